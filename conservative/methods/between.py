@@ -1,7 +1,7 @@
-"""SampleTimes at any times: from the step before each of them, on by short steps of high order, to round-off.
+"""Samples at arbitrary times: each is computed from the step before it, by short steps of high order that add only round-off.
 
-So a sample is as good as the steps that lead to it: no polynomial is put through steps, and no invariant is lost. Source: the
-coefficients are Dormand and Prince's, as in `conservative.methods.coefficients.explicit`; the rest is our own.
+A sample is therefore as accurate as the steps before it, and conserves the same invariants. An interpolating polynomial would
+be less accurate. The substeps use the coefficients of Dormand and Prince (`conservative.methods.coefficients.explicit`).
 """
 
 from __future__ import annotations
@@ -27,27 +27,29 @@ from .principal_axes import PrincipalStart, invariant_scales, principal_start
 from .units import bound_rate, convert_scene, find_units
 
 SAME = 1e-9
-"""Part of a step by which a sample may be off a step to be taken from it as it is."""
+"""A sample that is closer to a step than this share of the step size is the state of that step."""
 RADIANS = 0.5
-"""Longest step that a gap is crossed in at first, rad turned at most."""
+"""First substep across a gap, as the largest possible rotation, rad."""
 LONGEST = 6.0
-"""Longest step, rad turned at most, where accuracy does not depend on it: shorter ones cost less than longer gaps."""
+"""Longest step, as the largest possible rotation, rad, of methods whose accuracy does not depend on it.
+
+Shorter steps cost less than the substeps across longer gaps."""
 MOST_KEPT = 10**6
-"""Steps of a run that are kept to start from; of more, as many, evenly spaced."""
+"""Largest number of steps, evenly spaced, that are stored as starting points of samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampleTimes:
-    """Which samples of a run are kept.
+    """The samples that a run stores.
 
     Attributes
     ----------
     spacing
-        Where steps have to divide it: the distance of samples, s. Else None.
+        Sampling interval, s, that the steps have to divide; None for any steps.
     every
-        So many of these distances, or of the steps, are from one sample to the next.
+        Number of these intervals, or of steps, between samples.
     at
-        Times of the samples (n,), s, in increasing order, instead of both. Else None.
+        Increasing times of the samples (n,), s, which replace the other two; None for evenly spaced samples.
     """
 
     spacing: float | None = None
@@ -56,12 +58,12 @@ class SampleTimes:
 
 
 def read_times(value: object, t_end: float) -> Array:
-    """Return times of samples (n,), s, as given or, where `value` is a number, so many evenly spaced ones from 0 to t_end, s.
+    """Return the times of samples (n,), s. An integer `value` is the number of times, evenly spaced from 0 to t_end, s.
 
     Raises
     ------
     BadInput
-        They are no numbers, not finite, not in increasing order, not within 0 to t_end, none, or do not fit in memory.
+        The times are not numbers, not finite, not increasing, not within 0 to t_end, or empty, or they do not fit in memory.
     """
     allowed = f"times (n,), s, in increasing order from 0 to t_end = {t_end:g}, or their number, 2 or more"
     if not isinstance(value, bool) and isinstance(value, Integral):
@@ -82,7 +84,7 @@ def read_times(value: object, t_end: float) -> Array:
 
 
 def _require_count(n: int, least: int, allowed: str) -> None:
-    """Raise `BadInput` unless the number n of samples is at least so large, and they fit in memory."""
+    """Raise `BadInput` unless there are at least `least` samples and they fit in memory."""
     if n < least:
         raise BadInput("t_eval", "none" if n == 0 else f"{n}", allowed)
     if n > most_samples():
@@ -92,26 +94,26 @@ def _require_count(n: int, least: int, allowed: str) -> None:
 
 
 def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
-    """Return the grid of steps dt, s, from which samples at times t (n,), s, are reached."""
+    """Return the grid of steps dt, s, from which samples at times t (n,), s, are computed."""
     dt = divide_step(scene, method, dt)
     n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
     return Grid(dt, n_steps, spread(n_steps))
 
 
 def divide_step(scene: Scene, method: Method, dt: float) -> float:
-    """Return the step dt, s; an equal part of it where accuracy does not depend on the step, and gaps would be long."""
+    """Return the step dt, s, or an equal part of it if accuracy does not depend on the step and gaps would be long."""
     return dt if method.order is not None else dt / max(1, math.ceil(dt * bound_rate(scene) / LONGEST))
 
 
 def spread(n_steps: int) -> int:
-    """Return after how many steps each one is kept, of a number of steps."""
+    """Return the number of steps between stored ones in a run of `n_steps` steps."""
     return max(1, n_steps // MOST_KEPT)
 
 
 def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> Trajectory:
-    """Return the samples at times t (n,), s, in increasing order, of the run of a method on a grid.
+    """Return the samples at increasing times t (n,), s, from the run of a method on a grid.
 
-    Of a run that failed, those up to its last good step.
+    The samples of a failed run end at its last valid step.
     """
     if not len(found):
         return found
@@ -127,10 +129,10 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
 
 
 def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
-    """Return what follows after gaps (n,), s, on states at times t (n,), s, and how many were moved.
+    """Move states at times t (n,), s, forward by gaps (n,), s. Return the attitudes, the rates and the number of moved states.
 
-    These are all before the first that cannot be. States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those
-    whose gap is 0 stay as they are, bit for bit.
+    States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. If a state cannot be moved, the later ones are not moved
+    either. States with a gap of 0 do not change.
     """
     far = np.flatnonzero(gaps)
     R, w = R_WB.copy(), w_WB_B.copy()
@@ -144,7 +146,7 @@ def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tup
 
 
 def _move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
-    """Do the same with a scene of order one and gaps that are not 0."""
+    """Move states as `move` does, in a scene of order one, by gaps that are not 0."""
     start, tableau = scene.derive(principal_start), DORMAND_PRINCE_8
     q, L = into_principal_axes(scene, start, R_WB, w_WB_B)
     longest, size = RADIANS / bound_rate(scene), invariant_scales(scene)[1]
@@ -157,7 +159,7 @@ def _move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tu
 
 
 def into_principal_axes(scene: Scene, start: PrincipalStart, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array]:
-    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes: of attitudes (n, 3, 3), rates (n, 3), rad/s."""
+    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes, from attitudes (n, 3, 3) and rates (n, 3)."""
     R_BP = scene.body.R_BP
     return np.ascontiguousarray(to_quaternion(R_WB @ R_BP)), np.ascontiguousarray((w_WB_B @ R_BP) * scene.body.moments)
 

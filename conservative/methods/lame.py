@@ -16,17 +16,17 @@ p(t + h) = S^2 - p(t) - p(h),
     A = [f(h) (p(h) + x + B) - f'(h) S] / 3,    b = [f'(h) - f(h) S] / 3.
 
 Proof: b is an elliptic function of t with simple poles at 0 and -h only, so it is linear in S, and both coefficients follow
-from t -> 0; A = -db/dt with the end of the step held fixed. So no step has a truncation error, however long. The constants
-p(h), p'(h), f(h), f'(h) are found once per run in twofold precision, from Laurent series and these theorems at doubled
-arguments. Nothing is singular: an axis through a pole, a sleeping top, steady precession, zero spin, rest and no gravity are
-ordinary states.
+from t -> 0. A = -db/dt with the end of the step held fixed. A step of any length therefore has no truncation error. The
+constants p(h), p'(h), f(h), f'(h) are computed once per run in twofold precision, from Laurent series and these theorems at
+doubled arguments. No state is singular: an axis through a pole, a sleeping top, steady precession, zero spin, rest and no
+gravity need no special case.
 
-The constants belong to one energy and one momentum, so round-off alone would let both wander, linearly, and near a steady
-precession exponentially. Each step therefore ends with the smallest change of the state that restores them.
+The constants belong to one energy and one momentum. Round-off would let both drift, linearly, or exponentially near a steady
+precession. Each step therefore ends with the smallest change of the state that restores them.
 
-Why not something else on tops: `Gauss` needs some thirty times the work and stays for bodies without symmetry; a Taylor
-series of (axis, momentum) evaluates six products to order 20, where this takes one division and no series; compositions of free
-rotations and kicks have a truncation error and bound the energy only.
+Alternatives on tops are slower or less accurate. `Gauss` needs about thirty times the work. A Taylor series of (axis, momentum)
+evaluates six products to order 20, compared with one division here. Compositions of free rotations and kicks have a truncation
+error and only bound the energy error.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from .run_kernel import prepare_run
 from .units import bound_rate, in_own_units
 
 MOST_RADIANS = 1e6
-"""Largest turn in a step, rad, by all the energy there is: it takes as many parts, and half of the digits of the phase."""
+"""Longest step, as the largest rotation that the energy allows, rad. Such a step loses half of the digits of the phase."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Lame(Method):
         return MOST_RADIANS / bound_rate(scene)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Return the run of a scene, as `Method.prepare` has it.
+        """Return the run of a scene, as `Method.prepare` does.
 
         Raises
         ------
@@ -112,29 +112,29 @@ class Lame(Method):
         return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
-        """Lanes for all tops that it has a step for."""
+        """Return the run of the supported tops in lanes; None if lanes do not support the field."""
         return prepare_lanes(self, bodies, grid) if in_gravity_or_free(bodies) else None
 
 
 def convert(scene: Scene, method: Lame) -> tuple[str, PrincipalStart, Any]:
-    """Return the label of a run, its start in the frame that does not spin and the kernel's model of it."""
+    """Return the label of a run, its initial state in the non-spinning frame, and the kernel's model."""
     start = principal_start(scene, "non_spinning")
     moment = start.field.z if start.field else 0.0
     return method.label, start, kernels("lame").Model(start.J[0], moment, start.q, start.L)
 
 
 PART = 1.5e-8
-"""Seconds that a part of a step takes for a body among many, about: only how often a run can be stopped follows from it."""
+"""Approximate time, s, of a part of a step for a body in lanes. It determines only how often a run can be stopped."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tops:
-    """n tops at the start, in the frame that does not spin.
+    """The initial states of n tops, in the non-spinning frame.
 
     Attributes
     ----------
     places
-        Which of the bodies (n,) they are.
+        Indices of the tops (n,) in the batch.
     J1, J3
         Moments (n,) across and along the axis, kg m^2.
     kappa
@@ -142,7 +142,7 @@ class Tops:
     q, L
         Attitudes (n, 4), scalar first, and momenta (n, 3), kg m^2/s.
     R_BP
-        Rotations (n, 3, 3) from the frame's axes to those of the body.
+        Rotations (n, 3, 3) from the frame's axes to body axes.
     """
 
     places: Any
@@ -158,43 +158,43 @@ class Tops:
 
     @property
     def spin(self) -> Array:
-        """Rates (n, 2) about the axis that the frame lacks, rad/s, and 1/J3."""
+        """Spin (n, 2): the rate about the axis that the frame omits, rad/s, and 1/J3."""
         return np.stack([spin_rate(self.J1, self.J3, self.L[:, 2]), 1 / self.J3], axis=1)
 
     @property
     def rate(self) -> Array:
-        """Rates (n,), rad/s, as `bound_rate` has them of scenes."""
+        """Upper bounds of the angular speed (n,), rad/s, as `bound_rate` computes for scenes."""
         kinetic = (self.L[:, 0] ** 2 + self.L[:, 1] ** 2) / self.J1 + self.L[:, 2] ** 2 / self.J3
         return np.sqrt((kinetic + 2 * np.abs(self.kappa)) / np.minimum(self.J1, self.J3))
 
     def convert(self, units: Array, time: float) -> Tops:
-        """Return them in other units of moments (n,), kg m^2, and of time, s."""
+        """Convert to other units of moments (n,), kg m^2, and of time, s."""
         kappa, L = self.kappa / units * time * time, self.L / units[:, None] * time
         return Tops(self.places, self.J1 / units, self.J3 / units, kappa, self.q, L, self.R_BP)
 
 
 def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
-    """Return the run of many tops with `conservative.kernels.lame_many`; None where none of them has such a step."""
+    """Return the run of many tops with `conservative.kernels.lame_many`; None if no body has a step of this kind."""
     kernel, n, time = kernels("lame_many"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
     if tops is not None:
-        with np.errstate(all="ignore"):  # whose numbers overflow is not among the tops that are left
+        with np.errstate(all="ignore"):  # the comparison below excludes tops whose numbers overflow
             tops = tops.convert(find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1)), time)
             tops = tops[tops.rate * h <= MOST_RADIANS]
     if tops is None or not len(tops.places):
         return None
     table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
     kernel.prepare(tops.J1, tops.kappa, tops.q, tops.L, h, table)
-    # Those with as many parts of a step side by side, so that few lanes wait for others.
+    # Tops with equal numbers of parts per step are neighbours, so that few lanes wait.
     order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
     tops, table[:, : len(order)] = tops[order], table[:, order]
     return march_tops(tops, table, grid, n)
 
 
 def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
-    """Return the run of tops among n bodies: moments in units of their own, times in that of the step.
+    """Return the run of tops in a batch of n bodies. Moments are in each body's unit, times in the unit of the step.
 
-    The table (32, m) is what the kernel made of them, without a unit.
+    `table` (32, m) is the kernel's prepared table, dimensionless.
     """
     kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
@@ -211,7 +211,7 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
 
 
 def find_tops(method: Lame, bodies: Batch) -> Tops | None:
-    """Return those of the bodies that the method supports, as tops; None where there are none."""
+    """Return the tops that the method supports; None if there are none."""
     if has_one_axis(bodies):
         return find_alike(method, bodies)
     found = []
@@ -225,13 +225,13 @@ def find_tops(method: Lame, bodies: Batch) -> Tops | None:
 
 
 def has_one_axis(bodies: Batch) -> bool:
-    """Whether all bodies have the same axis of symmetry for certain, as inertia and the direction of their moments are."""
+    """Return whether all bodies surely have the same axis of symmetry: inertia and direction of the moment are shared."""
     weights = bodies.parameters.get("weight", np.ones(1))
     return bodies.inertia is None and "com_B" not in bodies.parameters and bool((weights > 0).all() or (weights < 0).all())
 
 
 def find_alike(method: Lame, bodies: Batch) -> Tops | None:
-    """Return what `find_tops` does, of bodies with the same axis."""
+    """Return the tops, as `find_tops` does, if all bodies have the same axis."""
     scene, n = bodies.take(0), len(bodies)
     if method.unsupported(scene) is not None:
         return None

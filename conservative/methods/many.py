@@ -12,14 +12,14 @@ from ..attitude import Array
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """What a run of n bodies gives, of s samples each.
+    """The samples of n bodies, s of each.
 
     Attributes
     ----------
     R_WB, w_WB_B
         Attitudes (n, s, 3, 3), body to world, and angular velocities (n, s, 3), rad/s, body axes.
     finished
-        Whether each body (n,) was finished here. Those that were not are run again, each alone, and their samples replaced.
+        Booleans (n,). Bodies that are not finished are integrated again one by one, and their samples are replaced.
     """
 
     R_WB: Array
@@ -31,7 +31,7 @@ RunMany = Callable[[], Block]
 
 
 class GivenUp(BaseException):
-    """Nobody waits for this block any more: whoever asked for it was interrupted, or another block failed."""
+    """The block is no longer needed: the caller was interrupted, or another block failed."""
 
 
 _of_thread = threading.local()
@@ -43,10 +43,9 @@ def watch(given_up: threading.Event) -> None:
 
 
 def pause() -> None:
-    """Raise `GivenUp` if nobody waits for this thread's block any more.
+    """Raise `GivenUp` if this thread's block is no longer needed.
 
-    Called between two pieces of a block, every 20 to 50 ms. In the main thread, Ctrl-C needs no call: Python raises it by
-    itself.
+    Called between two pieces of a block, every 20 to 50 ms. In the main thread, Ctrl-C works without this call.
     """
     given_up = getattr(_of_thread, "given_up", None)
     if given_up is not None and given_up.is_set():

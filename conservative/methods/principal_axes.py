@@ -1,8 +1,7 @@
-"""To principal axes and back: the one conversion that all compiled methods share.
+"""Conversion of initial states to principal axes, for all compiled methods.
 
-Kernels see a diagonal inertia, the attitude `R_WP` as a quaternion (scalar first) and the momentum `L_P`. Their axes P can be
-those of the frame that does not spin (`conservative.methods.non_spinning`); the spin is then added to the samples. Source:
-definitions.
+Kernels use a diagonal inertia, the attitude `R_WP` as a quaternion (scalar first) and the momentum `L_P`. The axes P can also
+belong to the non-spinning frame (`conservative.methods.non_spinning`); the spin is then added to the samples.
 """
 
 from __future__ import annotations
@@ -27,20 +26,20 @@ Quadruple = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class PrincipalStart:
-    """A scene's start as kernels take it: floats in tuples, principal axes.
+    """The initial state of a scene for kernels: tuples of floats, principal axes.
 
     Attributes
     ----------
     J, J_inverse
-        Moments of what the kernel moves, kg m^2, and their inverses.
+        Moments of inertia that the kernel uses, kg m^2, and their inverses.
     q, L
-        Attitude, scalar first, and momentum, kg m^2/s, at the start.
+        Initial attitude, scalar first, and initial momentum, kg m^2/s.
     R_BP
-        Rotation (3, 3) from the kernel's axes to those of the body; None where they are the same.
+        Rotation (3, 3) from the kernel's axes to body axes; None if they are the same.
     field
-        Parameters of the potential in the kernel's axes, None without one.
+        Parameters of the potential in the kernel's axes; None for a free body.
     spin
-        Where the third axis is one of symmetry and its spin is left out: the rate of that, rad/s, and 1/J3. Else None.
+        In the non-spinning frame, the omitted rate about the third axis, rad/s, and 1/J3; otherwise None.
     """
 
     J: Triple
@@ -53,7 +52,7 @@ class PrincipalStart:
 
 
 def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
-    """Return the scene's start in principal axes, or in the frame that does not spin.
+    """Return the initial state of a scene in principal axes, or in the non-spinning frame.
 
     Raises
     ------
@@ -64,13 +63,13 @@ def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
         return start_along(scene, scene.body.R_BP, scene.body.moments)
     axes, J1, J3 = slow_axes(scene)
     start = start_along(scene, axes, np.array((J1, J1, J3)))
-    upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis but for round-off
+    upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis, up to round-off
     spin = (spin_rate(J1, J3, start.L[2]), 1 / J3)
     return replace(start, J=(J1, J1, J1), J_inverse=(1 / J1, 1 / J1, 1 / J1), field=upright, spin=spin)
 
 
 def slow_axes(scene: Scene) -> tuple[Array, float, float]:
-    """Return axes (3, 3) of the frame that does not spin, in body axes, and the moments across and along its third, kg m^2.
+    """Return the axes (3, 3) of the non-spinning frame, body components, and the moments across and along the third, kg m^2.
 
     Raises
     ------
@@ -85,12 +84,12 @@ def slow_axes(scene: Scene) -> tuple[Array, float, float]:
 
 
 def spin_rate(J1: Any, J3: Any, L3: Any) -> Any:
-    """Return the rate about the axis, rad/s, that the frame lacks, of moments, kg m^2, and momentum along it, kg m^2/s."""
+    """Return the omitted rate about the axis, rad/s, from moments, kg m^2, and the momentum along the axis, kg m^2/s."""
     return (J1 - J3) / (J1 * J3) * L3
 
 
 def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
-    """Return the start in axes (3, 3) along which the scene's body has these moments (3,), kg m^2."""
+    """Return the initial state in the axes R_BP (3, 3), in which the body has the moments (3,), kg m^2."""
     L = (scene.w_WB_B0 @ R_BP) * moments
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
@@ -110,9 +109,9 @@ def field_axis(scene: Scene) -> Triple | None:
 
 
 def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes.
+    """Return the reference scales of energy, J, and momentum, kg m^2/s: the largest momentum that the energy allows.
 
-    The first is inf where neither energy nor Jacobi integral is conserved.
+    The first is inf if neither energy nor Jacobi integral is conserved.
     """
     energy, potential = scene.energy_scale, scene.potential
     momentum = math.sqrt(2 * energy * float(scene.body.moments.max()))

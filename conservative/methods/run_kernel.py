@@ -1,4 +1,4 @@
-"""The runner of all kernels that take steps: it calls the kernel and returns its samples as a trajectory."""
+"""Run a kernel that makes steps, and return its samples as a trajectory."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
 
     `start` turns the samples from principal to body axes. Everything that all calls share is made here, including the arrays q
-    and L, because a run is not called twice at a time.
+    and L, because calls of one run do not overlap.
     """
     n, n_steps, t = grid.n_samples, grid.n_steps, grid.t
     q, L, of_R, of_w = np.empty((n, 4)), np.empty((n, 3)), (n, 3, 3), (n, 3)
-    # Of the workspace, the last three are of each run. Its count is checked by `enter`, that of the result by unpacking it.
     enter, to_body_axes = partial(kernel.enter, *model, *coefficients, n_steps, grid.every), kernels("samples").to_body_axes
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
@@ -39,7 +38,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
         nonlocal counts, counters
         try:
             done, stages, corrections, evaluations, size, elsewhere = enter(kernel.PAUSE if in_main_thread() else 0, q, L)
-        except np.linalg.LinAlgError:  # what compiled code cannot catch: equations that are singular, or not finite
+        except np.linalg.LinAlgError:  # compiled code cannot catch it: the equations are singular or not finite
             done, size, elsewhere = count_steps(enter, q, L, grid), np.inf, False
             stages, corrections, evaluations = 0, 0, None
         # Runs share their counters, which are frozen and rarely change: 0.3 us.
@@ -72,7 +71,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
 
 def count_steps(enter: Any, q: Array, L: Array, grid: Grid) -> int:
-    """Return how many steps a run that raises takes at least, by the samples it fills: q (n, 4), L (n, 3), kg m^2/s."""
+    """Return a lower bound of the steps before a run raises, from the samples that it fills: q (n, 4), L (n, 3), kg m^2/s."""
     q.fill(np.nan)
     with suppress(np.linalg.LinAlgError):
         enter(0, q, L)
@@ -80,17 +79,17 @@ def count_steps(enter: Any, q: Array, L: Array, grid: Grid) -> int:
 
 
 def in_main_thread() -> bool:
-    """Whether this is the thread that Python calls handlers of signals in."""
+    """Return whether this is the main thread, in which Python runs signal handlers."""
     return get_ident() == main_thread().ident
 
 
 def turn_back(
     start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
 ) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure, if some are not finite.
+    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure if a sample is not finite.
 
-    They are made of the first n of q (., 4) and L (., 3), kg m^2/s, principal axes, up to the first that is not finite.
-    The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
+    The first n samples q (., 4) and L (., 3), kg m^2/s, principal axes, are converted, up to the first that is not finite. The
+    quaternion is normalised here; its length has no meaning, because the kernels' products are homogeneous in it.
     """
     t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))
     finite = kernels("samples").to_body_axes(t, q, L, start.J_inverse, start.spin, start.R_BP, R_WB, w_WB_B)

@@ -1,7 +1,7 @@
-"""Symmetric compositions: a symmetric step of order 2, taken with several lengths in a row, becomes one of higher order.
+"""Symmetric compositions: several symmetric steps of order 2 with different lengths form one step of higher order.
 
-A set is data: its source, the order it claims and the first half of its lengths relative to the step, the middle one last, as
-decimals of more digits than any arithmetic here has. It is checked when it is made, so a wrong digit cannot get in unnoticed.
+A composition consists of its source, its order and the first half of its lengths relative to the step, up to the middle one, as
+decimals with more digits than a double. It is checked when it is created, so a wrong digit is an error.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ...check import choice, describe
 from ...errors import BadInput
 
 DIGITS = Fraction(1, 10**38)
-"""How far the order conditions may be off: what the last decimals of the longest sets allow."""
+"""Tolerance of the order conditions: the precision of the longest compositions."""
 
 
 @dataclass(frozen=True)
@@ -23,17 +23,17 @@ class Composition:
     Attributes
     ----------
     name, source
-        What it is called and where it was published.
+        Name and publication.
     order
-        Even order that it gives to a symmetric step of order 2.
+        Even order of the composition of symmetric steps of order 2.
     half
         Decimals of the lengths of the first stages up to and including the middle one; the rest mirrors them.
 
     Raises
     ------
     BadInput
-        The order is not even, or the lengths do not satisfy sum w = 1 and, below the order, sum w^k = 0 for odd k > 1: what the
-        composition of motions in one dimension asks for (Hairer, Lubich & Wanner 2006, III.3). Tests observe the order itself.
+        The order is not even, or the lengths do not satisfy sum w = 1 and, below the order, sum w^k = 0 for odd k > 1, the
+        conditions in one dimension (Hairer, Lubich & Wanner 2006, III.3). Tests measure the order itself.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Composition:
 
     @property
     def weights(self) -> tuple[Fraction, ...]:
-        """Lengths of all stages relative to the step, as the decimals say, without rounding."""
+        """Lengths of all stages relative to the step: the exact values of the decimals."""
         first = tuple(Fraction(text) for text in self.half)
         return first + first[-2::-1]
 
@@ -66,8 +66,8 @@ class Composition:
     def lengths(self, dt: float) -> tuple[float, ...]:
         """Return the lengths of the stages, s, of a step dt, s.
 
-        Each is rounded once, from the exact product, and the middle one is what is then left of dt, so that errors of single
-        lengths do not add up to a clock that is wrong.
+        Each is rounded once, from the exact product. The middle one is the remainder of dt, so that rounding errors do not
+        accumulate.
         """
         rounded = [float(w * Fraction(dt)) for w in self.weights]
         middle = len(self.half) - 1

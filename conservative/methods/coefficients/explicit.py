@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta coefficients as data that checks itself. Source: each carries its own."""
+"""Coefficients of explicit Runge-Kutta methods, checked when they are created."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...errors import BadInput
 
 Row = tuple[float, ...]
 ROUND_OFF = 1e-13
-"""How far sums of coefficients of size 50, given to a float's precision, may be off."""
+"""Tolerance of the order conditions: coefficients of size 50 are given to double precision."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class ExplicitTableau:
     Attributes
     ----------
     source
-        Where it was published.
+        Publication.
     order
-        The order that it claims.
+        Order of convergence.
     A
-        Row i has the i coefficients of the slopes that stage i is made of: the first row is empty.
+        Row i has the i coefficients of the earlier slopes in stage i; the first row is empty.
     b
         Weights (stages,) of the slopes.
 
@@ -36,7 +36,7 @@ class ExplicitTableau:
     ------
     BadInput
         A row has another length, or the weights are not a quadrature of the order: sum b c^k = 1/(k+1) for k below it, and the
-        chains b A c^k with one A more. What more the order asks for shows as the observed order, in the tests.
+        chains b A c^k with one more A. Tests measure the order itself.
     """
 
     source: str
@@ -61,7 +61,7 @@ class ExplicitTableau:
 
     @cached_property
     def packed(self) -> tuple[Array, Array, Array]:
-        """What is not zero of A and, last, of b: factors (n,), their columns (n,), and where in those each row starts."""
+        """Nonzero entries of A and then b: factors (n,), their columns (n,), and the index at which each row starts."""
         rows = [[(value, column) for column, value in enumerate(row) if value] for row in (*self.A, self.b)]
         values, columns = zip(*itertools.chain(*rows), strict=True)
         return np.array(values), np.array(columns), np.cumsum([0, *map(len, rows)])

@@ -1,4 +1,4 @@
-"""Gauss-Legendre collocation: nodes, weights and matrices, computed with 60 digits and kept as high and low parts."""
+"""Gauss-Legendre collocation: nodes, weights and matrices, computed with 60 digits and stored as high and low parts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Tableau:
     A, A_low
         A[i, j] is the integral of the j-th Lagrange polynomial from 0 to c_i.
     E
-        The same from 1 to 1 + c_i: what continues a step's polynomial to the stages of the next, as a first guess.
+        The same from 1 to 1 + c_i. It extrapolates a step's polynomial to the stages of the next step, as a first guess.
     """
 
     c: Array
@@ -41,7 +41,7 @@ def tableau(stages: int) -> Tableau:
     """Return the coefficients for `stages` stages, 1 to `MOST_STAGES` (Hairer, Lubich & Wanner, II.1.3)."""
     from mpmath import MPContext
 
-    mp = MPContext()  # that of the user has one precision for all threads
+    mp = MPContext()  # mpmath's global context has one precision for all threads
     mp.dps = DIGITS
     c = _nodes(mp, stages)
     inverse = mp.matrix([[node**k for node in c] for k in range(stages)]) ** -1
@@ -52,13 +52,13 @@ def tableau(stages: int) -> Tableau:
 
 
 def _nodes(mp: Any, stages: int) -> list[Any]:
-    """Zeros of the shifted Legendre polynomial, by Newton from the double-precision ones."""
+    """Return the zeros of the shifted Legendre polynomial, by Newton's method from their double-precision values."""
     start = np.polynomial.legendre.leggauss(stages)[0]
     return [(1 + mp.findroot(lambda x: mp.legendre(stages, x), mp.mpf(float(x)))) / 2 for x in start]
 
 
 def _integrals(mp: Any, inverse: Any, start: list[Any], end: list[Any]) -> Any:
-    """Integrals of all Lagrange polynomials from start_i to end_i; `inverse` turns moments of 1, x, x^2, ... into them."""
+    """Return the integrals of all Lagrange polynomials from start_i to end_i; `inverse` converts moments of 1, x, x^2, ..."""
     degrees = range(1, inverse.rows + 1)
     moments = mp.matrix([[(y**k - x**k) / k for k in degrees] for x, y in zip(start, end, strict=True)])
     return (inverse * moments.T).T
