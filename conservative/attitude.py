@@ -50,7 +50,7 @@ def from_quaternion(q: ArrayLike) -> Array:
 def to_quaternion(R: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3).
 
-    Of the four formulas it takes the one with the largest component (Shepperd 1978). The scalar part is not negative.
+    The formula with the largest component is used (Shepperd 1978). The scalar part is not negative.
     """
     R = np.asarray(R, dtype=float)
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]

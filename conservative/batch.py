@@ -20,7 +20,7 @@ from .scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """n independent bodies in scenes of one kind. The constructor checks nothing.
+    """n independent bodies in scenes of one kind. The constructor does not check its arguments.
 
     Attributes
     ----------
@@ -31,8 +31,8 @@ class Batch:
     inertia
         Tensors (n, 3, 3), kg m^2, body axes; None if all bodies have the scene's.
     parameters
-        Numbers (n, ...) of the scene's potential that differ from body to body, by the names of its fields; of a field that
-        turns, those of the field in its own axes.
+        Parameters (n, ...) of the potential that differ between bodies, by name. For a turning field, parameters of the field
+        in its own axes.
     """
 
     scene: Scene
@@ -51,12 +51,12 @@ class Batch:
 
     @classmethod
     def of(cls, scene: Scene) -> Batch:
-        """Return a batch of one body, that of a scene."""
+        """Return the batch of one body of a scene."""
         return cls(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
 
     @cached_property
     def first(self) -> Scene:
-        """The scene of body 0: `scene` itself, with its cache, if the batch was made of it alone."""
+        """The scene of body 0: `scene` itself, with its cache, if it is the only body."""
         scene = self.scene
         same = self.R_WB0.base is scene.R_WB0 and self.w_WB_B0.base is scene.w_WB_B0
         return scene if same and self.inertia is None and not self.parameters else self.take(0)
@@ -96,12 +96,12 @@ class Batch:
 
     @cached_property
     def q_WP0(self) -> Array:
-        """Attitudes (n, 4) of the principal axes at the start, scalar first."""
+        """Initial attitudes (n, 4) of the principal axes, scalar first."""
         return to_quaternion(self.R_WB0 @ self.principal[1])
 
     @cached_property
     def L_P0(self) -> Array:
-        """Angular momenta (n, 3) at the start, kg m^2/s, principal axes."""
+        """Initial angular momenta (n, 3), kg m^2/s, principal axes."""
         moments, R_BP = self.principal
         return np.asarray((self.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * moments)
 
@@ -117,6 +117,6 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
 
 
 def replace_unchecked(scene: Scene, **changes: Any) -> Scene:
-    """Return the scene with other fields, which are known to be right, and nothing derived from the old ones."""
+    """Return a copy of the scene with other fields, unchecked, and an empty cache."""
     kept = ("name", "t_end", "dt", "extra_invariants", "group", "source")
     return build_unchecked(Scene, **{name: getattr(scene, name) for name in kept}, **changes)

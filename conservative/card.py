@@ -82,19 +82,19 @@ class Card:
     group
         Only the first family of a group that supports the scene is tried; "" for a family outside all groups.
     exact
-        Whether there is no truncation error. The first such family that supports the scene is taken without comparison.
+        True if there is no truncation error. The first such family that supports the scene is chosen without comparison.
     candidates
         Settings that the automatic choice tries.
     longest
         Longest step that the automatic choice tries, in radians of the fastest possible rotation.
     cost
-        Returns the cost of a setting's work. Default: that of an explicit step of order 8.
+        Returns the cost of a setting's work. Default: an explicit step of order 8.
     colour
         A name in `conservative.reports.charts.style.PALETTE`, or a colour such as "#0072B2"; None for any free colour.
     kernel
         Module in `conservative.kernels` whose function `enter` makes all steps of a run; "" if there is none.
     time_dependent
-        Whether potentials that depend on time are supported. If not, `Method.unsupported` reports them.
+        True if potentials that depend on time are supported. If not, `Method.unsupported` reports them.
     """
 
     variants: tuple[str, ...] = ("",)

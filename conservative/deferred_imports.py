@@ -1,6 +1,6 @@
-"""Modules that are imported when they are first used: kernels, and what installed packages register as entry points.
+"""Modules that are imported when they are first used: kernels and registered entry points.
 
-Importing numba takes a second and importing every engine several seconds, which a command without an integration saves.
+Importing numba takes a second, and importing every engine several seconds. Commands without an integration need neither.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ def kernels(name: str) -> Any:
 @lru_cache(maxsize=8)
 def list_entries(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group such as `SCENES` by name, sorted; nothing is imported."""
-    from importlib.metadata import entry_points  # here, as it takes 20 ms, and an integration with a given method needs none
+    from importlib.metadata import entry_points  # here: it takes 20 ms, often unneeded
 
     return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
 
 
 def load_entry(group: str, argument: str, name: str) -> Any:
-    """Return the object that is registered under a name in a group. `argument` is what messages call the name.
+    """Return the object that is registered under a name in a group. `argument` is the name of the argument in messages.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from .scene import Scene
 
 ORTHONORMALITY = "orthonormality"
 NEARLY = 1e-11
-"""Relative difference of moments up to which the symmetry of a body is checked in full: more than counts as equal."""
+"""Relative difference of moments below which the symmetry of a body is checked completely; larger than any tolerance."""
 _NO_ENERGIES = np.empty((0, 0))
 
 
@@ -44,9 +44,9 @@ class ReferenceValues:
     def measure(self, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
         """Return the largest drifts (n, 5) of each body, dimensionless.
 
-        The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of those that are conserved by
-        the method. They are nan for a body with samples that are not finite, and for all if samples are not at the times of the
-        grid. Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+        The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the
+        method conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not
+        the grid's. Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
         """
         drifts = np.empty((len(self.rows), 5))
         V = _NO_ENERGIES if self.bodies.scene.potential is None else field_energies(self.bodies, t, R_WB, w_WB_B)
@@ -62,7 +62,7 @@ def scene_reference(scene: Scene, conserved: frozenset[str]) -> ReferenceValues:
 def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> ReferenceValues:
     """Return the reference values of n bodies, for a method that conserves the invariants of these names.
 
-    The rules for scales are those of `Scene.energy_scale`, `invariants_of` and `kept_sizes`.
+    Scales follow the rules of `Scene.energy_scale`, `invariants_of` and `kept_sizes`.
     """
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
@@ -102,7 +102,7 @@ def list_drifts(bodies: Batch) -> tuple[str, ...]:
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return the largest drifts (n, k) by the names of `list_drifts`; nan where a body has no such invariant, or failed.
+    """Return the largest drifts (n, k) by the names of `list_drifts`; nan if a body failed or does not have the invariant.
 
     Parameters
     ----------
@@ -161,14 +161,14 @@ def find_axes(bodies: Batch) -> Array:
 
 
 def field_scales(bodies: Batch) -> Array | float:
-    """Return the size of the field, J: of each body (n,), or one for all."""
+    """Return the magnitude of the potential, J: (n,), or one number for all bodies."""
     if bodies.scene.potential is None:
         return 0.0
     return bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale()
 
 
 def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return the energies (n, m), J, that added to the kinetic ones are conserved; (0, 0) if none are.
+    """Return the energies (n, m), J, whose sum with the kinetic energies is conserved; (0, 0) if there are none.
 
     In a turning field they include the term of the Jacobi integral. Samples are at times (m,), s: attitudes (n, m, 3, 3), body
     to world, and rates (n, m, 3), rad/s, body axes.

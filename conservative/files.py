@@ -179,12 +179,12 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     with ExitStack() as stack:
         with _errors(target, argument):
             is_file = target.is_file() or not target.exists()
-            place = Path(os.path.realpath(target)) if is_file else target  # a link stays one; that of a pipe is nowhere
+            place = Path(os.path.realpath(target)) if is_file else target  # a link stays a link
             fresh, handle = stack.enter_context(_open_target(place))
         yield _RawFile(handle, target, argument)
         if fresh != place:
             with _errors(target, argument):
-                os.fsync(handle)  # before it takes the place: else a crash of the machine could leave an empty file there
+                os.fsync(handle)  # before the renaming, because a crash of the machine could otherwise leave an empty file
                 fresh.replace(place)
             sync(place.parent)
 

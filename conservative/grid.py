@@ -15,7 +15,7 @@ from .errors import BadInput
 from .scene import Scene
 
 MOST_STEPS = 2**53
-"""Largest number of steps of a run: times are multiples of dt, and floats count no farther."""
+"""Largest number of steps of a run: times are multiples of dt, and larger integers are not exact in floats."""
 SAMPLE_BYTES = 1000
 """Memory that a run takes for a sample, bytes, including intermediate results."""
 MEMORY_SHARE = 0.5
@@ -115,7 +115,7 @@ def _recall_grid(dt: float, n_steps: int, every: int) -> Grid:
 
 @lru_cache(maxsize=1)
 def most_samples() -> int:
-    """Return how many samples fit into `MEMORY_SHARE` of this machine's memory."""
+    """Return the number of samples that fit into `MEMORY_SHARE` of this machine's memory."""
     try:
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):  # not on every system
@@ -124,7 +124,7 @@ def most_samples() -> int:
 
 
 def require_memory(argument: str, n_steps: int, every: int) -> None:
-    """Raise `BadInput` if a run of n_steps steps, of which every `every`-th is stored, has more than `most_samples`."""
+    """Raise `BadInput` if a run of n_steps steps stores more than `most_samples`, one after every `every` steps."""
     most, samples = most_samples(), 1 + -(-n_steps // every)
     if samples > most:
         fits = f"up to {most:.3g} samples fit in memory, {SAMPLE_BYTES} bytes each"

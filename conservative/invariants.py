@@ -113,7 +113,7 @@ def invariants_of(
     body, potential
         The body and its field.
     w_WB_B0
-        Angular velocity at the start (3,), rad/s, body axes.
+        Initial angular velocity (3,), rad/s, body axes.
     energy_scale
         Reference scale of the energy, J, above 0.
     """
@@ -132,7 +132,7 @@ def invariants_of(
 
 
 def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: float) -> Iterator[Invariant]:
-    """Yield the energy, or the Jacobi integral, or nothing."""
+    """Yield the energy, the Jacobi integral in a turning field, or nothing in another field that depends on time."""
     if isinstance(potential, Turning):
         field, orbit = potential.potential, potential.orbit
 
@@ -161,7 +161,7 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
 
 
 NEARLY_SPHERICAL = 0.005
-"""Relative gap of moments below which the axis of a symmetric body is not looked for beyond round-off."""
+"""Relative gap of moments below which `axial_direction` uses the plain tolerance."""
 
 
 def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-14) -> Array | None:

@@ -1,4 +1,4 @@
-"""The base class of all methods, ours and those of engines."""
+"""The base class of all methods, including engines."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Method(ABC):
 
     def __init_subclass__(cls) -> None:
         for name in ("colour", "variants", "suite", "rank", "candidates"):
-            if name in vars(cls):  # entries of the card were class attributes once
+            if name in vars(cls):  # these were class attributes in earlier versions
                 raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
         if "unsupported" in vars(cls):
             cls.unsupported = _refuse_time(cls.unsupported)  # type: ignore[method-assign]
@@ -67,7 +67,7 @@ class Method(ABC):
 
     @property
     def label(self) -> str:
-        """Maker and setting, such as `mujoco==4.0.0/RK4`; of our methods maker and name."""
+        """Maker and setting, such as `mujoco==4.0.0/RK4`. For our methods, maker and name."""
         setting = "" if self.role == Role.OURS else self.setting()
         return f"{self.maker}/{setting or self.name}"
 

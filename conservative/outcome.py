@@ -12,7 +12,7 @@ from typing import Any
 
 
 class OutcomeKind(StrEnum):
-    """How a run ended, or why it did not start."""
+    """Kind of outcome: a normal end, a failure, or the reason why a run did not start."""
 
     OK = "ok"
     NOT_CONVERGED = "not converged"
@@ -33,7 +33,7 @@ class OutcomeKind(StrEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended.
+    """The outcome of a run.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ class Sampled(Protocol):
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended."""
+        """Outcome of the run."""
 
     @property
     def work(self) -> dict[str, int]:

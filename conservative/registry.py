@@ -1,4 +1,4 @@
-"""Scenes, methods and engines by name. All are registered as entry points in the pyproject of a package, ours included.
+"""Scenes, methods and engines by name. All are registered as entry points in the pyproject.toml of a package, also ours.
 
     [project.entry-points."conservative.methods"]
     my_method = "my_package.my_file:MyMethod"           # a class derived from conservative.Method

@@ -54,7 +54,7 @@ class Trajectory:
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended: ok, or the failure and its time."""
+        """Outcome of the run: ok, or the failure and its time."""
         return OK if self.failure is None else self.failure.outcome
 
     @property
@@ -148,7 +148,7 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
     """Return the error in type, shape or scene of the result of a run on a grid, or None if it is a trajectory of the scene."""
     is_trajectory: bool = isinstance(result, Trajectory)
     if not is_trajectory:
-        return f"a {type(result).__name__}, no Trajectory"
+        return f"a {type(result).__name__}, not a Trajectory"
     if result.scene is not scene:
         return "the trajectory of another scene"
     if not isinstance(result.counters, Counters):
@@ -170,17 +170,17 @@ def find_misplaced(result: Trajectory, grid: Grid) -> str | None:
     """Return the error in times or initial state of the samples of a run on a grid, or None."""
     t, scene = grid.t, result.scene
     if len(result) > len(t) or not np.allclose(result.t, t[: len(result)], rtol=1e-12, atol=0):
-        return "samples at other times than those of the grid"
+        return "samples at times that are not in the grid"
     R_off = np.abs(result.R_WB[:1] - scene.R_WB0) > START_TOLERANCE
     w_off = np.abs(result.w_WB_B[:1] - scene.w_WB_B0) > START_TOLERANCE * np.abs(scene.w_WB_B0).max()
     return "a first sample that is not the start" if R_off.any() or w_off.any() else None
 
 
 def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return the samples of a run before the first that is not finite or, of a run that reached its end, beyond a bound.
+    """Cut a trajectory before the first invalid sample: one that is not finite or, if the run reached its end, exceeds a bound.
 
-    `conserved` are the names of the bounded invariants. A trajectory without such a sample is returned unchanged, and one that
-    is cut has the failure.
+    `conserved` are the names of the bounded invariants. A trajectory without invalid samples is returned unchanged. One that
+    is cut contains the failure.
     """
     with np.errstate(all="ignore"):
         n = finite_prefix(result.R_WB, result.w_WB_B)
@@ -209,7 +209,7 @@ def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
     """Return how many leading samples of attitudes (n, 3, 3) and rates (n, 3), rad/s, are finite."""
-    if np.isfinite(R_WB).all() and np.isfinite(w_WB_B).all():  # nearly always, and in a third of the time
+    if np.isfinite(R_WB).all() and np.isfinite(w_WB_B).all():  # the usual case, three times as fast
         return len(R_WB)
     finite = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
     return int(np.argmin(finite))

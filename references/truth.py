@@ -59,7 +59,7 @@ class Truth:
     checked_until
         End of the checked part, s.
     approximate
-        Whether the trajectory is neither a closed form nor multi-precision, so that `agreement_rad` bounds its accuracy.
+        True if the trajectory is neither a closed form nor multi-precision, so that `agreement_rad` bounds its accuracy.
     """
 
     trajectory: Trajectory

@@ -28,7 +28,7 @@ class Subject:
     study, scene
         Names of the study and of the scene; the scene is empty for a row without one.
     field, seed, body
-        Of a random body: its field or kind, the seed, and its index; "" and None for any other scene.
+        Field or kind of a random body, its seed and its index; "" and None for any other scene.
     method
         Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back. Empty if
         the row belongs to no single method.
@@ -39,7 +39,7 @@ class Subject:
     role
         Ours, engine or truth.
     series, series_setting
-        Name and setting of a line in a chart: those of the method without its tolerance.
+        Name and setting of a line in a chart: the method's without its tolerance.
     dt
         Step, s, or distance of samples of an adaptive method; NaN if the row belongs to no single step.
     """
@@ -68,13 +68,13 @@ class Measurement(Subject):
     Attributes
     ----------
     bodies, way
-        Of a run of many bodies: how many, and how they ran, such as "one at a time"; None and "" for a single body.
+        Number of bodies of a batch, and how they ran, such as "one at a time"; None and "" for a single body.
     quantity
         Invariant of a drift, or statistic of an error over many bodies; otherwise empty.
     measure, value
         Measure, and value in its unit; NaN if it could not be measured.
     outcome
-        Outcome of the run, or the reason why there was none.
+        Outcome of the run, or the reason why it was not made.
     detail
         Further information; may be empty.
     """

@@ -79,7 +79,7 @@ class Probe:
     cost
         Wall time per simulated second of this one run, s/s, for planning; nan if it failed.
     outcome
-        How the run ended.
+        Outcome of the run.
     """
 
     method: Method
@@ -228,7 +228,7 @@ class Conditions(Question):
         cost
             Expected wall time per simulated second, s/s; NaN if unknown.
         long
-            Which window.
+            True for the long window, False for the short one.
         before
             Probes at longer steps.
         """

@@ -136,7 +136,7 @@ class Advice:
     best
         The probe at the recommended setting; if no setting reaches the error, the nearest one.
     reached
-        Whether the requested error can be expected.
+        True if the requested error can be expected.
     cost
         Wall time per simulated second at that setting, s/s, interleaved minimum; NaN if it could not be timed.
     order

@@ -45,7 +45,7 @@ class Case:
     drawn
         The random body that the scene is.
     bodies, way
-        Of a run of many bodies: how many, and how they run, such as "one at a time".
+        Number of bodies of a batch, and how they run, such as "one at a time".
     """
 
     study: str

@@ -36,7 +36,7 @@ class Way:
     method
         The method.
     together
-        Whether `Method.prepare_many` runs the bodies at once; otherwise each body has its own run.
+        True if `Method.prepare_many` runs the bodies at once; otherwise each body has its own run.
     threads
         Number of our threads for blocks of bodies; the threads of an engine are one of its settings.
     """

@@ -49,7 +49,7 @@ class Change:
     quantity
         Name of the invariant of a drift; else empty.
     lost
-        Whether the later version lost something: the end of a run, an order, an invariant.
+        True if the later version lost something: the end of a run, an order, an invariant.
     """
 
     aspect: Aspect
@@ -89,7 +89,7 @@ def _orders(was: Observation, now: Observation) -> Iterator[Change]:
     grown = direction(was.error, now.error)
     for aspect, before, after in pairs:
         if math.isnan(before.slope) or math.isnan(after.slope):
-            # Whether an order can be fitted can depend on round-off. If the error changed too, it does not.
+            # Round-off can decide if an order can be fitted. Such a change counts only if the error changed too.
             if math.isnan(before.slope) != math.isnan(after.slope) and grown:
                 yield Change(aspect, before, after, lost=math.isnan(after.slope) and grown > 0)
         elif abs(after.slope - before.slope) > max(ORDER_STEP, ORDER_ERRORS * math.hypot(before.stderr, after.stderr)):

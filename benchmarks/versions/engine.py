@@ -96,11 +96,11 @@ class Observation:
     Attributes
     ----------
     scene, setting, version, label
-        Names; setting and label are those of the method.
+        Names; setting and label belong to the method.
     dt
         Step, s, of everything but the orders.
     outcome
-        How the run ended.
+        Outcome of the run.
     points
         Errors at shorter and shorter steps; empty for a method whose accuracy does not depend on a step.
     attitude_order, rates_order

@@ -31,7 +31,7 @@ class Version:
     commit
         Its commit, with "+changes" for a folder with changes that are not committed; "" for a wheel or a release.
     environment
-        Where it runs.
+        The environment in which it runs.
     """
 
     name: str
@@ -60,7 +60,7 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     project
         Folder of the project, which need not be the top of its repository.
     source
-        Where packages come from.
+        Source of packages.
     requirements
         Additional packages for its environment.
 

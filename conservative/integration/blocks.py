@@ -60,7 +60,7 @@ class BlockResult:
     failures: dict[int, IntegrationFailed]
 
     def put(self, first: int, part: BlockResult) -> None:
-        """Put the result of the bodies from number `first` on into this one."""
+        """Insert the result of a part that begins with body number `first`."""
         rows = slice(first, first + len(part))
         self.R_WB[rows], self.w_WB_B[rows], self.drifts[rows] = part.R_WB, part.w_WB_B, part.drifts
         self.failures.update((first + i, failure) for i, failure in part.failures.items())
@@ -75,7 +75,7 @@ def list_blocks(n: int, grid: Grid) -> range:
 
 
 def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
-    """Return the samples of a block. The outcome of each body is that of `Method.solve` for the body alone."""
+    """Return the samples of a block. The outcome of each body is the same as from `Method.solve` for the body alone."""
     n, m = len(bodies), grid.n_samples
     run, reference = method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
     if run is None:
@@ -96,10 +96,10 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
 
 
 def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> Any:
-    """Return which of n bodies (n,) are within the bounds of a method, by their drifts (n, 5) of `ReferenceValues.measure`.
+    """Return booleans (n,), true for bodies within the bounds of a method. `measured` (n, 5) is from `ReferenceValues.measure`.
 
-    Bounds grow with the ratio of the moments. So those of the body with the smallest ratio hold for all, and only bodies beyond
-    them need their own.
+    Bounds grow with the ratio of the moments. All bodies are first compared with the bounds of the smallest ratio. Only bodies
+    that exceed these are compared with their own bounds.
     """
 
     def are_within(i: int, part: Any) -> Any:

@@ -5,13 +5,13 @@
     with Client("tcp://10.0.0.7:8786") as client:  # or open_client, whose error is one line
         ensemble = cv.integrate_many(scene, w_WB_B0=starts, path="starts.zarr", client=client)
 
-A task is a pure function of the bytes that it is sent, and its result is sent back to the submitting process. Workers need no
-common file system. If a worker dies, another one runs its tasks, and the result of a task that runs twice counts once. Workers
+A task is a pure function of the bytes in its message. Its result returns to the submitting process. Workers need no
+common file system. If a worker dies, another one runs its tasks, and only one result is used if a task runs twice. Workers
 need the same version of this package, which is checked before any work. On processors of the same kind the results are the same
 as without a cluster, bit for bit; compiled code differs between kinds.
 
 If a worker dies with results, the scheduler tries to reach it for 30 s (its setting `distributed.comm.timeouts.connect`) before
-it has them computed again. A run can stand still for that long.
+other workers compute them again. The run waits for that long.
 
 Futures of Dask's own `Client.get_executor` are not used, because they never end if fetching a result fails, for example when a
 scheduler dies (distributed 2026.8.0).

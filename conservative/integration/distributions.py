@@ -17,7 +17,7 @@ from ..attitude import Array
 QUANTILES = (0.05, 0.5, 0.95)
 """Quantiles of the angle between an attitude and the mean."""
 _LEAST = 1e-9
-"""Angle, rad, below which all count as 0: the round-off of a sum of a million attitudes."""
+"""Smaller angles, rad, are treated as 0: the round-off of a sum of a million attitudes."""
 _WIDTH = 0.005
 """Width of a bin, relative to its angle. The error of a quantile is half of it."""
 _BINS = math.ceil(math.log(math.pi / _LEAST) / _WIDTH)
@@ -26,7 +26,7 @@ _BLOCK = 1 << 24
 
 
 def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
-    """Yield the attitudes (b, m, 3, 3) of one block of bodies after the other, at all samples or at the given ones.
+    """Yield the attitudes (b, m, 3, 3) of each block of bodies, at all samples or at the given ones.
 
     R_WB (n, m, 3, 3) is a NumPy array, or an array of Zarr, which is read along its chunks.
     """

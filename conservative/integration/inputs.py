@@ -1,7 +1,7 @@
 """Checks of initial states and bodies of `integrate_many`, before any work.
 
-Arrays are checked as a whole. The first body that does not pass is given to the constructor of `Scene` or of its parts, which
-raises the error.
+Arrays are checked as a whole. The first invalid body is passed to the constructor of `Scene` or of its parts, which raises the
+error.
 """
 
 from __future__ import annotations
@@ -57,15 +57,15 @@ def read_bodies(
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
     if J is not None and hasattr(static_part(scene.potential), "inertia") and "inertia" not in values:
-        allowed = "{'inertia': ...} too, because the field has an inertia, which should be that of the body"
+        allowed = "{'inertia': ...} too, because the field has an inertia, which should equal the body's"
         raise BadInput("parameters", describe(parameters), allowed)
     if (J is not None or values) and scene.extra_invariants:
-        scene = scene.rename(scene.name, extra_invariants=())  # those hold for the scene's own body and field
+        scene = scene.rename(scene.name, extra_invariants=())  # they hold only for the scene's own body and field
     return Batch(scene, R, w, J, values)
 
 
 def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Mapping[str, Array]) -> Array:
-    """Return an argument as a new array (n, ...), with the n of the arguments before it."""
+    """Return an argument as a new array (n, ...). n has to agree with earlier arguments."""
     array = real_array(value)
     other = next(iter(given), None)
     n = "n" if other is None else str(len(given[other]))
@@ -88,7 +88,7 @@ def _refuse_first(name: str, values: Array, bad: Any, check: Callable[[Any], obj
 
 
 def _are_in_range(values: Array) -> Any:
-    """Return which of n arrays (n, ...) are finite, and 0 or of magnitude `SMALLEST` to `LARGEST`."""
+    """Return booleans (n,), true for arrays (n, ...) that are finite, and 0 or of magnitude `SMALLEST` to `LARGEST`."""
     largest = np.abs(values.reshape(len(values), -1)).max(axis=1)
     return (largest == 0) | ((largest >= SMALLEST) & (largest <= LARGEST))
 

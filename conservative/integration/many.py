@@ -82,7 +82,7 @@ def integrate_many(
         A new folder, to which samples are written block by block (`conservative.integration.store`), so that they need not fit
         in memory. The returned ensemble reads them from there, as `open_ensemble(path)` does later.
     resume
-        Whether the folder may contain some blocks of the same run. Missing and damaged blocks are then computed. The result is
+        True if the folder may contain some blocks of the same run. Missing and damaged blocks are then computed. The result is
         the same, byte for byte, as that of an uninterrupted run.
     client
         A `dask.distributed.Client`, on whose workers the blocks run instead of threads of this process.

@@ -1,7 +1,7 @@
-"""Values as bytes for another process, including functions and classes of scripts and notebooks.
+"""Convert values to bytes for another process, including functions and classes of scripts and notebooks.
 
-Cached properties are left out, because compiled code and addresses mean nothing elsewhere. A read-only array stays read-only,
-because compiled code for it is different.
+Cached properties are omitted, because compiled code and addresses are valid in one process only. A read-only array stays
+read-only, because compiled code for it is different.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     value
         Any value.
     shared
-        Objects that the other side has as well. The bytes contain their places in this list instead.
+        Objects that the other process also has. The bytes contain their indices in this list instead.
     by_value
-        Modules that the other side cannot import. The bytes contain their functions and classes that the value uses.
+        Modules that the other process cannot import. The bytes contain their functions and classes that the value uses.
 
     Raises
     ------

@@ -26,12 +26,12 @@ _NOT_OF_MOTION = ("t_end", "dt", "group", "source")
 
 
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
-    """Return the given scene if the record is its, or the scene of the record if None is given.
+    """Return `scene` if the record describes it; if it is None, restore the scene from the record.
 
     Raises
     ------
     BadInput
-        The scene is not that of the record; or it is None, and the record contains digests or cannot be restored.
+        The record describes another scene; or `scene` is None, and the record contains digests or cannot be restored.
     """
     if scene is None:
         try:
@@ -46,7 +46,7 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "None, or the Scene of the run")
     if not record["fields"]["extra_invariants"]["tuple"]:
-        scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` drops those of one body for many
+        scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
     if not is_same_motion(record, record_scene(scene)):
         raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
     return scene

@@ -1,6 +1,6 @@
-"""Random initial states and bodies near those of a scene, for `integrate_many`.
+"""Random initial states and bodies near a scene, for `integrate_many`.
 
-Every quantity has its own stream of random numbers, drawn body by body. So the first bodies of a large ensemble are those of a
+Every quantity has its own stream of random numbers, drawn body by body. A large ensemble therefore begins with the bodies of a
 small one, and the spread of one quantity does not change another. Uniformly distributed attitudes are drawn as in K. Shoemake,
 Uniform random rotations (1992).
 """
@@ -29,7 +29,7 @@ START_BYTES = 400
 _PIECE = 1 << 16
 """Number of attitudes that are computed at once, which limits the intermediate results to 50 MB."""
 _ROUND_OFF = 1e-12
-"""Limit on a negative second moment of mass, relative to the largest moment of inertia: that of a plate is 0."""
+"""Round-off of a second moment of mass, relative to the largest moment of inertia. The second moment of a plate is 0."""
 
 _ANY = "any"
 """Value for uniformly distributed directions or attitudes."""
@@ -60,7 +60,7 @@ def spread(
     parameters: Mapping[str, float | str] | None = None,
     seed: int = 0,
 ) -> Starts:
-    """Return n random initial states and bodies near those of a scene: `integrate_many(scene, **spread(scene, n, ...))`.
+    """Return n random initial states and bodies near a scene: `integrate_many(scene, **spread(scene, n, ...))`.
 
     Deviations are normally distributed. A number is a standard deviation in SI units, for each component of a vector. A string
     such as `"2%"` is relative to the scene's value, or to the length of a vector. Everything else is taken from the scene. The
@@ -90,14 +90,14 @@ def spread(
     -------
     Starts
         `R_WB0` (n, 3, 3), `w_WB_B0` (n, 3), rad/s, body axes; `inertia`, kg m^2, moments (n, 3) or tensors (n, 3, 3), and
-        `parameters`, (n, ...), in SI units, where these vary.
+        `parameters`, (n, ...), in SI units, if these vary.
 
     Raises
     ------
     BadInput
         A deviation is invalid, or relative to zero; the potential has no such number; the scene's inertia does not belong to a
-        mass distribution, or is also that of a turning field; n or seed is not an integer in range, or n bodies do not fit in
-        memory.
+        mass distribution, or a turning field has the same inertia; n or seed is not an integer in range, or n bodies do not
+        fit in memory.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")

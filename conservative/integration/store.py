@@ -9,9 +9,8 @@
     parameters/NAME  numbers of the potential that differ from body to body
 
 Numbers are not compressed, because random digits do not compress. Every chunk ends in a CRC-32C checksum, which all readers of
-Zarr verify. Chunks of nothing but fill values are written too. A block is therefore done if all its chunks are there and their
-checksums match, and a run that is resumed computes every other block: those it has not reached, and those that were lost or
-damaged since. Zarr writes a chunk under another name and renames it, so a kill or a full disk leaves no partial chunk. Chunks
+Zarr verify. Chunks that contain only fill values are written too. A block is therefore done if all its chunks are there and
+their checksums match, and a resumed run computes every other block: blocks that were not reached, lost or damaged. Zarr writes a chunk under another name and renames it, so a kill or a full disk leaves no partial chunk. Chunks
 are not forced to the disk one by one; a power failure can lose some, which a resumed run then computes again.
 
 The attributes of the group describe the run, including the scene (`scene_record`) and digests of the numbers that differ from
@@ -60,8 +59,8 @@ from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, list_blocks
 from .scene_record import find_scene, is_same_motion, record_scene
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
-NEW_FOLDER = "a folder that is not there yet, in one that can be written, on a disk with room for it"
-_ROOM = "a disk with room for it; finished blocks stay there, and resume=True computes the others"
+NEW_FOLDER = "a new folder, in a folder that can be written, on a disk with enough space"
+_ROOM = "a disk with enough space; finished blocks stay there, and resume=True computes the others"
 _WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest"
 _RESULTS = ("R_WB", "w_WB_B", "drifts", "outcome", "failure")
 _CHECKSUM_BYTES = 4
@@ -313,7 +312,7 @@ def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
 
 
 def _list_differences(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """Return the differences between the attributes of a stored ensemble and those of a run, in words."""
+    """Return the differences between the attributes of a stored ensemble and of a run, in words."""
     plain = ("version", "method", "dt", "n_steps", "sample_every", "bodies", "block")
     values = ((name, stored.get(name), wanted[name]) for name in plain)
     differences = [f"{name} {before!r} there, {now!r} here" for name, before, now in values if before != now]

@@ -1,8 +1,8 @@
 """Integrate to a requested error: find the cheapest method and step, run them, and estimate the error of that run.
 
-1. The candidates are tried over a short duration (`search`). Trial runs are remembered (`trials`).
-2. The chosen one makes the whole run, and once more with twice the step (Richardson's step doubling). The difference gives the
-   estimate that is reported. The trials cannot provide it, as they do not see how much a scene amplifies errors later on. If
+1. The candidates are tried over a short duration (`search`). Trial runs are cached (`trials`).
+2. The chosen method makes the whole run, and repeats it with twice the step (Richardson's step doubling). The difference is the
+   reported estimate. The trials cannot provide it, because a scene can amplify errors later. If
    the estimate is above the requested error, the step is cut and the run repeated, unless the cause is rounding of the scene.
 """
 
@@ -104,7 +104,7 @@ def cut_step(
             return attempts
         try:
             grid = grid_with(grid.dt * step_factor(run.error, within, method))
-        except BadInput:  # too many steps or samples: the best run so far has to do
+        except BadInput:  # too many steps or samples: the best run so far is the result
             return attempts
 
 

@@ -1,7 +1,7 @@
 """Bounds on the drift of conserved invariants in a run with the outcome ok.
 
-Bounds are twenty times the largest measured drifts, and at most `LOOSEST`. The drifts were measured on all registered scenes and
-on random bodies whose largest moment is up to k = 1e6 times the smallest. Rounding causes at most 0.2 eps (10 + n) k after
+Bounds are twenty times the largest measured drifts, and at most `LOOSEST`. The drifts were measured on all registered scenes
+and on random bodies whose largest moment is up to k = 1e6 times the smallest. Rounding causes at most 0.2 eps (10 + n) k after
 n steps; k enters because energy divides momenta by moments. A solver's tolerance causes at most half of itself in each step.
 """
 

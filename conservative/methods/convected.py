@@ -1,4 +1,4 @@
-"""The paper's integrator as it stands: convected base vectors and their momenta, implicit constraints, 18 unknowns."""
+"""The paper's integrator, unchanged: convected base vectors and their momenta, implicit constraints, 18 unknowns."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Linearisation = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Convected(Method):
-    """Krenk & Nielsen's algorithm, Table 1, with its analytic tangent (29); read `kernels/convected.py` beside the paper.
+    """Krenk & Nielsen's algorithm, Table 1, with its analytic tangent (29); see also `kernels/convected.py`.
 
     Parameters
     ----------
@@ -64,13 +64,13 @@ class Convected(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
+        q0 = scene.R_WB0.T.flatten()  # a copy, because kernels are compiled separately for read-only arrays
         u0 = np.concatenate([q0, kernels("convected").conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
         J_inverse = np.ascontiguousarray(scene.body.inverse)
         linearise = _linearise(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
-            with np.errstate(all="ignore"):  # what overflows is no solution, and the step fails
+            with np.errstate(all="ignore"):  # a step that overflows fails
                 u, corrections, failure = _march(linearise, u0, grid, self.tol)
             q, p = u[:, :9].reshape(-1, 3, 3), u[:, 9:].reshape(-1, 3, 3)
             R_WB = np.swapaxes(q, 1, 2)
@@ -98,9 +98,9 @@ def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
 
 
 def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
-    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did.
+    """Follow Table 1. Return the samples (n, 18), the total number of corrections, and the failure or None.
 
-    The steps are taken in Python, where a singular tangent can be told from other errors; only its equations are compiled.
+    Steps are taken in Python, which can distinguish a singular tangent from other errors. Only the equations are compiled.
     """
     samples, total = [u], 0
     for step in range(1, grid.n_steps + 1):
@@ -114,7 +114,7 @@ def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[
 
 
 def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, int, float]:
-    """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
+    """Return the state after one step, its number of corrections, and the norm of its last residual."""
     u = u0  # 2) prediction: the state itself
     norm = math.inf
     for corrections in range(MAX_ITERATIONS + 1):
@@ -124,6 +124,6 @@ def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, 
             if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
                 break
             u = u - np.linalg.solve(K, r)  # 4), (28)
-        except np.linalg.LinAlgError:  # steps of a radian and more can end up where C C' or the tangent is singular
+        except np.linalg.LinAlgError:  # C C' or the tangent can become singular at steps of a radian and more
             break
     return u, corrections, norm

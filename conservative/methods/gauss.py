@@ -1,4 +1,4 @@
-"""Gauss collocation: any even order, and every quadratic invariant kept."""
+"""Gauss collocation: any even order, conserves every quadratic invariant."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Gauss(Method):
     The method is symmetric in time, so the attitude error of a regular motion grows linearly at first, while the errors of
     `Taylor` and `Projected` grow quadratically. If all have the same error after 250 s, its error after 10^6 steps is 7 to 30
     times smaller. `Taylor` with a shorter step is still faster: it needs 0.6 to 0.8 of the time for the same error. The stages
-    are solved to round-off, because looser stages are not symmetric.
+    are solved to round-off, because stages with larger residuals are not symmetric.
 
     Steps of several radians, for which the iteration does not converge, fail with `NotConverged`.
 
@@ -92,7 +92,7 @@ class Gauss(Method):
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
-            return "collocation keeps quadratic invariants, so a free body or uniform gravity"
+            return "it supports only free bodies and uniform gravity, whose invariants are quadratic"
         return frame_unsupported(self.frame, scene)
 
     @in_own_units
@@ -102,7 +102,7 @@ class Gauss(Method):
 
 
 def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
-    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
     return replace(method, frame=frame).label, start, closed_system(start)
@@ -124,20 +124,20 @@ def pad_tableau(stages: int) -> tuple[Array, ...]:
 
 
 def closed_system(start: PrincipalStart) -> Any:
-    """Return the kernel's model of a start; the vertical of a free body is the direction of its momentum."""
+    """Return the kernel's model of an initial state. For a free body, the direction of the momentum replaces the vertical."""
     R_WP, L = from_quaternion(start.q), np.array(start.L)
     size = math.hypot(*start.L)
     falls = start.field is not None or size == 0
     R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
     moment = np.zeros(3) if start.field is None else np.array(start.field)
-    # A power of two, so that scaling rounds nothing; a body at rest gets the size of what its field can make of it.
+    # A power of two, so that scaling does not round. For a body at rest, the momentum that its field can produce.
     largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
     unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
     return kernels("gauss").Model(
         unit,
         triple(unit * np.array(start.J_inverse)),
         triple(moment / unit),
-        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # momentum about the axis of symmetry is kept as it is
+        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # the momentum about the axis of symmetry does not change
         triple(L / unit),
         triple(R_WP[2] if falls else L / size),
         quadruple(R_WV.T @ R_WP),

@@ -1,4 +1,4 @@
-"""Discrete Moser-Veselov steps of a free body: explicit, conserving, and without truncation error if so wished."""
+"""Discrete Moser-Veselov steps of a free body: explicit, conservative, and optionally without truncation error."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from .units import convert_scene, find_units, in_own_units
 
 ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
 LONGEST, LONGEST_EXACT = 1.5, 6.0
-"""Limit of |w| dt at the start, rad: of an order 2 to 10, whose step exists for short steps only, and of the exact step."""
+"""Limits of the initial |w| dt, rad: for orders 2 to 10, which have short steps only, and for the exact step."""
 SMALLEST_CN = 0.2
-"""cn of half a step must be above this: at 0, after half a period of the polhode, the form of the quaternion breaks down."""
+"""Lower limit of cn at half a step. At cn = 0, after half a period of the polhode, the quaternion form is singular."""
 BODY_STEP, BODY_SAMPLE = 3e-9, 25e-9
-"""Seconds that a step of a body among many, and a sample, take, about: how often a run can be stopped follows from them."""
+"""Approximate time, s, of a step and of a sample for a body in lanes. They determine how often a run can be stopped."""
 LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
-"""Limit of nu dt of the exact step, nu being the polhode's frequency: below it cn is above SMALLEST_CN."""
+"""Limit of nu dt of the exact step, with the polhode's frequency nu: cn is above SMALLEST_CN for shorter steps."""
 
 
 @dataclass(frozen=True, init=False)
@@ -114,12 +114,12 @@ class MoserVeselov(Method):
 
 
 def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, PrincipalStart, Any, Any]:
-    """Return the label of a run, its start along `polhode_axes`, the kernel's model of it and coefficients of a step dt, s.
+    """Return the label of a run, its initial state along `polhode_axes`, the kernel's model, and coefficients of a step dt, s.
 
     Raises
     ------
     BadInput
-        The form of the quaternion has no step of this length.
+        The quaternion form has no step of this length.
     """
     kernel, (start, polhode) = kernels("moser_veselov"), scene.derive(find_polhode)
     step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
@@ -138,7 +138,7 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
     table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
     try:
         kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
-    except (ArithmeticError, ValueError):  # in plain Python only: compiled, a body without a step has nan
+    except (ArithmeticError, ValueError):  # without compilation only; compiled code returns nan for a body without a step
         return None
     finished = table[kernel.FINISHED, :n] == 1
 
@@ -155,7 +155,7 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
 
 
 def find_given(bodies: Batch) -> tuple[Array, Array, Array, Array]:
-    """Return moments (n, 3) and R_BP (n, 3, 3), of one body where it is for all, and R_WB0 (n, 3, 3), w_WB_B0 (n, 3), rad/s.
+    """Return moments (n, 3) and R_BP (n, 3, 3), one row if all bodies share them; R_WB0 (n, 3, 3) and w_WB_B0 (n, 3), rad/s.
 
     Moments are in units in which the largest of each body is of order one.
     """
@@ -166,7 +166,7 @@ def find_given(bodies: Batch) -> tuple[Array, Array, Array, Array]:
 
 
 def writable(values: Array) -> Array:
-    """Return an array (...) of any unit as one (...) of the kind that kernels are compiled for; a copy where it is not."""
+    """Return an array in the layout that kernels are compiled for: float64, contiguous and writable; a copy if necessary."""
     return np.require(values, np.float64, ("C", "W"))
 
 
@@ -180,7 +180,7 @@ def require_short_step(scene: Scene, dt: float, exact: bool) -> None:
 
 
 def step_limit(scene: Scene, exact: bool) -> float:
-    """Return the step, s, from which on steps are refused; infinite for a body at rest."""
+    """Return the smallest step, s, that is too long; infinite for a body at rest."""
     speed = float(np.linalg.norm(scene.w_WB_B0))
     if speed == 0:
         return math.inf
@@ -192,7 +192,7 @@ def step_limit(scene: Scene, exact: bool) -> float:
 
 
 def find_polhode(scene: Scene) -> tuple[PrincipalStart, Any]:
-    """Return the scene's start along `polhode_axes` and its polhode."""
+    """Return the initial state of a scene along `polhode_axes`, and its polhode."""
     R_BP, moments = scene.body.R_BP, scene.body.moments
     R_PS = polhode_axes(moments, (scene.w_WB_B0 @ R_BP) * moments)
     start = start_along(scene, R_BP @ R_PS, moments @ np.abs(R_PS))
@@ -200,11 +200,10 @@ def find_polhode(scene: Scene) -> tuple[PrincipalStart, Any]:
 
 
 def polhode_axes(J: Array, L: Array) -> Array:
-    """Return R_PS (3, 3), axes e1, e2, e3 in principal components: e2 intermediate, e3 the one that L keeps to one side of.
+    """Return R_PS (3, 3): the axes e1, e2, e3 in principal components. e2 is the intermediate axis; L circles e3.
 
-    J are the moments (3,), kg m^2, and L is the momentum (3,), kg m^2/s, both in principal axes.
-
-    That is the axis of the largest moment where L^2 > 2 E J2 and of the smallest where it is less; on the separatrix either.
+    J are the moments (3,), kg m^2, and L is the momentum (3,), kg m^2/s, both in principal axes. e3 is the axis of the largest
+    moment if L^2 > 2 E J2, and of the smallest if L^2 < 2 E J2. On the separatrix both are possible.
     """
     low, middle, high = np.argsort(J, kind="stable")
     above = L[high] ** 2 * (J[high] - J[middle]) / J[high] - L[low] ** 2 * (J[middle] - J[low]) / J[low]

@@ -1,11 +1,11 @@
-"""The frame that does not spin: a symmetric body is integrated without its spin, which is added in closed form.
+"""The non-spinning frame: a symmetric body is integrated without its spin, which is added in closed form.
 
 For J1 = J2 and a torque without component along the axis, L3 is constant and the frame R_WS with
 
     R_WB = R_WS Rot(axis, rate t)        rate = (1/J3 - 1/J1) L3
 
-turns with L/J1: it moves like a SPHERICAL body of inertia J1 in the same field, started with the same momentum. Steps are then
-limited by nutation and no longer by spin. `principal_start(scene, "non_spinning")` is that slow motion as kernels take it.
+turns with L/J1. It moves like a spherical body of inertia J1 in the same field, with the same initial momentum. Nutation limits
+the steps then, and spin does not. `principal_start(scene, "non_spinning")` returns the initial state of that slow motion.
 Klein and Sommerfeld, Theorie des Kreisels, call it the spherical top.
 """
 
@@ -23,7 +23,7 @@ FRAMES: tuple[Frame, ...] = ("auto", "body", "non_spinning")
 
 
 def resolve_frame(frame: Frame, scene: Scene) -> Resolved:
-    """Return the frame that "auto" stands for: non-spinning where body and field share an axis of symmetry that saves work."""
+    """Return the frame that "auto" stands for: non-spinning if body and field share an axis of symmetry."""
     if frame != "auto":
         return frame
     moments = scene.body.moments

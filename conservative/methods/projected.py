@@ -1,4 +1,4 @@
-"""Explicit steps of order 8, projected onto the invariants: the cheapest accuracy for a body in a field."""
+"""Explicit steps of order 8, projected onto the invariants: the cheapest method for most bodies in a field."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Projected(Method):
 
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
-    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     start = principal_start(scene)
     axis, turn, scales = field_axis(scene), field_turn(scene), invariant_scales(scene)
     model = kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L)
@@ -80,6 +80,6 @@ def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
 
 
 def field_turn(scene: Scene) -> Triple | None:
-    """Return the angular velocity of the axes that the field is fixed in, three floats in rad/s, world axes, or None."""
+    """Return the angular velocity of the axes of a turning field, three floats in rad/s, world axes; None for other fields."""
     potential = scene.potential
     return triple(potential.orbit.rate * potential.orbit.normal_W) if isinstance(potential, Turning) else None

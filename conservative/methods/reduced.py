@@ -60,12 +60,12 @@ class Reduced(Method):
         Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the most accurate one of
         the order.
     tol
-        Relative tolerance of the solver in a stage. The default is below round-off on purpose: any systematic error, however
-        small, becomes a drift after 10^8 steps.
+        Relative tolerance of the solver in a stage. The default is below round-off, because even a small systematic
+        error becomes a drift after 10^8 steps.
     frame
         "body": the paper's integrator. "non_spinning": the spin of a symmetric body is added in closed form; "auto":
-        non-spinning if possible. Energy and momentum of a top are then conserved only to the order of the method, because they
-        are those of the slow motion. For free bodies they are conserved to round-off.
+        non-spinning if possible. Energy and momentum of a top are then conserved only to the order of the method, because the
+        method conserves them for the slow motion. For free bodies they are conserved to round-off.
 
     Raises
     ------
@@ -121,12 +121,12 @@ class Reduced(Method):
         return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
-        """Lanes for free bodies and in uniform gravity, in principal axes."""
+        """Return the run of free bodies, or bodies in uniform gravity, in lanes; None for others."""
         return prepare_lanes(self, bodies, grid) if self.frame == "body" and in_gravity_or_free(bodies) else None
 
 
 def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
-    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
     model = kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L)
@@ -140,7 +140,7 @@ def find_coefficients(order: int, composition: str | None, tol: float, dt: float
 
 
 BODY_STEP = 2e-8
-"""Seconds that a stage takes for a body among many, about: only how often a run can be stopped follows from it."""
+"""Approximate time, s, of a stage for a body in lanes. It determines only how often a run can be stopped."""
 
 
 def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:

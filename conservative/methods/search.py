@@ -3,8 +3,8 @@
 All candidates are tried over the same short duration (`trials`). A lower bound of the work of each is known at any time: before
 its first trial run from its order, afterwards from the error of its last one. The candidate with the smallest bound is tried
 next, with a shorter step, and the search ends when that candidate already has a step that is short enough. So a method of order
-2 is not driven to 1e-9 if one of order 8 is already there, and most candidates are never run. (Best-first search: P. E. Hart,
-N. J. Nilsson and B. Raphael, 1968.)
+2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
+P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, all others together may cost `MOST_RUNS` times as much as it does.
@@ -27,7 +27,7 @@ from .trials import Trials
 from .units import bound_rate
 
 SAFETY = 0.5
-"""Share of the requested error that steps are chosen for."""
+"""Share of the requested error that steps have to reach."""
 ATTEMPTS = 24
 STALLED = 0.7
 """Shorter steps no longer help if two in a row leave more than this share of the error before them."""
@@ -38,18 +38,18 @@ MOST_PROBED = 10**7
 MOST_COMPARED = 10**5
 """Largest number of samples of a trial run."""
 LENIENCY = 3.0
-"""A candidate may need this many times less work than predicted; it is not given up before."""
+"""Factor by which the work of a candidate may be smaller than predicted."""
 PENALTY = 10.0
 """Factor on the work of a candidate that stalls above the error, so that one that reaches the error is preferred."""
 RESOLVED = 0.01
-"""If runs with shorter steps, in radians of that rotation, still have nothing in common, the motion amplifies rounding."""
+"""If runs with shorter steps, in radians of that rotation, still differ completely, the sensitivity to rounding is measured."""
 MOST_RUNS = 20.0
 """Limit to the work of a search after the first candidate that reaches the error, in units of the work of that candidate."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method on its way to a step that is short enough.
+    """A method and its trial runs with shorter and shorter steps.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Candidate:
     def advance(self, trials: Trials) -> Candidate:
         """Return the candidate after a trial run at its next step."""
         grid = even_grid(self.duration, self.dt, max(1, int(self.duration / self.dt / MOST_COMPARED)))
-        # Nothing in common even at short steps: find out whether rounding is the reason.
+        # The runs differ completely even at short steps. Check if rounding is the reason.
         lost = bool(self.attempts) and self.attempts[-1][1] == math.inf and self.rate * grid.dt < RESOLVED
         trial = trials.estimate(self.method, grid, sensitivity=lost)
         after = replace(
@@ -115,7 +115,7 @@ class Candidate:
 
     @cached_property
     def prior_work(self) -> float:
-        """A guess at the work, ns, from order and rate alone: error = (rate * step)^order."""
+        """Estimate of the work, ns, from order and rate alone: error = (rate * step)^order."""
         step = 1.0 if self.method.order is None else (SAFETY * self.error) ** (1 / self.method.order)
         return self.method.card.cost(self.method).least * self.rate * self.duration / step
 
@@ -184,7 +184,7 @@ def candidates(scene: Scene, exact: bool = True) -> tuple[Method, ...]:
     """Return the methods that are worth trying on a scene, in the order of their ranks (`Card`).
 
     These are the settings of a family without truncation error, if one supports the scene; otherwise, and if `exact` is False,
-    those of the first family of each group.
+    the settings of the first family of each group.
     """
     families = [each for each in registry.list_families().values() if each.role == Role.OURS and each.card.rank is not None]
     chosen: dict[str, tuple[Method, ...]] = {}

@@ -1,4 +1,4 @@
-"""Substepping by name: another method with every step in as many equal parts as its equations need. Source: our own."""
+"""Substepping: another method, with every step divided into as many equal parts as its equations need."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..trajectory import Bounds, Trajectory
 class Substepped(Method):
     """A method that repeats a run with shorter steps if the equations of a step have no solution.
 
-    ALL steps of the run are divided into 1, 2, 4, ... equal parts, up to `most`. Parts that change from step to step would
+    All steps of the run are divided into 1, 2, 4, ... equal parts, up to `most`. Parts that change from step to step would
     destroy the long-time behaviour of a symmetric method. `Counters.steps` counts parts, and the label of the trajectory
     contains the number of parts per step.
 
@@ -87,6 +87,6 @@ class Substepped(Method):
         return run
 
     def _relabel(self, found: Trajectory, grid: Grid, parts: int) -> Trajectory:
-        """Return the trajectory at the times of the grid itself, under a label that says how many parts there are in a step."""
+        """Return the trajectory at the times of the grid itself, with the number of parts per step in the label."""
         label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
         return replace(found, t=grid.t[: len(found)], label=label)

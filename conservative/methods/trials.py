@@ -1,12 +1,12 @@
-"""Trial runs: the error of a run, estimated from one more run at twice the step, and remembered for later calls.
+"""Trial runs: the error of a run is estimated from a second run at twice the step, and cached for later calls.
 
-Step doubling (Richardson's extrapolation) cannot show what rounding of the scene's own numbers causes: principal moments of a
-tensor are known only to an ulp of the largest, and motions near a separatrix, or chaotic ones, amplify that. So a third run
-starts from a scene whose inertia and initial state are changed by an ulp. Its distance from the second run is added to the
-estimate.
+Step doubling (Richardson's extrapolation) cannot show the effect of rounding the scene's own numbers: principal moments of a
+tensor are known only to an ulp of the largest, and chaotic motions or motions near a separatrix amplify that error. A third run
+therefore starts from a scene whose inertia and initial state are changed by an ulp. Its distance from the second run is added
+to the estimate.
 
-Estimates are remembered by the numbers of a scene and not by the object, so a scene that is built again profits as well. They
-depend on nothing else, so the choice is the same whether or not other calls were made before.
+Estimates are cached by the numbers of a scene, so an equal scene that is built later uses them as well. They depend on nothing
+else, so earlier calls do not change the choice.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from ..scene import Scene
 from ..trajectory import Trajectory
 
 LARGEST_FACTOR = 30.0
-"""Largest factor by which halving the step is assumed to reduce the error, whatever the order: round-off is not reduced."""
+"""Largest factor by which halving the step is assumed to reduce the error, for any order, because round-off is not reduced."""
 ASYMPTOTIC = 0.2
 """Errors above this, rad, are saturated (angles end at pi) and are not used."""
 MOST_SCENES, MOST_ESTIMATES = 64, 1024
-"""Number of scenes whose trial runs are remembered (the most recent ones), and of trial runs of each."""
+"""Largest numbers of scenes whose trial runs are cached, and of cached trial runs of each."""
 ROUNDED = float(np.finfo(float).eps)
 """Relative change of a scene's numbers that represents rounding."""
 _SIGNS = np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
@@ -49,7 +49,7 @@ class Estimate:
     Attributes
     ----------
     error
-        Attitude error from a run at twice the step, rad; inf if a run failed or both have nothing in common.
+        Attitude error from a run at twice the step, rad; inf if a run failed or both differ completely.
     work
         Work of the run, ns by `Card.cost`.
     sensitivity
@@ -104,7 +104,7 @@ class Trials:
 
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
-    """Return the trial runs of a scene, with the remembered ones; `progress` is called as `integrate` describes."""
+    """Return the trial runs of a scene, including cached ones; `progress` is called as `integrate` describes."""
     try:
         known = recall(content_of(scene))
     except TypeError:  # a field that cannot be hashed
@@ -148,9 +148,9 @@ def throttle(progress: Callable[[Progress], object], clock: Callable[[], float] 
 
 
 def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory, Trajectory | None]:
-    """Return the estimated error of a run, rad, its trajectory, and that of the run at twice the step.
+    """Return the estimated error of a run, rad, its trajectory, and the trajectory at twice the step.
 
-    If one of them fails, the estimate is inf and the last one None.
+    If a run fails, the estimate is inf and the last trajectory None.
     """
     fine = method.solve(scene, grid)
     coarse = _solve(method, scene, coarse_grid(grid))
@@ -175,7 +175,7 @@ def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
 
 
 def find_sensitivity(method: Method, trajectory: Trajectory, grid: Grid) -> float:
-    """Return the distance of a run from that of `nearby_scene`, rad; inf if that fails."""
+    """Return the distance of a run from the run of `nearby_scene`, rad; inf if the latter fails."""
     scene = nearby_scene(trajectory.scene)
     if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
         scene = scene.rename(scene.name, body=trajectory.scene.body)
@@ -186,7 +186,7 @@ def find_sensitivity(method: Method, trajectory: Trajectory, grid: Grid) -> floa
 def nearby_scene(scene: Scene) -> Scene:
     """Return the scene with inertia, attitude and rates changed by `ROUNDED`, as rounding them may change them.
 
-    If the tensor is diagonal, no axes have to be computed and zeros stay zeros: a spin about a principal axis stays one.
+    If the tensor is diagonal, no axes have to be computed and zeros stay zeros, so a spin about a principal axis remains one.
     Moments of any other tensor are known to an ulp of the largest, and rates along its axes to an ulp of the whole rate.
     """
     body, w = scene.body, scene.w_WB_B0

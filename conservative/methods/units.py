@@ -1,10 +1,10 @@
-"""Units in which a scene is of order one: powers of two, so that going there and back rounds nothing.
+"""Units in which a scene is of order one: powers of two, so that conversions do not round.
 
-A motion stays what it is when moments of inertia are measured in units of M, times in units of T, and energies in units of
-M/T^2. Methods integrate in units in which the largest moment is of order one, and so is the rate that the energy makes of it:
-so tolerances and thresholds of theirs mean the same for bodies of any size. Exponents of the units are multiples of 16,
-rounded towards 0: a scene whose largest moment lies between 2^-16 and 2^16 kg m^2, and whose rate lies between 2^-16 and
-2^16 rad/s, keeps its own units, bit for bit. So does one with a potential that has no `in_units`.
+The equations of motion are the same in units M of moments of inertia, T of times and M/T^2 of energies. Methods integrate in
+units in which the largest moment and the rate that the energy allows are of order one, so that their tolerances and thresholds
+have the same meaning for bodies of any size. Exponents of the units are multiples of 16, rounded towards 0. A scene whose
+largest moment is between 2^-16 and 2^16 kg m^2 and whose rate is between 2^-16 and 2^16 rad/s is therefore not converted. A
+scene whose potential has no `in_units` is not converted either.
 
 Source: dimensional analysis; see E. Buckingham, On physically similar systems (1914).
 """
@@ -32,7 +32,7 @@ Prepare = Callable[[AnyMethod, Scene, Grid], Run]
 COARSE = 16
 """Exponents of units are multiples of this."""
 SHORTEST = -64
-"""Exponent of the shortest step in units of time: with less motion than that in a step, the step sets the unit."""
+"""Exponent of the shortest step in units of time. For shorter steps, the step determines the unit."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Units:
         )
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
-        """Return the trajectory of a scene on a grid, both in SI units, that was found in these units."""
+        """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
         failure = found.failure and found.failure.at_times(self.time)
         w_WB_B = found.w_WB_B / self.time
         return replace(found, scene=scene, t=grid.t[: len(found)], w_WB_B=w_WB_B, failure=failure)
@@ -67,14 +67,14 @@ SI = Units(1.0, 1.0)
 
 
 def _convert_potential(potential: Any, energy: float, time: float) -> Any:
-    """Return a potential or None, for which `find_units` has looked, in units of J and s."""
+    """Return a potential in other units of energy, J, and time, s; None for a free body."""
     if potential is None:
         return None
     return potential.in_units(energy, time) if depends_on_time(potential) else potential.in_units(energy)
 
 
 def find_units(scene: Scene, dt: float) -> Units:
-    """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not far below."""
+    """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not much smaller."""
     potential = scene.potential
     if potential is not None and not (hasattr(potential, "in_units") and hasattr(static_part(potential), "in_units")):
         return SI
@@ -100,7 +100,7 @@ def bound_rate(scene: Scene) -> float:
 
 
 def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
-    """Make a `Method.prepare` of one that is given only scenes of order one."""
+    """Extend a `prepare` for scenes of order one to all scenes."""
 
     @wraps(prepare)
     def prepare_in_units(method: AnyMethod, scene: Scene, grid: Grid) -> Run:

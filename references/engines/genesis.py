@@ -12,7 +12,7 @@ integrator
 precision
     "f64" or "f32", which is Genesis's default (`gs.init(precision="32")`). A process has one precision.
 as_installed
-    Whether collisions and constraints stay on.
+    True if collisions and constraints stay on.
 
 References
 ----------

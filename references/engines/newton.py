@@ -13,7 +13,7 @@ solver
     "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an integrator:
     "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
 as_installed
-    Whether Newton's own defaults stay: damping, contacts, the solver inside Kamino.
+    True if Newton's own defaults stay: damping, contacts, the solver inside Kamino.
 
 References
 ----------

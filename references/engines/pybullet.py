@@ -9,7 +9,7 @@ Parameters
 body
     "multibody" (btMultiBody, Bullet's default) or "maximal" (btRigidBody, in maximal coordinates).
 as_installed
-    Whether damping, sleeping and the limit of rates stay on.
+    True if damping, sleeping and the limit of rates stay on.
 
 References
 ----------

@@ -9,7 +9,7 @@ Parameters
 substeps
     Substeps of a step, 1 or more (`num_solver_iterations`); 4 by default, as in Rapier.
 as_installed
-    Whether sleeping and the limit of fast rotation stay on.
+    True if sleeping and the limit of fast rotation stay on.
 
 References
 ----------

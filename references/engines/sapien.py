@@ -6,7 +6,7 @@ is 0.05 1/s (`angular_damping`), sleeping (`sleep_threshold`), the limit of 100 
 Parameters
 ----------
 as_installed
-    Whether damping, sleeping and the limit stay on.
+    True if damping, sleeping and the limit stay on.
 
 References
 ----------

@@ -50,7 +50,7 @@ class EngineData(Distribution):
     precision
         "f64" or "f32", for engines without such a setting.
     gravity
-        Whether bodies about a fixed point in uniform gravity are supported, not only free bodies.
+        True if bodies about a fixed point in uniform gravity are supported, not only free bodies.
     free_only
         The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
         depends on that.

@@ -30,7 +30,7 @@ class Source:
     find_links
         A folder of wheels that replaces the index.
     allow_build
-        Whether a package without a wheel may be built, which runs its code.
+        True if a package without a wheel may be built, which runs its code.
     """
 
     find_links: Path | None = None

@@ -41,7 +41,7 @@ class Formulation:
     readout
         Maps times (n,) and states (n, m) to attitudes (n, 3, 3) and rates (n, 3) in F.
     fast_math
-        Whether the compiler may reorder sums.
+        True if the compiler may reorder sums.
     attitudes, R_WD
         If R_WF is R_WD attitudes(states without rates), this function and R_WD; otherwise None and the identity.
     """

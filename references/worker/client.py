@@ -82,7 +82,7 @@ class Worker:
     memory
         Memory limit in bytes, where the system supports it; 0 for none.
     show_output
-        Whether the output of the program goes to stderr. By default it is only used to describe a crash.
+        True if the output of the program goes to stderr. By default it is only used to describe a crash.
 
     Attributes: `starts`, how often the program was started.
     """

@@ -78,7 +78,7 @@ def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420, hidden: S
     chart
         The picture.
     shown
-        What hovering shows: keys of `SHOWN`, or fields with kind and title.
+        Contents of tooltips: keys of `SHOWN`, or fields with kind and title.
     height
         Height of a panel.
     hidden

@@ -92,7 +92,7 @@ def require_replaceable(file: Path, mark: str, option: str, force: bool = False,
     option
         Name of the option, for the message.
     force
-        Whether a file without the mark may be replaced.
+        True if a file without the mark may be replaced.
     inputs
         Files that are never replaced.
 

@@ -211,13 +211,13 @@ class Document:
     blocks
         The content; a section with its heading is a block.
     brief
-        What the terminal shows instead of all blocks, if that is less.
+        Blocks that the terminal shows instead of all blocks; None for all.
     data
         The content for programs: dictionaries, lists, dataclasses, enums, numbers (JSON writes NaN and infinity as null).
     checks
-        The test cases, of a document that judges something.
+        The test cases of a gate or a comparison.
     failures
-        Why the command fails; empty if it does not.
+        Reasons why the command fails; empty if it succeeds.
     """
 
     command: str

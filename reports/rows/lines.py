@@ -30,7 +30,7 @@ def _samples_of(samples: pd.DataFrame, study: str) -> pd.DataFrame:
 def drifts(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the drifts over time: columns scene, family, name, t (s), quantity, drift (relative, the largest so far).
 
-    Of methods that differ only in tolerance, those with the loosest and the tightest are included.
+    If methods differ only in tolerance, the loosest and the tightest are included.
     """
     rows = _samples_of(samples, "long_runs").rename(columns={"value": "drift"})
     names = rows.groupby(["scene", "line"])["name"]

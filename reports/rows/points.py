@@ -38,7 +38,7 @@ def points(
     study, time
         Name of the study, and the measure of the time.
     untimed
-        Whether settings without a time are included, as points with the time NaN.
+        True if settings without a time are included, as points with the time NaN.
 
     Returns
     -------

@@ -78,13 +78,13 @@ def plan_report(
     scenes, methods, engines
         Names. Default: the paper's two scenes, `selection.main_methods` (all registered methods if `full`), no engine.
     full
-        Whether everything is measured: random bodies, many bodies, hard cases, stability and the paper's figures as well.
+        True if everything is measured: random bodies, many bodies, hard cases, stability and the paper's figures as well.
     quick
         Fewer steps and rounds. No study of hard cases or of many bodies.
     skip_missing
         Rows with the outcome "missing" instead of `MissingEngine`.
     png
-        Whether pictures are also written as PNG.
+        True if pictures are also written as PNG.
     time_limit
         Time budget of a run, s; see `Study`. Default: `MAIN_TIME_LIMIT` for the scenes, unless `full`.
     bodies

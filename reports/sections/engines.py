@@ -83,7 +83,7 @@ class EngineRow:
     outcome
         Outcome of the run at the scene's step, or of its timing.
     as_installed, best
-        Whether only the step is set, and whether no setting of the engine has a smaller error.
+        True if only the step is set; true if no setting of the engine has a smaller error.
     error
         Largest attitude error at the scene's step, rad; NaN if it was not measured.
     second_time

@@ -36,7 +36,7 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
     comparison
         The measurements of all versions.
     gated
-        Whether a loss in the last version is a failure.
+        True if a loss in the last version is a failure.
     made
         How and where it was measured.
     """

@@ -114,7 +114,7 @@ def test_other_results_are_invalid(name: str, kind: type[Foreign]) -> None:
 
 def test_integrate_raises_and_run_returns_the_failure() -> None:
     nothing = Foreign(INVALID["nothing"])
-    with pytest.raises(InvalidResult, match=r"method: got a NoneType, no Trajectory from .*foreign.*; expected a Trajectory"):
+    with pytest.raises(InvalidResult, match=r"method: got a NoneType, not a Trajectory from .*foreign.*; expected a T"):
         cv.integrate(BRICK, method=nothing)
     assert nothing.run(BRICK, 0.1).outcome.kind is OutcomeKind.INVALID
     assert cv.integrate(BRICK, method=nothing, on_failure="return").outcome.kind is OutcomeKind.INVALID

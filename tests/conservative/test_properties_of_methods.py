@@ -97,7 +97,7 @@ def test_limits_are_included():
 
 def test_methods_give_the_reason_for_unsupported_scenes():
     said = [method.unsupported(scene) for method, scene in ((cv.Gauss(), SPRUNG), (cv.Lame(), SPRUNG), (cv.Lame(), GRAVITY))]
-    assert said[0].startswith("collocation keeps quadratic invariants")
+    assert said[0].startswith("it supports only free bodies and uniform gravity")
     assert said[1:] == ["needs uniform gravity", "body and field symmetric about one axis"]
     assert cv.MoserVeselov().unsupported(GRAVITY) == "it is for free bodies"
     assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
