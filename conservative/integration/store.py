@@ -10,8 +10,9 @@
 
 Numbers are not compressed, because random digits do not compress. Every chunk ends in a CRC-32C checksum, which all readers of
 Zarr verify. Chunks that contain only fill values are written too. A block is therefore done if all its chunks are there and
-their checksums match, and a resumed run computes every other block: blocks that were not reached, lost or damaged. Zarr writes a chunk under another name and renames it, so a kill or a full disk leaves no partial chunk. Chunks
-are not forced to the disk one by one; a power failure can lose some, which a resumed run then computes again.
+their checksums match, and a resumed run computes every other block: blocks that were not reached, lost or damaged.
+Zarr writes a chunk under another name and renames it, so a kill or a full disk leaves no partial chunk. Chunks are not forced
+to the disk one by one; a power failure can lose some, which a resumed run then computes again.
 
 The attributes of the group describe the run, including the scene (`scene_record`) and digests of the numbers that differ from
 body to body.
