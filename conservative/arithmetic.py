@@ -2,8 +2,8 @@
 
 A number is a float, a NumPy array with one element per body, or a `Traced` number, whose operations emit machine instructions
 (`conservative.kernels.traced`). Vectors and quaternions are tuples of numbers, so that compiled code keeps them in registers.
-No function branches on the value of a number. Sums of products name the product that is added without rounding (`fuse`):
-otherwise the compiler chooses, and it can choose differently for one body and for several.
+No function branches on the value of a number. Sums of products state with `fuse` which product is not rounded. Otherwise the
+compiler chooses, and it can choose differently for one body and for several.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Traced:
 
 
 class Axes(NamedTuple):
-    """Three numbers that are added and multiplied as one, with another such value or with one number for all."""
+    """Three numbers with + - and * by component, with another such value or with one number for all."""
 
     x: Any
     y: Any
@@ -196,7 +196,7 @@ def in_body(q: Sequence[Any], v: Vector) -> Any:
 def halfway(a: Vector, c: Vector) -> Any:
     """Return M c with M = (1 + Cay(2 a))/2, and its derivative by a (three columns).
 
-    M c is c on average over a step, in axes of its start: M = 1 + (hat(a) + hat(a)^2) / (1 + a.a), and M' is M at -a.
+    M c is the mean of c over a step, in the axes of its start: M = 1 + (hat(a) + hat(a)^2) / (1 + a.a), and M' is M at -a.
     """
     s = 1.0 / (1.0 + dot(a, a))
     ac = cross(a, c)

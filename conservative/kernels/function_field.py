@@ -86,7 +86,7 @@ class Function(NamedTuple):
 
 
 class FunctionInTime(NamedTuple):
-    """As `Function`, at a time, s. Nothing is conserved that the energy is needed for, so that it is 0."""
+    """A `Function` at a time, s. The energy is 0: no invariant of such a field needs it."""
 
     address: Any
     rows: Any

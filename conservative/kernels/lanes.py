@@ -1,12 +1,12 @@
-"""Lanes: numbers with one float for each of several bodies, or for several components of one; and how they reach memory.
+"""Lanes: numbers that contain one float for each of several bodies, or for several components of one body.
 
-Functions of `small` and traced functions that are written for floats and branch on nothing serve lanes as they are: + - * /
-between lanes, and between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max`. Comparisons give a truth value
-per lane, joined by & | ~; `choose`, `every` and `some` of `vector` read them.
+Functions of `small` and traced functions accept lanes in place of floats if they do not branch on a number. The operations are
++ - * / between lanes, and between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max`. Comparisons return a
+truth value per lane. Combine these with & | ~, and use them in `choose`, `every` and `some` of `vector`.
 
-Memory is contiguous arrays of floats of one dimension; no bounds are checked. A width is a number in the source, or a number
-that has as many lanes. In plain Python a body's lane is the only one, so that both widths of bodies are 1; lanes of one body's
-components are arrays.
+Arrays in memory are contiguous, one-dimensional arrays of floats; bounds are not checked. A width is a literal number, or
+another number with the same width. In plain Python there is one body at a time, so the width for bodies is 1; lanes of one
+body's components are arrays.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .traced import REGISTER as REGISTER
 from .traced import trace
 
 WIDTH = 2 * REGISTER if COMPILED else 1
-"""Bodies that most kernels take at once: two registers, as the processor works on one while results of the other are awaited.
-Where two do not fit, `REGISTER` is the width to take."""
+"""Number of bodies in most kernels: two registers, so that the processor works on one while it waits for the other. Kernels
+that have no room for two use `REGISTER`."""
 FOUR = 4
 """Floats of one register that belong to one body: stages or components."""
 
@@ -41,7 +41,7 @@ if COMPILED:
         """Let numba compile `symbol` for lanes as the operation on their symbols."""
 
         class Operator(AbstractTemplate):
-            """What numba calls to find the type of the result."""
+            """The type of the result, for numba."""
 
             def generic(self, args, kws):
                 """Return the signature, None for arguments of other kinds."""
@@ -72,7 +72,7 @@ if COMPILED:
         _register(_logical, _logical, Mask, Mask)
 
     def _place(context, builder, array, index, register=DOUBLE):
-        """Return the address of an element, as that of a register of this type; `array` is a numba type and a value."""
+        """Return the address of an element as a pointer to a register; `array` is a numba type and a value."""
         kind, value = array
         pointer = builder.gep(context.make_array(kind)(context, builder, value).data, [index])
         return builder.bitcast(pointer, register.as_pointer())
@@ -89,13 +89,13 @@ if COMPILED:
         return pack(context, builder, kind, Symbol(builder, registers))
 
     def _of_width(width):
-        """Return the type of a number: of a width in the source, or of the type of another number."""
+        """Return the type of a number with a literal width, or the type of another number."""
         if not isinstance(width, types.Literal):
             return width
         return types.float64 if width.literal_value == 1 else Lanes(width.literal_value)
 
     def _arrange(like, kind):
-        """Return the type of a tuple of numbers of this type: of a count in the source, or arranged as another tuple."""
+        """Return the type of a tuple of numbers: a literal count of them, or the arrangement of another tuple."""
         if isinstance(like, types.Literal):
             return types.UniTuple(kind, like.literal_value)
         if not isinstance(like, types.BaseTuple):
@@ -165,7 +165,7 @@ if COMPILED:
         return types.none(array, types.intp, types.intp, values), build
 
     def _transpose(builder, numbers):
-        """Return, of up to four registers, one per number, four registers, one per lane."""
+        """Return four registers, one per lane, from up to four registers, one per number."""
         pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, REGISTER), at))  # noqa: E731
         nothing = ir.Constant(VECTOR, ir.Undefined)
         a, b, c, d = [*numbers] + [nothing] * (REGISTER - len(numbers))
@@ -175,7 +175,7 @@ if COMPILED:
 
     @intrinsic
     def save_columns(typing, array, index, stride, values):
-        """Store the numbers of each body one after the other: those of the first at index, of the next at index + stride."""
+        """Store the numbers of each body one after the other: the first body at index, the next at index + stride."""
 
         def build(context, builder, sig, args):
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
@@ -192,7 +192,7 @@ if COMPILED:
         return types.none(array, types.intp, types.intp, values), build
 
     def _copy(builder, value):
-        """Return the address of a copy in memory, as that of the whole and of the first float."""
+        """Return the address of a copy in memory, as a pointer to the whole and to the first float."""
         memory = cgutils.alloca_once_value(builder, value)
         return memory, builder.bitcast(memory, DOUBLE.as_pointer())
 

@@ -1,4 +1,4 @@
-"""Samples of many bodies in body axes, out of the quaternions and rates of lanes."""
+"""Samples of many bodies in body axes, computed from quaternions and rates in lanes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .vector import dot
 
 @small
 def rotation(q):
-    """Rows of the matrix of a quaternion of any length."""
+    """Return the rows of the matrix of a quaternion of any length."""
     w, x, y, z = q
     s = 2.0 / (w * w + x * x + y * y + z * z)
     return (
@@ -21,10 +21,10 @@ def rotation(q):
 
 @small
 def store_sample(q, w, axes, place, samples, R_WB, w_WB_B):
-    """Write one sample of all bodies of a number; their next ones are `samples` samples further on.
+    """Write one sample of the bodies in the lanes.
 
-    q (4) and w (3) are attitude and rate in axes of the kernel, `axes` (9) the rows of the matrix from these to the body's.
-    R_WB and w_WB_B are flat; `place` is the number of the sample among all in them.
+    q (4) and w (3) are attitude and rates in axes of the kernel. `axes` (9) are the rows of the rotation from these to body
+    axes. R_WB and w_WB_B are flat arrays with `samples` samples per body; `place` is the number of the first body's sample.
     """
     r0, r1, r2 = rotation(q)
     a, b, c = axes[0:3], axes[3:6], axes[6:9]

@@ -10,17 +10,20 @@ A vector x is stored as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is 
 of the rows turn at a rate u about their second one, g' gains u a, and a' loses u g. A field adds J^-1 T'[n], which its `series`
 forms.
 
-The values differ by what is integrated. For one body a vector is a register of components. The processor then waits for
-results most of the time, so sums run from the middle outwards, as the newest coefficients come last; products that are added
-and those that are taken away have a total each, and what depends on the newest is added in two short chains, with constants
-that contain the factor h/(n+1). For several bodies a vector is three numbers (`Axes`) whose lanes are bodies, and shuffles cost
-nothing. The processor waits for nothing, so few operations are best: one total per sum, multiplied by h/(n+1) as a whole. The
-two round differently. Of 32 random heavy tops the attitudes differ by 3e-16 after 10 steps, by 1e-15 to 3e-15 after 100 (at
-most 6e-14), and by 4e-14 to 4e-13 after 1,000. In plain Python vectors are `Axes` of floats.
+One body and several bodies use different arrangements of the same sums:
 
-Straight code for several bodies and all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on
-each order has a loop of its own. Source: D. Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems of
-ordinary differential equations by the method of Taylor series (1971).
+* One body: a vector is a register of components. The processor mostly waits for results. Sums therefore run from the middle
+  outwards, because the newest coefficients come last. Added and subtracted products have separate totals. Terms with the newest
+  coefficients are added in two short chains, with constants that contain the factor h/(n+1).
+* Several bodies: a vector is three numbers (`Axes`) with a lane per body, and shuffles cost nothing. The processor does not
+  wait, so the fewest operations are best: one total per sum, multiplied by h/(n+1) at the end.
+
+The two round differently. For 32 random heavy tops, the attitudes differ by 3e-16 after 10 steps, by 1e-15 to 3e-15 after 100
+(at most 6e-14), and by 4e-14 to 4e-13 after 1,000. In plain Python, vectors are `Axes` of floats.
+
+Unrolled code for several bodies and all orders does not fit into the processor's instruction cache, so each order from
+`LOOPS_FROM` on is a loop. Source: D. Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems of ordinary
+differential equations by the method of Taylor series (1971).
 """
 
 from __future__ import annotations
@@ -30,10 +33,10 @@ from . import COMPILED
 from .traced import join
 
 LOWEST, HIGHEST = 4, 18
-"""Orders that code is made for: code beyond the highest does not fit into the processor's cache of instructions."""
+"""Lowest and highest order. Code for higher orders does not fit into the processor's instruction cache."""
 LOOPS_FROM = 6
 TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
-"""The places of (x2, x3, x1) and (x3, x1, x2) in (x1, x2, x3)."""
+"""Indices that turn (x1, x2, x3) into (x2, x3, x1) and (x3, x1, x2)."""
 
 if COMPILED:
     from llvmlite import ir
@@ -45,7 +48,7 @@ if COMPILED:
     BYTES = 8 * REGISTER
 
     class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
-        """A load that is made once, here. LLVM would otherwise keep all coefficients in registers and spill them."""
+        """A load that LLVM does not move. Otherwise it would keep all coefficients in registers and spill them."""
 
         def descr(self, buf):
             """Write the instruction to a list of texts, as llvmlite asks it to."""
@@ -75,7 +78,7 @@ if COMPILED:
                 self._start = builder.bitcast(memory, ir.IntType(8).as_pointer())
 
         def store(self, number):
-            """Return the place of a number, which is stored once however often this is called."""
+            """Store a number, unless it is stored already, and return its place."""
             (register,) = number.registers
             if id(register) not in self._places:
                 place = len(self._places)
@@ -94,7 +97,7 @@ if COMPILED:
             return Symbol(self.builder, [found])
 
         def load_behind(self, place, byte):
-            """Return the number that lies behind a place by a number of bytes that varies."""
+            """Return the number at a place plus a variable number of bytes."""
             at = self._address(self.builder.add(byte, count_bytes(place)))
             return Symbol(self.builder, [self.builder.load(at, align=BYTES)])
 
@@ -109,7 +112,7 @@ if COMPILED:
 
 
 class History:
-    """Coefficients of one quantity. The newest and the first are at hand, all others come out of memory, from `places`."""
+    """Coefficients of one quantity. The newest and the first are in registers, the others in memory at `places`."""
 
     def __init__(self, memory):
         self._memory, self._values, self.places = memory, [], []
@@ -127,7 +130,7 @@ class History:
 
 
 class Vectors:
-    """Coefficients of vectors, of each as (r, s): `[n, 2 k]` and `[n, 2 k + 1]` are those of vector k; `newest` as they are."""
+    """Coefficients of vectors as (r, s): vector k has `[n, 2 k]` and `[n, 2 k + 1]`. `newest` are the last ones, unshuffled."""
 
     def __init__(self, series, count):
         self._series, self._parts, self.newest = series, [series.history() for _ in range(2 * count)], ()
@@ -149,7 +152,7 @@ class Vectors:
 
 
 class Series:
-    """Values, memory and sums of products for a step of one body or of several, by the kind of a number of it."""
+    """Vectors, memory and sums of products for one body or several. The kind follows from one number of the state."""
 
     def __init__(self, number):
         traced = isinstance(number, Traced)
@@ -181,7 +184,7 @@ class Series:
         return History(self._memory)
 
     def convolve(self, n, first, last, *sums, start=None):
-        """Return sums over i = first ... last of x[i] y[n-i], each minus that of a second pair (x, y) if there is one.
+        """Return sums over i = first ... last of x[i] y[n-i], each minus the sum over a second pair (x, y) if there is one.
 
         The first begins with `start`. A sum without terms is None.
         """
@@ -327,7 +330,7 @@ def sum_to_order(series, order, h, start, K, accelerate, turn):
     builder.position_at_end(end)
 
     def merge(values):
-        """Return the value of the exit that is taken, of a number or a tuple of numbers per exit."""
+        """Return the number, or tuple of numbers, of the exit that was taken."""
         if isinstance(values[0], tuple):
             parts = [merge(each) for each in zip(*values, strict=True)]
             return Axes(*parts) if isinstance(values[0], Axes) else tuple(parts)

@@ -1,19 +1,19 @@
 """Steps of a Taylor series, each projected back onto the invariants, in any field that has an axis and a recurrence.
 
-Axes D of the world have the field's axis for their third one; for a free body that is the direction of its momentum. The state
-is g and a, third and first row of the attitude's matrix against D, and the rates w, all in principal axes:
+The third of the axes D is the field's axis; for a free body it is the direction of the momentum. The state consists of g and
+a, the third and the first row of the attitude's matrix relative to D, and the rates w, all in principal axes:
 
     g' = g x w        a' = a x w        J w' = J w x w + T        T = g x dV/dg
 
-Where the field turns about an axis at right angles to its own, axes D turn with it about their second one at the rate u: then
-g' has u a more and a' has u g less, and the Jacobi integral E - u b.L, b the second row, takes the place of the energy, without
-the momentum about the axis.
+If the field turns about an axis perpendicular to its own, the axes D turn with it at the rate u, about the second of them.
+Then g' has the additional term u a and a' the additional term -u g. The Jacobi integral E - u b.L, with the second row b, is
+conserved instead of the energy, and the momentum about the axis is not conserved.
 
-The coefficients of a step come from the field's recurrence (`axial`, `series`). After the step g and a are made orthonormal,
-and energy and momentum about the axis are brought back to their values at the start as in `projected`: by Newton's method along
-their gradients with respect to L and to a turn of the body. A momentum about an axis of symmetry, which the series keeps, is
-left out of these gradients. The momentum of a free body is l g, whatever g, so that w follows from g, and only energy is left
-to be restored. Source: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
+The coefficients of a step come from the field's recurrence (`series`). After the step, g and a are made orthonormal. Energy and
+momentum about the axis are restored to their initial values as in `projected`: by Newton's method along their gradients with
+respect to L and to a rotation of the body. The series conserves the momentum about an axis of symmetry, so these gradients
+exclude it. The momentum of a free body is l g for any g, so w follows from g, and only the energy is restored. Source: E.
+Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
 ENOUGH, NOISE = 2.0**-50, 2.0**-46
-"""Relative defect that a correction may leave: round-off, and the defect that round-off alone can make."""
+"""Relative defect after which no further correction is made, and the largest defect that round-off alone can cause."""
 ROUND_OFF = 2.0**-50
-"""Largest relative defect that counts as none."""
+"""Relative defect up to which nothing is corrected."""
 FAR, LEFT = 0.1, 1e-6
-"""Largest relative defect a step may have before projection, and after it."""
+"""Largest relative defect of a step before and after projection."""
 SAFETY, SHORTEST = 0.8, 2.0**-30
-"""Share of the longest part that a tolerance allows, and the shortest part of a step."""
+"""Factor between a part of a step and the longest that the tolerance allows, and the shortest part, relative to the step."""
 DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
 """Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
 
@@ -52,10 +52,10 @@ DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
 class Model(NamedTuple):
     """The body, its field and its start in principal axes.
 
-    `J` and `J_inverse` are moments and their inverses, `loose` is 1 for each component of L that a projection may change, else
-    0, `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative to. `left` is the quaternion that turns axes D
-    to the world's, `g` and `a` are third and first row of the matrix against D, `q` and `L` attitude against the world and
-    momentum, all at the start.
+    `J` and `J_inverse` are the moments and their inverses. `loose` is 1 for each component of L that a projection may change,
+    otherwise 0. `scales` are the reference scales of energy, J, and momentum, kg m^2/s. `left` is the quaternion of the
+    rotation from axes D to world axes. `g` and `a` are the third and the first row of the matrix relative to D, `q` and `L` the
+    attitude in the world and the momentum, all at the start.
     """
 
     J: Any
@@ -71,7 +71,7 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Order of the series, length of the step, s, and the largest size of the last two terms of its parts, 0 for no parts."""
+    """Order of the series, step size, s, and tolerance for the last two terms; 0: steps are not divided into parts."""
 
     order: int
     h: float
@@ -79,7 +79,7 @@ class Coefficients(NamedTuple):
 
 
 class Free(NamedTuple):
-    """No field; the size of the momentum, kg m^2/s, whose direction is g. See `UniformField` for the functions."""
+    """No field: size of the momentum, kg m^2/s, whose direction is g. `UniformField` explains the functions."""
 
     momentum: Any
 
@@ -97,13 +97,13 @@ class Free(NamedTuple):
 
 
 def values(field, constants, L, n, g, w):
-    """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
+    """Return energy and momentum about the axis for n g instead of g, to first order, and dV/dg."""
     V, slope = field.slope(constants, g)
     return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
 
 
 def turning_values(field, constants, L, n, g, upright, w):
-    """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, with g longer by n and a upright."""
+    """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, for n g and `upright` as g and a."""
     energy, momentum, slope = values(field, constants, L, n, g, w)
     o = scale(field.rate * n, cross(g, upright))
     return energy - dot(L, o), momentum, slope, o
@@ -111,9 +111,9 @@ def turning_values(field, constants, L, n, g, upright, w):
 
 @trace
 def begin(model):
-    """Return what `correct` takes, ((J2 - J3)/J1 and its kin), and rates.
+    """Return (constants of the field, (J, J_inverse, loose), conserved values, scales and their inverses), K, and the rates.
 
-    The first is (constants of the field, (J, J_inverse, loose), what is kept, scales and their inverses).
+    K = ((J2 - J3)/J1, (J3 - J1)/J2, (J1 - J2)/J3).
     """
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = field.find_constants(J_inverse), times(J_inverse, model.L)
@@ -129,7 +129,7 @@ def begin(model):
 
 @trace
 def take_step(field, constants, order, h, K, g, a, w):
-    """The state after one step, not projected, and its last two terms."""
+    """Return the state after one step, not projected, and the last two terms of the series."""
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
     turn = series.spread(field.rate) if isinstance(field, Turned) else None
@@ -141,35 +141,35 @@ def take_step(field, constants, order, h, K, g, a, w):
 
 @trace
 def sizes(scales, last, before):
-    """The sizes of two terms: of rows of a rotation, and of rates in units of what all energy makes of the largest moment."""
+    """Return the sizes of two terms; rates are in units of the rate of the slowest axis at the same energy."""
     over = 0.5 * scales[1] * scales[2]
     return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (last, before))
 
 
 @small
 def stretch(tolerance, order, large):
-    """By which factor a step may be longer, by the sizes of its last two terms."""
+    """Return the factor by which the step may grow, from the sizes of its last two terms."""
     last, before = large[0] + TINY, large[1] + TINY
     return min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
 
 
 def significant(x, scale):
-    """x, less in size by what counts as round-off of that scale: a continuous function, which amplifies no noise."""
+    """Return x moved towards 0 by the round-off of the scale: continuous, so that noise is not amplified."""
     least = ROUND_OFF * scale
     return choose(x > least, x - least, choose(x < -least, x + least, 0.0))
 
 
 def straighten(g, a):
-    """Return 1/|g|, the vector a of length one and at right angles to g, both to first order, and by how much they were not."""
+    """Return 1/|g| and a made orthonormal to g, both to first order, and the defect of orthonormality."""
     n, m, c = 0.5 - 0.5 * dot(g, g), 0.5 - 0.5 * dot(a, a), dot(a, g)
     return 1.0 + n, subtract(scale(1.0 + m, a), scale(c, g)), abs(n) + abs(m) + abs(c)
 
 
 def shortest_move(loose, scales, w, L, T, e, m, g):
-    """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order, and moves least.
+    """Return the smallest (dL, rotation of the body) that changes energy by e and momentum about the axis by m, to first order.
 
-    Gradients are with respect to (L / size, turn): (size w, -T) and (size g, L x g) with the torque T. The third that is
-    returned is the share of e and m that regularisation leaves where it is.
+    Gradients are with respect to (L / size, rotation): (size w, -T) and (size g, L x g) with the torque T. The third result is
+    the share of e and m that regularisation leaves uncorrected.
     """
     turn, square = cross(L, g), scales[1] * scales[1]
     w, g = times(loose, w), times(loose, g)
@@ -183,11 +183,11 @@ def shortest_move(loose, scales, w, L, T, e, m, g):
 
 
 def correct_in_field(field, constants, body, kept, scales, g, a, w):
-    """`correct` where a field acts.
+    """Correct a state in a field (`find_correction`).
 
-    The inverse length of g is two terms of its series (`projected.near_unit`), and energy and momentum are taken with g that
-    long to first order, so that no product waits for another. What is left is of the size of the defect's square, and that
-    share of the defect which regularisation leaves.
+    The inverse length of g is two terms of its series, and energy and momentum are those of the normalised g to first order, so
+    that no product waits for another. The remaining defect is of the size of the square of the first one, plus the share that
+    regularisation leaves.
     """
     J, J_inverse, loose = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
@@ -200,7 +200,7 @@ def correct_in_field(field, constants, body, kept, scales, g, a, w):
 
 
 def correct_free(field, constants, body, kept, scales, g, a):
-    """`correct` of a free body: the momentum is along g, so that w follows from g, and energy is brought back by turning g."""
+    """Correct a free body: the momentum is along g, so w follows from g, and rotating g restores the energy."""
     J_inverse, (n, upright, off) = body[1], straighten(g, a)
     L = scale(n * field.momentum, g)
     e, slope = kept[0] - 0.5 * dot(L, times(J_inverse, L)), cross(times(J_inverse, L), L)
@@ -212,7 +212,7 @@ def correct_free(field, constants, body, kept, scales, g, a):
 
 
 def correct_revolving(field, constants, body, kept, scales, g, a, w):
-    """`correct` where the field turns: the Jacobi integral's gradients are the rates less those of D, and -(T + L x these)."""
+    """Correct a state in a field that turns at rates o: the gradients of the Jacobi integral are w - o and -(T + L x o)."""
     J, J_inverse, _ = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
     jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
@@ -227,9 +227,9 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
 
 
 def find_correction(field, constants, body, kept, scales, g, a, w):
-    """Return (g, a, w, relative defect before, share left) of a state brought closer to orthonormality and to what is `kept`.
+    """Return (g, a, w) closer to orthonormality and to the values `kept`, the relative defect before, and the share left.
 
-    `body` is (J, J_inverse, loose) of `Model`; the share is what regularisation leaves of the defect.
+    `body` is (J, J_inverse, loose) of `Model`. The share is the part of the defect that regularisation leaves.
     """
     if isinstance(field, Free):
         return correct_free(field, constants, body, kept, scales, g, a)
@@ -240,9 +240,9 @@ def find_correction(field, constants, body, kept, scales, g, a, w):
 
 @trace
 def correct(field, body, g, a, w):
-    """Return (g, a, w) of `find_correction`, what is left of the relative defect, and whether to correct once more.
+    """Return (g, a, w) of `find_correction`, the relative defect that remains, and whether to correct once more.
 
-    Left are the defect's square, and the share that regularisation leaves of what is no round-off.
+    The square of the defect remains, and the share that regularisation leaves of the part above round-off.
     """
     g, a, w, defect, rest = find_correction(field, *body, g, a, w)
     beyond_noise = choose(defect > NOISE, defect - NOISE, 0.0)
@@ -252,9 +252,9 @@ def correct(field, body, g, a, w):
 
 @partial(kernel, forceinline=True)
 def project(field, body, g, a, w, active):
-    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`.
+    """Return (g, a, w) projected onto the invariants, the number of corrections, and the relative defect that remains.
 
-    Bodies that are not active, and those that need no further correction, wait for the others.
+    Bodies that are not active, and those that need no further correction, do not change.
     """
     g, a, w, left, needed = correct(field, body, g, a, w)
     needed = needed & active
@@ -269,7 +269,7 @@ def project(field, body, g, a, w, active):
 
 @small
 def quaternion(g, a):
-    """The quaternion, of any length, of the matrix with third row g and first row a."""
+    """Return the quaternion, of any length, of the matrix with third row g and first row a."""
     b = cross(g, a)
     trace = a[0] + b[1] + g[2]
     if trace > 0.0:
@@ -284,7 +284,7 @@ def quaternion(g, a):
 # Optimised twice: once alone, steps of a free body take 1.05 times and those in a turning field 1.06 times as long.
 @partial(kernel, forceinline=True, ahead=True)
 def march(model, coefficients, workspace):
-    """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
+    """Take the steps (`protocol`). A step that cannot be projected fails; the size is the relative defect that remains."""
     field, left, g, a = model.field, model.left, model.g, model.a
     order, h, tolerance = coefficients
     n_steps, every, pause, q_out, L_out = workspace
@@ -338,11 +338,11 @@ def enter(*loose):
 
 
 class Bodies(NamedTuple):
-    """Bodies in lanes: as `Model`, and numbers that steps and samples need.
+    """Bodies in lanes: the numbers of `Model`, and others for steps and samples.
 
-    `h` is the length of a step in the units of the body. `axes` are the rows of the rotation from axes D to the world's,
-    `R_BP` those of the rotation from principal to body axes. Rates in the units of the body times `units` are those of samples:
-    the third contains the spin if the body is described in a frame that does not spin.
+    `h` is the step size in the units of the body. `axes` are the rows of the rotation from axes D to world axes, `R_BP` the rows
+    of the rotation from principal to body axes. `units` converts rates of the body's units to rad/s; its third component
+    contains the spin if the body is described in a non-spinning frame.
     """
 
     J: Any
@@ -370,7 +370,7 @@ class Motion(NamedTuple):
 
 @trace
 def find_sample(bodies, turn, g, a, w):
-    """Return the rows of R_WB, one after the other, and w_WB_B; `turn` is cosine and sine of the angle of a spin left out."""
+    """Return R_WB by rows and w_WB_B; `turn` is cosine and sine of the angle of the spin outside the frame."""
     b, (cos, sin), (x, y, z) = cross(g, a), turn, times(bodies.units, w)
     w = cos * x + sin * y, cos * y - sin * x, z
     R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in bodies.axes]

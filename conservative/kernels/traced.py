@@ -2,10 +2,10 @@
 
 `trace(function)` runs a function once with `Symbol`s in place of its arguments; their arithmetic emits LLVM instructions. Numba
 then has no types of inner functions to infer, which takes a tenth of a second each. Arguments and results are floats, integers,
-truth values, `Lanes`, and tuples of these, named or not. One source so serves one body and several: the `Lanes` of a number
-hold one float per body. With plain Python kernels, `trace` returns the function itself.
+truth values, `Lanes`, and tuples of these, named or not. One source therefore serves one body and several: `Lanes` contain one
+float per body. With plain Python kernels, `trace` returns the function itself.
 
-Products that are added at once are rounded once (the flag "contract"), as in `kernels.SMALL`.
+A product and the sum after it are rounded once (the flag "contract"), as in `kernels.SMALL`.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ else:
             return kind.count * len(self.registers) if isinstance(kind, ir.VectorType) else 0
 
         def spread(self, x):
-            """Return the registers of a number x brought to the lanes of this one."""
+            """Return the registers of a number x with as many lanes as this one."""
             if not isinstance(x, Symbol):
                 kind = ir.VectorType(DOUBLE, REGISTER) if self.width else DOUBLE
                 return [ir.Constant(kind, [float(x)] * REGISTER if self.width else float(x))] * (len(self.registers))
@@ -250,7 +250,7 @@ else:
 
     @cache
     def _find_type(function, kinds):
-        """Return the type of a function's result, found by tracing it into a module that is thrown away."""
+        """Return the type of a function's result. The function is traced into a temporary module."""
         context = cpu_target.target_context
         arguments = [context.get_value_type(kind) for kind in kinds]
         whole = ir.Function(ir.Module(), ir.FunctionType(INDEX, arguments), "trial")
@@ -258,7 +258,7 @@ else:
         return type_of(function(*(unpack(builder, *each) for each in zip(kinds, whole.args, strict=True))))
 
     def trace(function):
-        """Return the function itself, after making it known to numba; in Python it stays what it is."""
+        """Register a function with numba and return it unchanged."""
 
         def traced(typing, *kinds):
             # A value that may be None by its type is not None here: numba's cast checks it.
@@ -282,7 +282,7 @@ else:
 
 
 def join(a, b, c, d):
-    """Return four floats as one number: lanes for components, in plain Python an array."""
+    """Return four floats as one number with a lane per component; in plain Python an array."""
     symbol = next((x for x in (a, b, c, d) if isinstance(x, Traced)), None)
     if symbol is None:
         return np.array((a, b, c, d))

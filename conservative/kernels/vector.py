@@ -1,4 +1,4 @@
-"""The functions of `conservative.arithmetic` for compiled code: of floats, of lanes, and of both together."""
+"""The functions of `conservative.arithmetic` for floats and lanes in compiled code."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from .traced import trace
 
 
 def every(mask):
-    """Return whether all lanes are true; of a plain truth value, itself."""
+    """Return whether all lanes are true; a plain truth value is returned unchanged."""
     return mask.reduce("and") if isinstance(mask, _Traced) else mask
 
 
 def some(mask):
-    """Return whether any lane is true; of a plain truth value, itself."""
+    """Return whether any lane is true; a plain truth value is returned unchanged."""
     return mask.reduce("or") if isinstance(mask, _Traced) else mask
 
 

@@ -9,7 +9,7 @@ and quaternions q of any length, a field has the functions
     finite_torque(q, a)          torque of a step and its derivative by a (`kernels.fields`)
     finite_derivative(q0, q1)    (c, d), with the finite derivative V* = c d' of base vectors q0, q1 (three columns each)
     finite_slope(q0, q1)         (D, B), with dV*[j] / dq1[k] = D[j][k] B, for base vectors j and k
-    find_constants(J_inverse)    what the next two are given: all that depends on field and body alone
+    find_constants(J_inverse)    arguments of the next two: all that depends on field and body only
     slope(constants, g)          V and dV/dg, J
     series(constants, g, series) a function that returns coefficient n of J^-1 T (`kernels.series`)
 
@@ -35,7 +35,7 @@ from .varied import Varied
 
 
 class FieldPotential(ABC):
-    """Base of potentials that are made of numbers. A subclass names them and builds its field of them."""
+    """Base of potentials that are defined by numbers. A subclass names them and builds its field from them."""
 
     NUMBERS: ClassVar[tuple[str, ...]]
     """Names of the attributes that `build_field` takes."""
@@ -43,7 +43,7 @@ class FieldPotential(ABC):
     @staticmethod
     @abstractmethod
     def build_field(R_BP: Array | None, *numbers: Any) -> Any:
-        """Return the field in axes that rotations R_BP (..., 3, 3) take to those of the body; None: in body axes.
+        """Return the field in axes P, with R_BP (..., 3, 3) from P to body axes; None: in body axes.
 
         Numbers, in SI units, and the numbers of the field are arrays with any leading axes.
         """
@@ -66,7 +66,7 @@ class FieldPotential(ABC):
         return self.build_field(R_BP, *(getattr(self, name) for name in self.NUMBERS))
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the field as kernels take it, in principal axes: floats in tuples."""
+        """Return the field for kernels, in principal axes: tuples of floats."""
         return _to_tuples(self._field(R_BP))
 
     def energy(self, R_WB: Array) -> Array:
@@ -107,7 +107,7 @@ def _to_tuples(value: Any) -> Any:
 
 
 def into_axes(v: Array, R_BP: Array | None) -> Array:
-    """Return vectors (..., 3), body axes, in axes R_BP (..., 3, 3); None are those of the body."""
+    """Return vectors (..., 3), body axes, in axes P with R_BP (..., 3, 3) from P to body axes; None: body axes."""
     return v if R_BP is None else np.asarray((v[..., None, :] @ R_BP)[..., 0, :])
 
 

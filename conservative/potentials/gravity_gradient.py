@@ -35,7 +35,7 @@ class GradientField(NamedTuple):
         return cross(u, apply(self.rows, u))
 
     def finite_torque(self, q: Any, a: Any) -> Any:
-        """Return T = e x (M G ubar) and its derivative; M changes the product by dm, u changes by -du as it is taken at -a."""
+        """Return T = e x (M G ubar) and its derivative. M changes the product by dm; u, evaluated at -a, changes by -du."""
         e = in_body(q, self.e)
         u, du = halfway(scale(-1.0, a), e)
         m, dm = halfway(a, apply(self.rows, u))
@@ -52,7 +52,7 @@ class GradientField(NamedTuple):
         return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return the rows of two matrices: u = G g, turned as r and as s and over J, is one of them times r, s and g."""
+        """Return the rows of two matrices that map (r, s, g) to J^-1 u in the arrangements r and s, with u = G g."""
         x, y, z = self.rows
         rows = (
             (y[1], z[2], x[0]),
@@ -137,7 +137,7 @@ class GravityGradient(FieldPotential):
 
     @property
     def factor(self) -> float:
-        """Return 3 rate^2, 1/s^2: what u x J u is multiplied by."""
+        """Return 3 rate^2, 1/s^2: the factor of u x J u."""
         return 3 * self.rate**2
 
     NUMBERS: ClassVar[tuple[str, ...]] = ("rate", "inertia", "direction_W")

@@ -115,7 +115,7 @@ class UniformGravity(FieldPotential):
         """Return the field in axes R_BP."""
         return UniformField(*np.moveaxis(into_axes(np.asarray(weight)[..., None] * com_B, R_BP), -1, 0))
 
-    # Of one body, these three are asked in every run: the field's functions take 10 us each.
+    # Every run of one body calls these three. The functions of the field take 10 us each.
 
     def energy(self, R_WB: Array) -> Array:
         """Return V, (...), in J at attitudes (..., 3, 3)."""
@@ -136,5 +136,5 @@ class UniformGravity(FieldPotential):
 
     @staticmethod
     def suspects(parameters: Mapping[str, Array]) -> bool:
-        """Return which of n bodies' numbers (n, ...), N and m, might not be taken as they are: none."""
+        """Return False: any numbers (n, ...), N and m, are valid for n bodies."""
         return False
