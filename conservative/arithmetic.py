@@ -48,12 +48,12 @@ def _thrice(x: Any) -> Any:
 
 def fuse(a: Any, b: Any, c: Any) -> Any:
     """Return a b + c; compiled code rounds once."""
-    if any(isinstance(x, Axes) for x in (a, b, c)):
+    if not isinstance(a, Traced | Axes) and not isinstance(b, Traced | Axes) and not isinstance(c, Traced | Axes):
+        return a * b + c
+    if isinstance(a, Axes) or isinstance(b, Axes):
         return Axes(*map(fuse, _thrice(a), _thrice(b), _thrice(c)))
-    for x in (a, b, c):
-        if isinstance(x, Traced):
-            return x.fuse(a, b, c)  # type: ignore[attr-defined]
-    return a * b + c
+    number: Any = next(x for x in (a, b, c) if isinstance(x, Traced))
+    return number.fuse(a, b, c)
 
 
 def root(x: Any) -> Any:

@@ -23,7 +23,7 @@ Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates
 
 
 class Role(StrEnum):
-    """Which side a method is on."""
+    """Role of a method in comparisons."""
 
     OURS = "ours"
     """Compared with the engines in verdicts; its time is gated."""

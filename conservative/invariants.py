@@ -117,18 +117,18 @@ def invariants_of(
     energy_scale
         Reference scale of the energy, J, above 0.
     """
-    found = list(_energies(body, potential, energy_scale))
+    conserved = list(_energies(body, potential, energy_scale))
     # A scene that starts at rest has no momentum. The momentum that gravity can produce is the scale instead.
     scale = float(np.linalg.norm(body.momentum(w_WB_B0))) or math.sqrt(float(body.moments.max()) * energy_scale)
     if potential is None:
-        found.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
+        conserved.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
         name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
-        found.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
+        conserved.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
     axis = axial_direction(body, potential)
     if axis is not None:
-        found.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
-    return tuple(found)
+        conserved.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
+    return tuple(conserved)
 
 
 def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: float) -> Iterator[Invariant]:
@@ -156,8 +156,8 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     near rest.
     """
     most = math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
-    found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
-    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in found}
+    of_motion = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
+    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in of_motion}
 
 
 NEARLY_SPHERICAL = 0.005

@@ -57,7 +57,7 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Whether the run reached its end."""
+        """True if the run reached its end."""
         return self.kind is OutcomeKind.OK
 
     def __str__(self) -> str:
@@ -170,7 +170,7 @@ class Choice:
 
     @property
     def reached(self) -> bool:
-        """Whether the estimate is at most the requested error."""
+        """True if the estimate is at most the requested error."""
         return self.estimate <= self.error
 
 

@@ -112,12 +112,12 @@ class Scene:
 
     @property
     def free(self) -> bool:
-        """Whether the body is free: no potential."""
+        """True if there is no potential."""
         return self.potential is None
 
     @property
     def integrable(self) -> bool:
-        """Whether a closed form of the motion exists: three invariants are known, one for each degree of freedom.
+        """True if a closed form of the motion exists: three invariants are known, one for each degree of freedom.
 
         This holds for free bodies and for scenes with three invariants, including `extra_invariants` (Arnold, Mathematical
         Methods of Classical Mechanics, section 49, Liouville's theorem).
@@ -169,11 +169,11 @@ class Scene:
         try:
             return known[key]
         except KeyError:
-            found = function(self, *settings)
+            result = function(self, *settings)
             if len(known) >= MOST_DERIVATIONS:
                 known.clear()
-            known[key] = found
-        return found
+            known[key] = result
+        return result
 
     def forget(self) -> None:
         """Delete the cache of `derive`, for timing the complete preparation of a run."""
@@ -191,12 +191,12 @@ class Scene:
 def _invariants(value: object) -> tuple[Invariant, ...]:
     """Return invariants as a tuple. Raise `BadInput` for anything else."""
     try:
-        found: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
+        given: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
     except Exception:  # not an iterable, or one that fails
-        found = (value,)
-    if not all(isinstance(each, Invariant) for each in found):
+        given = (value,)
+    if not all(isinstance(each, Invariant) for each in given):
         raise BadInput("extra_invariants", describe(value), "Invariants, in a tuple or a list")
-    return found
+    return given
 
 
 def _usual_step(w_WB_B0: Array, t_end: float) -> float:

@@ -59,7 +59,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """Whether the run reached its end."""
+        """True if the run reached its end."""
         return self.failure is None
 
     @cached_property

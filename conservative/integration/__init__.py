@@ -1,1 +1,1 @@
-"""What users call: `one` integrates a scene, `many` thousands of starts and bodies of one kind of scene."""
+"""The functions for users: `one` integrates a scene, `many` integrates thousands of initial states and bodies."""

@@ -79,7 +79,7 @@ class Ensemble:
 
     @property
     def ok(self) -> Any:
-        """Whether the run of each body (n,) reached its end."""
+        """Booleans (n,): True for bodies whose run reached its end."""
         ok = np.ones(len(self), dtype=bool)
         ok[list(self.failures)] = False
         return ok

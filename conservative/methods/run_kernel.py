@@ -18,6 +18,8 @@ from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart
 
+_NO_COUNTERS = Counters(0)
+
 
 def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, kernel: Any, model: Any, coefficients: Any) -> Run:
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
@@ -30,8 +32,8 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     # Of the workspace, the last three are of each run. Its count is checked by `enter`, that of the result by unpacking it.
     enter, to_body_axes = partial(kernel.enter, *model, *coefficients, n_steps, grid.every), kernels("samples").to_body_axes
     turn = start.J_inverse, start.spin, start.R_BP
-    counts: tuple[int, int, int, int | None] = 0, 0, 0, None
-    counters = Counters(*counts)
+    counts: tuple[int, int, int, int | None] | None = None
+    counters = _NO_COUNTERS
 
     def run() -> Trajectory:
         nonlocal counts, counters

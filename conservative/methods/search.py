@@ -78,19 +78,19 @@ class Candidate:
 
     @property
     def reached(self) -> bool:
-        """Whether the last step is short enough."""
+        """True if the last step is short enough."""
         return bool(self.attempts) and self.attempts[-1][1] <= SAFETY * self.error
 
     @property
     def settled(self) -> bool:
-        """Whether the last step is short enough, or shorter ones do not help."""
+        """True if the last step is short enough, or shorter ones do not help."""
         if not self.attempts:
             return False
         return self.reached or self.method.order is None or stops_falling([error for _, error in self.attempts])
 
     @property
     def hopeless(self) -> bool:
-        """Whether the candidate is given up."""
+        """True if the candidate is given up."""
         return not self.settled and (self.duration / self.dt > MOST_PROBED or len(self.attempts) >= ATTEMPTS)
 
     @property

@@ -79,12 +79,13 @@ class FieldPotential(ABC):
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return V*, (..., 3, 3), in J, exact for attitudes (..., 3, 3) at any distance."""
-        columns = (np.moveaxis(np.asarray(R), (-1, -2), (0, 1)) for R in (R_0, R_1))
+        columns = [[[R[..., i, j] for i in range(3)] for j in range(3)] for R in (np.asarray(R_0), np.asarray(R_1))]
         c, d = self.kernel_field(np.eye(3)).finite_derivative(*columns)
-        product = (
-            np.stack(np.broadcast_arrays(*c), axis=-1)[..., :, None] * np.stack(np.broadcast_arrays(*d), axis=-1)[..., None, :]
-        )
-        return np.array(np.broadcast_to(product, np.shape(R_0)))
+        V_star = np.empty(np.shape(R_0))
+        for i in range(3):
+            for j in range(3):
+                V_star[..., i, j] = c[i] * d[j]
+        return V_star
 
     def scale(self) -> float:
         """Return the size of the field, J."""

@@ -89,8 +89,8 @@ class GradientField(NamedTuple):
 
     def energies(self, R_WB: Any) -> Any:
         """Return V, (...), in J."""
-        u = np.sum(R_WB * self.e[..., :, None], axis=-2)
-        return np.sum(np.sum(self.rows * u[..., None, :], axis=-1) * u, axis=-1) / 2
+        u = self.e[..., None, :] @ R_WB
+        return np.sum(u @ self.rows * u, axis=(-1, -2)) / 2
 
     def scale(self) -> Any:
         """Return the largest V, J."""
@@ -145,9 +145,13 @@ class GravityGradient(FieldPotential):
     @staticmethod
     def build_field(R_BP: Array | None, rate: Any, inertia: Any, direction_W: Any) -> GradientField:
         """Return the field in axes R_BP."""
-        axes = np.eye(3) if R_BP is None else R_BP
-        rows = 3 * np.asarray(rate)[..., None, None] ** 2 * (np.swapaxes(axes, -1, -2) @ inertia @ axes)
-        return GradientField(rows, direction_W)
+        turned = inertia if R_BP is None else np.swapaxes(R_BP, -1, -2) @ inertia @ R_BP
+        return GradientField(3 * np.asarray(rate)[..., None, None] ** 2 * turned, direction_W)
+
+    @property
+    def axis_W(self) -> Array:
+        """Return the direction of the centre, (3,)."""
+        return self.direction_W
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""

@@ -198,7 +198,7 @@ def _paths(value: object, prefix: Key) -> Iterator[Key]:
 
 
 def _numeric(value: object) -> bool:
-    """Whether a value is a number or nested lists of numbers. NumPy would also convert texts and booleans."""
+    """Return whether a value is a number or nested lists of numbers. NumPy would also convert texts and booleans."""
     if isinstance(value, list):
         return all(_numeric(item) for item in value)
     if isinstance(value, int) and not isinstance(value, bool):

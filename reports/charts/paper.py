@@ -22,7 +22,11 @@ _MAP_COLOURS = {PAPER_MAP: PALETTE["sky"], REDUCED_MAP: PALETTE["blue"]}
 _RUN_LOOKS = ((PALETTE["sky"], [1, 0]), (PALETTE["blue"], [8, 4]), (PALETTE["black"], [2, 2]))
 
 
-def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
+Drawn = tuple[Any, list[vega_embed.Spec], list[LegendEntry]]
+"""The picture of a figure, and its panels and legend on the page."""
+
+
+def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Drawn:
     """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
     ends = rates.loc[rates.groupby("component")["t"].idxmax()]
     colour = alt.Color("component:N", scale=_scale(_RATE_COLOURS), legend=None)
@@ -33,7 +37,13 @@ def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
     a = lines + labels.encode(x="t:Q", y=alt.Y("rate:Q", stack=None), text="component:N", color=colour)
     b = _errors(errors, ENERGY, "relative error of energy", "(b) Energy, Δt = 0.01 s, ε = 1e-8")
     c = _errors(errors, MOMENTUM, "relative error of |L|", "(c) Length of the angular momentum, Δt = 0.01 s, ε = 1e-8")
-    return apply_style(alt.hconcat(a, alt.vconcat(b, c)).resolve_scale(color="independent"))
+    picture = apply_style(alt.hconcat(a, alt.vconcat(b, c)).resolve_scale(color="independent"))
+    shown: list[vega_embed.Shown] = [
+        ("component", "N", "rate"), ("method", "N", "method"), ("t", "Q", "t, s"), ("rate", "Q", "rad/s"),
+        (ENERGY, "Q", "relative error of energy"), (MOMENTUM, "Q", "relative error of |L|"),
+    ]  # fmt: skip
+    legend = [LegendEntry(name, shade, "", "1 0") for name, shade in (_RATE_COLOURS | _MAP_COLOURS).items()]
+    return picture, vega_embed.embed(picture, shown, PANEL_HEIGHT), legend
 
 
 def _errors(errors: pd.DataFrame, column: str, axis: str, title: str) -> Any:
@@ -43,9 +53,9 @@ def _errors(errors: pd.DataFrame, column: str, axis: str, title: str) -> Any:
     return chart.encode(x=_TIME, y=y, color=alt.Color("method:N", scale=_scale(_MAP_COLOURS), legend=legend))
 
 
-def figure_2(positions: pd.DataFrame) -> Any:
+def figure_2(positions: pd.DataFrame) -> Drawn:
     """Return figure 2: (b), (c), the coordinates x1 and x2 of the top's centre of mass for two steps, and exact."""
-    runs = _runs(positions)
+    runs = [*(str(name) for name in positions["run"].unique() if name != ANALYTICAL), ANALYTICAL]
     legend = alt.Legend(title=None, orient="bottom", symbolSize=300)
     colours, dashes = (alt.Scale(domain=runs, range=[look[part] for look in _RUN_LOOKS]) for part in (0, 1))
     look = {
@@ -58,29 +68,11 @@ def figure_2(positions: pd.DataFrame) -> Any:
         .encode(x=_TIME, y=alt.Y(f"{coordinate}:Q", title=f"{coordinate}, m"), **look)
         for letter, coordinate in (("b", X1), ("c", X2))
     ]
-    return apply_style(alt.hconcat(*panels))
-
-
-def panels_1(picture: Any) -> tuple[list[vega_embed.Spec], list[LegendEntry]]:
-    """Return the panels of figure 1 and their legend as the page draws them."""
-    shown: list[vega_embed.Shown] = [
-        ("component", "N", "rate"), ("method", "N", "method"), ("t", "Q", "t, s"), ("rate", "Q", "rad/s"),
-        (ENERGY, "Q", "relative error of energy"), (MOMENTUM, "Q", "relative error of |L|"),
-    ]  # fmt: skip
-    colours = _RATE_COLOURS | _MAP_COLOURS
-    return vega_embed.embed(picture, shown, PANEL_HEIGHT), [LegendEntry(name, colours[name], "", "1 0") for name in colours]
-
-
-def panels_2(picture: Any, positions: pd.DataFrame) -> tuple[list[vega_embed.Spec], list[LegendEntry]]:
-    """Return the panels of figure 2 and their legend as the page draws them."""
+    picture = apply_style(alt.hconcat(*panels))
     shown: list[vega_embed.Shown] = [("run", "N", "line"), ("t", "Q", "t, s"), (X1, "Q", f"{X1}, m"), (X2, "Q", f"{X2}, m")]
-    looks = zip(_runs(positions), _RUN_LOOKS, strict=False)
-    legend = [LegendEntry(run, colour, "", " ".join(map(str, dash))) for run, (colour, dash) in looks]
-    return vega_embed.embed(picture, shown, PANEL_HEIGHT), legend
-
-
-def _runs(positions: pd.DataFrame) -> list[str]:
-    return [*(str(name) for name in positions["run"].unique() if name != ANALYTICAL), ANALYTICAL]
+    looks = zip(runs, _RUN_LOOKS, strict=False)
+    entries = [LegendEntry(run, colour, "", " ".join(map(str, dash))) for run, (colour, dash) in looks]
+    return picture, vega_embed.embed(picture, shown, PANEL_HEIGHT), entries
 
 
 def _scale(colours: Mapping[str, str]) -> alt.Scale:

@@ -32,13 +32,10 @@ def drifts(samples: pd.DataFrame) -> pd.DataFrame:
 
     Of methods that differ only in tolerance, those with the loosest and the tightest are included.
     """
-    rows = _extremes(_samples_of(samples, "long_runs")).rename(columns={"value": "drift"})
-    return rows[["scene", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
-
-
-def _extremes(rows: pd.DataFrame) -> pd.DataFrame:
+    rows = _samples_of(samples, "long_runs").rename(columns={"value": "drift"})
     names = rows.groupby(["scene", "line"])["name"]
-    return rows[(rows["name"] == names.transform("first")) | (rows["name"] == names.transform("last"))]
+    rows = rows[(rows["name"] == names.transform("first")) | (rows["name"] == names.transform("last"))]
+    return rows[["scene", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
 
 
 def thin(drifts: pd.DataFrame) -> pd.DataFrame:
@@ -76,17 +73,14 @@ def conservation_errors(samples: pd.DataFrame) -> pd.DataFrame:
 def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
     """Return figures 2(b) and 2(c): columns t (s), run, x1, x2 (m), the top's centre of mass for two steps, and exact."""
     rows = _of_figure(samples, TOP)
-    runs = [_run(method, dt) for method, dt in zip(rows["method"], rows["dt"], strict=True)]
+    methods = zip(rows["method"], rows["dt"], strict=True)
+    runs = [ANALYTICAL if method == EXACT else f"Δt = {dt:g} s" for method, dt in methods]
     return _points(rows.assign(run=pd.Series(runs, index=rows.index, dtype="string")), ["t", "run"], (X1, X2))
 
 
 def _of_figure(samples: pd.DataFrame, scene: str) -> pd.DataFrame:
     rows = _samples_of(samples, "paper_figures")
     return rows[rows["scene"] == scene]
-
-
-def _run(method: str, dt: float) -> str:
-    return ANALYTICAL if method == EXACT else f"Δt = {dt:g} s"
 
 
 def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:

@@ -113,11 +113,6 @@ def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.D
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
 
 
-def prefix_quantity(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows with the quantity before the measure: `energy drift max`."""
-    return rows.assign(measure=(rows["quantity"] + " " + rows["measure"]).str.lstrip())
-
-
 def outcomes(rows: pd.DataFrame) -> list[Outcome]:
     """Return the outcome of each row."""
     return [outcome_of(row) for _, row in rows.iterrows()]

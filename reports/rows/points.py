@@ -34,7 +34,7 @@ def points(
     Parameters
     ----------
     table
-        Measurements with names (see `labels.with_names`).
+        Measurements with names (see `names.with_names`).
     study, time
         Name of the study, and the measure of the time.
     untimed

@@ -18,14 +18,12 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
     figures = []
     if len(rates):
         words = "The brick, disturbed by 1e-8, turns over repeatedly about its middle axis; signed errors of energy and |L|."
-        picture = paper.figure_1(rates, errors)
         title = "Figure 1 of the paper: body rates, energy and momentum"
-        figures.append(Figure("paper_figure_1", title, words, picture, *paper.panels_1(picture), Layout.PANELS))
+        figures.append(Figure("paper_figure_1", title, words, *paper.figure_1(rates, errors), Layout.PANELS))
     if len(positions):
         words = "The top's centre of mass for two steps, and exact. The tables of drift above show what the map conserves."
-        picture = paper.figure_2(positions)
         title = "Figure 2 of the paper: centre of mass of the top"
-        figures.append(Figure("paper_figure_2", title, words, picture, *paper.panels_2(picture, positions), Layout.PANELS))
+        figures.append(Figure("paper_figure_2", title, words, *paper.figure_2(positions), Layout.PANELS))
     return Section("The paper's figures, drawn again", filled(*figures, position_errors(table)), "paper", "The paper")
 
 

@@ -13,7 +13,7 @@ from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
 from ..document.model import Block, Document, Facts, Paragraph, Row, Section, Table, filled
-from ..rows.names import prefix_quantity, with_names
+from ..rows.names import with_names
 from ..run.measure import Measurements
 from . import many_bodies, random_bodies
 from .report import records
@@ -53,12 +53,10 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
 def rows_table(name: str, table: pd.DataFrame) -> Table:
     """Return named rows (see `names.with_names`) as a table."""
     header = ["scene", "method", "step, s", "measure", "value", "unit", "outcome"]
-    rows = [_row(row) for row in prefix_quantity(table).to_dict("records")]
+    rows: list[Row] = []
+    for row in table.to_dict("records"):
+        step = DASH if math.isnan(row["dt"]) else f"{row['dt']:.4g}"
+        measure = f"{row['quantity']} {row['measure']}".lstrip()
+        end = "" if row["outcome"] == OutcomeKind.OK else f"{row['outcome']}{': ' * bool(row['reason'])}{row['reason']}"
+        rows.append([row["scene"], row["name"], step, measure, number(row["value"], 3), row["unit"], end])
     return Table(header, rows, f"{name}: {len(table)} rows")
-
-
-def _row(row: Mapping[Any, Any]) -> Row:
-    step = DASH if math.isnan(row["dt"]) else f"{row['dt']:.4g}"
-    ok = row["outcome"] == OutcomeKind.OK
-    end = "" if ok else f"{row['outcome']}{': ' * bool(row['reason'])}{row['reason']}"
-    return [row["scene"], row["name"], step, row["measure"], number(row["value"], 3), row["unit"], end]

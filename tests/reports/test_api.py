@@ -16,7 +16,7 @@ LOADED = re.compile(r'<(?:script|img|iframe|source)[^>]*\ssrc="([^"]*)"|<link[^>
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
-    """Pages by their path; made in another process, as pdoc runs what stands under `if TYPE_CHECKING`."""
+    """Pages by their path; written by another process, as pdoc runs the code under `if TYPE_CHECKING`."""
     folder = tmp_path_factory.mktemp("api")
     command = [sys.executable, "-W", "error", "-m", "conservative.reports.documentation.api", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)

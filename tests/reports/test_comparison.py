@@ -1,4 +1,4 @@
-"""What is said of two versions: text, table, JSON, Markdown, JUnit, the page; and which options go together."""
+"""Comparisons of two versions as table, JSON, Markdown, JUnit and page, and the options of the command."""
 
 import json
 import math

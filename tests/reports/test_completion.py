@@ -8,7 +8,7 @@ from conservative.reports.cli.main import main
 
 
 def completed(words):
-    """Return type and value of what is offered for the last of the words."""
+    """Return type and value of the completions of the last word."""
     *before, last = words.split(" ")
     shell = BashComplete(main, {}, "conservative", "_CONSERVATIVE_COMPLETE")
     return [(item.type, item.value) for item in shell.get_completions(before, last)]

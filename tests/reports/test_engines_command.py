@@ -1,4 +1,4 @@
-"""`conservative engines`: what it prints, and how it exits."""
+"""`conservative engines`: output and exit codes."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What a report says of engines, from made-up measurements whose tables and pictures are known."""
+"""The section of engines, on made-up measurements with known tables and pictures."""
 
 import math
 

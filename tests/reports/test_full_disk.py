@@ -1,4 +1,4 @@
-"""Commands on a disk that is full: one line that names what cannot be written, and what was there is as it was."""
+"""Commands on a full disk end in one line that names the file, and change no file."""
 
 import json
 import re

@@ -23,7 +23,7 @@ T = np.linspace(0.5, 60, 120)
 
 
 def drifts(*settings):
-    """The drifts of one engine with some settings: what it shares with others, and a tolerance."""
+    """The drifts of one engine: pairs of a shared setting and a tolerance."""
     common = {
         "study": "long_runs",
         "scene": "made_up",

@@ -123,7 +123,7 @@ DEAD = "0123456789ab"
 
 
 def killed(folder, *, step):
-    """Leave what a kill after a step of a swap leaves: the earlier report is `report` with notes of a person beside it."""
+    """Leave the files of a kill after a step of a swap; the earlier report is `report`, with a person's notes."""
     earlier, fresh = folder / "report", folder / f".report-{DEAD}"
     earlier.mkdir()
     write_report(earlier, "a.svg")

@@ -29,7 +29,7 @@ from .rows import frame, row
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A real report, of one scene and three methods; the folder, and what the command said."""
+    """A real report of one scene and three methods: its folder and the result of the command."""
     folder = tmp_path_factory.mktemp("made") / "report"
     methods = "reduced,mujoco:RK4,heyoka:tol=1e-9,frame=non_spinning"
     options = ["--quick", "--scenes", "brick_flip", "--methods", methods, "--out", str(folder)]

@@ -1,4 +1,4 @@
-"""What an unfinished report keeps, what may be resumed, and interruptions of a real process."""
+"""Files of unfinished reports, their resumption, and interruptions of a real process."""
 
 import json
 import re
@@ -198,7 +198,7 @@ def an_earlier_report(folder):
 
 @pytest.fixture(scope="module")
 def resumed(tmp_path_factory):
-    """The folder of a report that was interrupted and resumed, and what was said on the way."""
+    """The folder of a report that was interrupted and resumed, and the output of both processes."""
     folder = tmp_path_factory.mktemp("resumed")
     an_earlier_report(folder / "report")
     kept = folder / "report.partial.json"

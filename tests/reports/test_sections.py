@@ -61,7 +61,7 @@ def report():
 
 
 def texts(document, folder):
-    """The Markdown and the page of a document, and what of them tells how it was made."""
+    """The Markdown and the page of a document."""
     render(document, folder, png=False)
     return [(folder / name).read_text(encoding="utf-8") for name in ("report.md", "index.html")]
 

@@ -1,4 +1,4 @@
-"""What is told first of a scene and of random bodies: classes of methods, a sentence, the picture of families."""
+"""Summaries of a scene and of random bodies: sentence, classes of methods, picture of families."""
 
 import math
 

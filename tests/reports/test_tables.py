@@ -194,7 +194,7 @@ def test_reference_solutions_have_their_agreement():
 
 @pytest.fixture
 def bumped():
-    """A run whose energy is off by 2e-3 in the middle and right in the end."""
+    """A run with an energy error of 2e-3 in the middle and none at the end."""
     exact = cv.integrate(cv.scenes.brick_flip(), 0.1)
     bump = 1 + 1e-3 * np.sin(np.pi * np.arange(len(exact)) / (len(exact) - 1))
     return Trajectory(exact.scene, exact.t, exact.R_WB, exact.w_WB_B * bump[:, None], "bumped")
@@ -210,7 +210,7 @@ def test_the_largest_drift_is_shown_and_not_the_last(bumped):
 
 
 def test_methods_are_ranked_by_their_drift():
-    """Ours and the engines' are among each other: who drifts least comes first, who fails last."""
+    """The smallest drift comes first and failures last, for our methods and engines alike."""
     found = [
         made_up.row("long_runs", "b", "energy drift max", math.nan, outcome=Diverged(0.36, "why").outcome),
         made_up.row("long_runs", "mujoco", "energy drift max", 1e-2, role="engine"),
@@ -266,7 +266,7 @@ def judged(*values):
 
 
 def test_a_hard_case_is_judged_by_its_motion_and_by_its_worst_invariant():
-    """Neither speaks for the other: what keeps everything can be wrong by 0.2 rad, and what is right can drift."""
+    """The two are independent: a method can conserve everything with an error of 0.2 rad, or be accurate and drift."""
     wrong = judged(("attitude error max", 0.2), ("energy drift max", 1e-15), ("momentum drift max", 0))
     assert wrong == (Grade.BAD, Grade.GOOD)
     assert judged(("attitude error max", 1.4e-6), ("energy drift max", 1e-8)) == (Grade.GOOD, Grade.FAIR)

@@ -39,7 +39,7 @@ FAST = SLOW.replace("1.0: Event(), 1.5: Event()", "0.9: Event()")
 
 
 def on_a_terminal(code, columns=80):
-    """Return what a program writes to a terminal of that width."""
+    """Return the output of a program on a terminal of that width."""
     ours, theirs = pty.openpty()
     environment = {**os.environ, "COLUMNS": str(columns), "TERM": "xterm-256color"}
     process = subprocess.Popen([sys.executable, "-c", code], stderr=theirs, stdout=theirs, env=environment)

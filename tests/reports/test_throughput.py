@@ -1,4 +1,4 @@
-"""Many bodies in tables and the report, on made-up measurements whose answer is known."""
+"""Many bodies in tables and the report, on made-up measurements with known results."""
 
 from dataclasses import replace
 

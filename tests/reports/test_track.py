@@ -1,4 +1,4 @@
-"""What is said of versions: sentences with figures, tables, JSON, Markdown, JUnit, a page, and the verdict on the last one."""
+"""Changes between versions in tables, JSON, Markdown, JUnit and the page, and the verdict on the last version."""
 
 import json
 import re
