@@ -1,6 +1,10 @@
 """The step of the symmetric top by addition theorems, and its constants; derivation and symbols: `conservative.methods.lame`.
 
 State: attitude q of the slow frame, whose third axis is the body's, and momentum L in its axes. Quaternions are scalar first.
+
+Many tops take the same steps in the same arithmetic, each in a lane (`march_lanes`). The constants are found one body after the
+other, because they need twofold arithmetic and decisions. Steps of tops can have different numbers of parts: a lane with fewer
+parts waits for its neighbours unchanged.
 """
 
 from __future__ import annotations
@@ -11,10 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .lanes import WIDTH, load, load_rows, save_columns, save_rows
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .twofold import minus, over, plus, scale, times, two
-from .vector import add, cross, product
+from .vector import add, choose, cross, product
 from .vector import scale as scale_vector
 
 TERMS = 22
@@ -25,6 +30,10 @@ PAUSE = 2**18
 """Parts of steps between two calls of handlers of signals."""
 PARTS_AT_ONCE = 1024
 """Numbers of parts tried between two such calls."""
+PARTS, CONSTANTS, ROWS = 20, 22, 32
+"""Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across
+the axis, then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
+constants, and all."""
 
 
 class Model(NamedTuple):
@@ -312,3 +321,64 @@ def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
     return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+
+
+@entry
+def prepare_lanes(J, kappa, q, L, h, table):
+    """Fill the table (ROWS, m) of n bodies, m not below n: moments J (n,), kappa (n,), q (n, 4) and L (n, 3) as in `Model`.
+
+    The columns that are left repeat the last body.
+    """
+    n = len(J)
+    for i in range(n):
+        q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
+        parts, part = divide_step(Model(J[i], kappa[i], q0, L0), h)
+        gamma = unit_vertical(q0)
+        state = q0 + gamma + (L0[0] / J[i], L0[1] / J[i], L0[2])
+        for row, x in enumerate((*part[:], float(parts), J[i], *state)):
+            table[row, i] = x
+    for i in range(n, table.shape[1]):
+        for row in range(ROWS):
+            table[row, i] = table[row, n - 1]
+
+
+@small
+def take_step(c, parts, least, most, q, gamma, w0, w1):
+    """Take a step of so many parts, which differ from lane to lane: `least` of them at least, `most` at most."""
+    for part in range(most):
+        q1, gamma1, v0, v1 = advance(c, q, gamma, w0, w1)
+        if part < least:
+            q, gamma, w0, w1 = q1, gamma1, v0, v1
+        else:
+            left = parts > float(part)
+            q, gamma, w0, w1 = choose(left, q1, q), choose(left, gamma1, gamma), choose(left, v0, w0), choose(left, v1, w1)
+    return q, gamma, w0, w1
+
+
+@entry
+def march_lanes(table, done, last, n_steps, every, q_out, L_out):
+    """Take the steps after `done` up to `last` of n_steps: of all bodies of the table of `prepare_lanes`, WIDTH at a time.
+
+    Samples go to q_out (n, samples, 4) and L_out (n, samples, 3).
+    """
+    n, flat = table.shape[1], table.reshape(-1)
+    q_flat, L_flat, samples = q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
+    for i in range(0, n, WIDTH):
+        c = Part(*load_rows(flat, i, n, PARTS, WIDTH))
+        parts, J = load(flat, i + PARTS * n, WIDTH), load(flat, i + (PARTS + 1) * n, WIDTH)
+        least, most = table[PARTS, i], table[PARTS, i]
+        for lane in range(1, WIDTH):
+            least, most = min(least, table[PARTS, i + lane]), max(most, table[PARTS, i + lane])
+        state = load_rows(flat, i + CONSTANTS * n, n, 10, WIDTH)
+        q, gamma, w0, w1, L2 = state[:4], state[4:7], state[7], state[8], state[9]
+        row, until_sample = done // every, every - done % every
+        for step in range(done + 1, last + 1):
+            q, gamma, w0, w1 = take_step(c, parts, int(least), int(most), q, gamma, w0, w1)
+            until_sample -= 1
+            if until_sample == 0 or step == n_steps:
+                until_sample = every
+                row += 1
+                to = i * samples + row
+                save_columns(q_flat, 4 * to, 4 * samples, q)
+                save_columns(L_flat, 3 * to, 3 * samples, (J * w0, J * w1, L2))
+        save_rows(flat, i + CONSTANTS * n, n, q + gamma + (w0, w1, L2))

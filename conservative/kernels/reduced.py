@@ -16,6 +16,10 @@ the first guess and its tangent need no L, so that a processor works on them whi
 
 The equation has several solutions at large steps. The step is the one on the continuous branch a(h) from a(0) = 0. Newton's
 answer is trusted where its few corrections stay near the first guess; where they do not, `continue_branch` follows the branch.
+
+Many bodies take the same steps in the same arithmetic: each is a lane with a field and moments of its own (`march_lanes`). A
+lane whose solution is not trusted is solved for alone. A lane without a solution on the continuous branch stops, and its body
+is run again alone. Neither changes a bit of its neighbours' results.
 """
 
 from __future__ import annotations
@@ -23,11 +27,29 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
 from .fields import body_torque, finite_torque
+from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
-from .vector import accumulate, add, apply, choose, cross, dot, every, fuse, inverse, invert, scale, subtract, times, turn
+from .vector import (
+    accumulate,
+    add,
+    apply,
+    choose,
+    cross,
+    dot,
+    every,
+    fill_like,
+    fuse,
+    inverse,
+    invert,
+    scale,
+    subtract,
+    times,
+    turn,
+)
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
@@ -46,6 +68,11 @@ FIRST_PART, SHORTEST_PART = 0.25, 2.0**-14
 """`continue_branch` takes h in parts: the first one, relative to h, and the length below which the branch counts as ended."""
 SMOOTH = 0.04
 """Guesses are extrapolated while |change of a|^2 <= SMOOTH |a|^2 from step to step."""
+ROWS = 33
+"""Numbers of a body's state: q (4), L (3), what their sums lost (4, 3), how many solutions fit on each other, and the last six
+of them (18), newest first."""
+PAST, ROOM = 5, 30
+"""Solutions that are kept in a ring, from the second newest on, and its rows: all of them are there twice."""
 
 
 class Model(NamedTuple):
@@ -328,7 +355,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
 
 @small
 def no_history():
-    """How many of the last solutions are known, none, and the last six, newest first.
+    """Return the number of known last solutions, 0, and places for the last six, newest first.
 
     With one stage a step they are equally spaced in time, and their extrapolation beats the explicit guess.
     """
@@ -338,7 +365,7 @@ def no_history():
 
 @small
 def add_momentum(L, carry, gain):
-    """L + gain as a compensated sum."""
+    """Return L + gain as a compensated sum."""
     x, cx = accumulate(L[0], carry[0], gain[0])
     y, cy = accumulate(L[1], carry[1], gain[1])
     z, cz = accumulate(L[2], carry[2], gain[2])
@@ -347,11 +374,11 @@ def add_momentum(L, carry, gain):
 
 @small
 def turn_attitude(a, q, carry):
-    """q1 = q0 (1, a) / sqrt(1 + a.a) as a compensated increment.
+    """Return q1 = q0 (1, a) / sqrt(1 + a.a) as a compensated sum.
 
-    With 1 / sqrt(1 + a.a) = 1 + c it is p + c (q0 + p), p = q0 (0, a): what is rounded in c counts a.a times less than in p.
+    With 1 / sqrt(1 + a.a) = 1 + c the increment is p + c (q0 + p), p = q0 (0, a). Rounding of c has a.a times the effect of rounding of p.
     """
-    square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # which product is rounded is said, for the same bits in lanes
+    square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # explicit, for the same bits in lanes
     root = math.sqrt(1.0 + square)
     c = -square / (root * (1.0 + root))
     p = turn(q, a)
@@ -360,3 +387,110 @@ def turn_attitude(a, q, carry):
     y, cy = accumulate(q[2], carry[2], p[2] + c * (q[2] + p[2]))
     z, cz = accumulate(q[3], carry[3], p[3] + c * (q[3] + p[3]))
     return (w, x, y, z), (cw, cx, cy, cz)
+
+
+@small
+def load_past(ring, place, newest):
+    """Return the last six solutions, newest first: `newest`, and five from a place of the ring."""
+    past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
+    return newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]
+
+
+@small
+def push(ring, place, a):
+    """Store a as the newest solution and return its place. Two copies make five successive solutions contiguous at any place."""
+    place = place - 1 if place > 0 else PAST - 1
+    save_rows(ring, 3 * place * WIDTH, WIDTH, a)
+    save_rows(ring, 3 * (place + PAST) * WIDTH, WIDTH, a)
+    return place
+
+
+@small
+def pick(v, i):
+    """Return the vector of one body."""
+    return lane_of(v[0], i), lane_of(v[1], i), lane_of(v[2], i)
+
+
+@small
+def put(v, i, x):
+    """Return the vectors with the vector of one body replaced."""
+    return with_lane(v[0], i, x[0]), with_lane(v[1], i, x[1]), with_lane(v[2], i, x[2])
+
+
+@kernel
+def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted, finished, first):
+    """Solve for the lanes that are not trusted, one by one; return solutions, gains, and momenta of all with what they lost.
+
+    A body without a solution is brought to rest, where it needs no further work, and noted in `finished`.
+    """
+    alone = choose(trusted, fill_like(0.0, a[0]), fill_like(1.0, a[0]))
+    rest = (0.0, 0.0, 0.0)
+    for i in range(WIDTH):
+        if lane_of(alone, i) == 1.0:
+            own_field = None if field is None else UniformField(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
+            own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
+            own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
+            found, own_gain, _, _, exists = continue_branch(h, own[0], own[1], own[2], own[3], own[4], own[5], tolerance)
+            if not exists:
+                finished[first + i] = False
+                found, own_gain, L, carry = rest, rest, put(L, i, rest), put(carry, i, rest)
+            a, gain = put(a, i, found), put(gain, i, own_gain)
+    return a, gain, L, carry
+
+
+@entry
+def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n_steps, every_step, q_out, L_out, finished):
+    """Take the steps after `done` up to `last` of n_steps: of all bodies, WIDTH at a time.
+
+    lengths (stages,) are those of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses, moment (3, n)
+    that of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is worked in. Samples go to q_out (n, samples,
+    4) and L_out (n, samples, 3), and `finished` (n,) is made False where a body has no solution.
+    """
+    n, stages = moments.shape[1], len(lengths)
+    tolerance = tolerance ** (2.0 / 3.0)
+    all_moments, all_states = moments.reshape(-1), states.reshape(-1)
+    ring, q_flat, L_flat, samples = room.reshape(-1), q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
+    for i in range(0, n, WIDTH):
+        J_and_inverse = load_rows(all_moments, i, n, 6, WIDTH)
+        J, J_inverse = J_and_inverse[:3], J_and_inverse[3:]
+        if moment is None:
+            field = None
+        else:
+            x, y, z = load_rows(moment.reshape(-1), i, n, 3, WIDTH)
+            field = UniformField(x, y, z)
+        state = load_rows(all_states, i, n, 18, WIDTH)
+        q, L, q_carry, L_carry, known, newest = state[:4], state[4:7], state[7:11], state[11:14], state[14], state[15:]
+        older = load_rows(all_states, i + 18 * n, n, 15, WIDTH)
+        save_rows(ring, 0, WIDTH, older)
+        save_rows(ring, 15 * WIDTH, WIDTH, older)
+        zero = fill_like(0.0, known)
+        place, row, until_sample = 0, done // every_step, every_step - done % every_step
+        for step in range(done + 1, last + 1):
+            for stage in range(stages):
+                h = lengths[stage]
+                enough = known >= 6.0
+                a = guess_ahead(load_past(ring, place, newest))
+                if not every(enough):
+                    a = choose(enough, a, explicit_guess(h, J_inverse, field, q, L))
+                a, gain, _, _, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
+                if not every(trusted):
+                    a, gain, L, L_carry = solve_alone(
+                        h, J, J_inverse, field, q, L, L_carry, tolerance, a, gain, trusted, finished, i
+                    )
+                    known = choose(trusted, known, zero)
+                if stages == 1:
+                    change = subtract(a, newest)
+                    place = push(ring, place, newest)
+                    newest = a
+                    known = choose(dot(change, change) <= SMOOTH * dot(a, a), known + 1.0, zero)
+                L, L_carry = add_momentum(L, L_carry, gain)
+                q, q_carry = turn_attitude(a, q, q_carry)
+            until_sample -= 1
+            if until_sample == 0 or step == n_steps:
+                until_sample = every_step
+                row += 1
+                to = i * samples + row
+                save_columns(q_flat, 4 * to, 4 * samples, q)
+                save_columns(L_flat, 3 * to, 3 * samples, L)
+        save_rows(all_states, i, n, q + L + q_carry + L_carry + (known,) + newest)
+        save_rows(all_states, i + 18 * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH))

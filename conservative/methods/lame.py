@@ -174,8 +174,8 @@ class Tops:
 
 
 def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
-    """Return the run of many tops with `conservative.kernels.lame_many`; None if no body has a step of this kind."""
-    kernel, n, time = kernels("lame_many"), len(bodies), find_unit_of_time(grid)
+    """Return the run of many tops with `march_lanes` of `conservative.kernels.lame`; None if no body has a step of this kind."""
+    kernel, n, time = kernels("lame"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
     if tops is not None:
         with np.errstate(all="ignore"):  # the comparison below excludes tops whose numbers overflow
@@ -184,7 +184,7 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     if tops is None or not len(tops.places):
         return None
     table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
-    kernel.prepare(tops.J1, tops.kappa, tops.q, tops.L, h, table)
+    kernel.prepare_lanes(tops.J1, tops.kappa, tops.q, tops.L, h, table)
     # Tops with equal numbers of parts per step are neighbours, so that few lanes wait.
     order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
     tops, table[:, : len(order)] = tops[order], table[:, order]
@@ -196,7 +196,7 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
 
     `table` (32, m) is the kernel's prepared table, dimensionless.
     """
-    kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
+    kernel, s, m, k, time = kernels("lame"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L
     turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
@@ -204,7 +204,9 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
 
     def run() -> Block:
         states = table.copy()
-        take_pieces(grid.n_steps, cost, lambda done, last: kernel.march(states, done, last, grid.n_steps, grid.every, q, L))
+        take_pieces(
+            grid.n_steps, cost, lambda done, last: kernel.march_lanes(states, done, last, grid.n_steps, grid.every, q, L)
+        )
         return turn_samples(grid, q, L, turn, tops.places, n)
 
     return run

@@ -129,15 +129,15 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, Princ
 
 
 def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | None:
-    """Return the run of many bodies with `conservative.kernels.moser_veselov_many`."""
-    kernel, n, s = kernels("moser_veselov_many"), len(bodies), grid.n_samples
+    """Return the run of many bodies with `march_lanes` of `conservative.kernels.moser_veselov`."""
+    kernel, n, s = kernels("moser_veselov"), len(bodies), grid.n_samples
     time = find_unit_of_time(grid)
     longest = LONGEST_EXACT if method.order is None else LONGEST
     limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
     columns = -(-n // kernel.WIDTH) * kernel.WIDTH
     table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
     try:
-        kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
+        kernel.prepare_lanes(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
     except (ArithmeticError, ValueError):  # without compilation only; compiled code returns nan for a body without a step
         return None
     finished = table[kernel.FINISHED, :n] == 1
@@ -146,7 +146,7 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
         states, R_WB, w_WB_B = start.copy(), np.empty((columns, s, 3, 3)), np.empty((columns, s, 3))
 
         def take(done: int, last: int) -> None:
-            kernel.march(table, states, done, last, grid.n_steps, grid.every, R_WB, w_WB_B)
+            kernel.march_lanes(table, states, done, last, grid.n_steps, grid.every, R_WB, w_WB_B)
 
         take_pieces(grid.n_steps, n * (BODY_STEP + BODY_SAMPLE / grid.every), take)
         return Block(R_WB[:n], w_WB_B[:n], finished)

@@ -144,8 +144,8 @@ BODY_STEP = 2e-8
 
 
 def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
-    """Return the run of many bodies with `conservative.kernels.reduced_many`."""
-    kernel, n, s = kernels("reduced_many"), len(bodies), grid.n_samples
+    """Return the run of many bodies with `march_lanes` of `conservative.kernels.reduced`."""
+    kernel, n, s = kernels("reduced"), len(bodies), grid.n_samples
     moments, R_BP = bodies.principal
     time, units = find_unit_of_time(grid), find_units_of_moments(moments)[:, None]
     lengths, tol = find_coefficients(method.order, method.composition, method.tol, grid.dt / time)
@@ -161,7 +161,7 @@ def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
         states, finished = starts.copy(), np.ones(columns.shape[1], dtype=bool)
 
         def take(done: int, last: int) -> None:
-            kernel.march(lengths, tol, columns, field, states, room, done, last, grid.n_steps, grid.every, q, L, finished)
+            kernel.march_lanes(lengths, tol, columns, field, states, room, done, last, grid.n_steps, grid.every, q, L, finished)
 
         take_pieces(grid.n_steps, BODY_STEP * len(lengths) * n, take)
         return replace(turn_samples(grid, q, L, (1 / J / time, None, R_BP), np.arange(n), n), finished=finished[:n])
