@@ -24,7 +24,7 @@ from numba import config, njit
 from ..files import write_text
 
 COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
-"""Whether kernels are machine code; else they are plain Python."""
+"""True if kernels are machine code, False if they are plain Python."""
 
 
 def _can_cache() -> bool:
@@ -39,7 +39,7 @@ def _can_cache() -> bool:
 
 
 CACHED = COMPILED and _can_cache()
-"""Whether compiled code is kept for the next process."""
+"""True if compiled code is stored for the next process."""
 
 entry: Any = partial(njit, cache=CACHED, error_model="numpy", nogil=True)
 """Compile a function that Python calls and that runs long: without the interpreter's lock, so that other threads go on."""

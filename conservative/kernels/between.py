@@ -38,7 +38,7 @@ def cross_gap(n, gap, t, J_inverse, field, table, q, L, room):
 
 @kernel
 def difference(q0, L0, q1, L1, size):
-    """The largest difference of two states, momenta relative to `size`; not a number where one is none."""
+    """Return the largest difference of two states, momenta relative to `size`; nan if a value is nan."""
     found = 0.0
     for i in range(4):
         found += abs(q1[i] - q0[i])

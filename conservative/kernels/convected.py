@@ -20,7 +20,7 @@ from .fields import finite_derivative
 
 @kernel
 def skew(a):
-    """hat(a), (3, 3)"""
+    """Return hat(a), (3, 3)."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
@@ -62,13 +62,13 @@ def times_identity(small):
 
 @kernel
 def H(nu):
-    """The matrix with G(q)' nu = H(nu) q, (9, 9), skew."""
+    """Return the skew matrix with G(q)' nu = H(nu) q, (9, 9)."""
     return times_identity(skew(nu))
 
 
 @kernel
 def S(kappa):
-    """The matrix with C(q)' kappa = S(kappa) q, (9, 9), symmetric."""
+    """Return the symmetric matrix with C(q)' kappa = S(kappa) q, (9, 9)."""
     k = kappa
     return times_identity(np.array([[k[0], k[5], k[4]], [k[5], k[1], k[3]], [k[4], k[3], k[2]]]))
 
@@ -111,7 +111,7 @@ def apply(A, x):
 
 @kernel
 def invert(A):
-    """The inverse of a positive definite matrix, for which elimination needs no pivots; not finite if it is singular."""
+    """Return the inverse of a positive definite matrix. Elimination needs no pivots. Not finite if singular."""
     n = len(A)
     left, out = A.copy(), np.eye(n)
     for k in range(n):

@@ -14,7 +14,7 @@ from .lanes import WIDTH, load, save
 from .vector import choose, fill_like, fuse, some
 
 ROUND = 6755399441055744.0
-"""1.5 2^52: added and taken away again, it rounds to the nearest integer."""
+"""1.5 2^52: adding and subtracting it rounds to the nearest integer."""
 PI_1, PI_2, PI_3 = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
 """pi / 2 in three parts."""
 SINE = (
@@ -36,7 +36,7 @@ COSINE = (
 """Polynomials in x^2, |x| <= pi / 4, of the highest power first (fdlibm, Sun Microsystems 1993)."""
 LEVELS = 16
 TINIEST = 1e-60
-"""mc below this is as good as 0: what it changes is far below the round-off of a float."""
+"""Smaller values of mc count as 0: their effect is far below round-off."""
 
 
 @kernel
@@ -50,7 +50,7 @@ def polynomial(z, terms):
 
 @kernel
 def sine_and_cosine(x):
-    """sin x and cos x, |x| below 1e5 or so, with errors of about one unit in the last place."""
+    """Return sin x and cos x for |x| below about 1e5, with errors of about one unit in the last place."""
     n = (x * (2.0 / math.pi) + ROUND) - ROUND
     r = fuse(-n, PI_3, fuse(-n, PI_2, fuse(-n, PI_1, x)))
     z = r * r
@@ -90,7 +90,7 @@ def find_means(mc):
 
 @kernel
 def jacobi(u, found):
-    """sn, cn, dn of u, given what `find_means` found (Bulirsch 1965, sncndn): no 1 - m is ever formed."""
+    """Return sn, cn, dn of u from the result of `find_means` (Bulirsch 1965, sncndn), without computing 1 - m."""
     means, levels, last, limit = found
     sine, cosine = sine_and_cosine(limit * u)
     at_rest = sine == 0.0

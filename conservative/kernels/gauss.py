@@ -126,13 +126,13 @@ def combine(M, s, width, i, F, at):
 
 @small
 def shift(u, h, d):
-    """u + h d, of three floats u and three Fours d."""
+    """Return u + h d for three floats u and three fours d."""
     return (fuse(h, d[0], splat(u[0])), fuse(h, d[1], splat(u[1])), fuse(h, d[2], splat(u[2])))
 
 
 @small
 def add_squares(a, b, total):
-    """total + |a - b|^2, of three Fours."""
+    """Return total + |a - b|^2 for three fours."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return fuse(x, x, fuse(y, y, fuse(z, z, total)))
 
@@ -265,13 +265,13 @@ def weigh(b, b_low, F, at):
 
 @small
 def add_weighted(b, x, total):
-    """total + b x, of three Fours."""
+    """Return total + b x for three fours."""
     return (fuse(b, x[0], total[0]), fuse(b, x[1], total[1]), fuse(b, x[2], total[2]))
 
 
 @small
 def add_carried(v, carry, d):
-    """v + d as a compensated sum of vectors."""
+    """Return v + d as a compensated sum of vectors."""
     x, cx = accumulate(v[0], carry[0], d[0])
     y, cy = accumulate(v[1], carry[1], d[1])
     z, cz = accumulate(v[2], carry[2], d[2])

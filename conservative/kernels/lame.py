@@ -86,7 +86,7 @@ def scale_of(g2, g3, B):
 
 @kernel
 def series(g2, g3, B, t):
-    """p, p' and for each of three B the regular solution f of f'' = (2 p + B) f and f', at a short time t (twofold)."""
+    """Return p, p' and, for each of three B, the regular solution f of f'' = (2 p + B) f and f' at a short time t (twofold)."""
     c = np.zeros((TERMS, 2))
     T = times(t, t)
     c[2, 0], c[2, 1] = over(g2, two(20.0))
@@ -123,7 +123,7 @@ def series(g2, g3, B, t):
 
 @kernel
 def constants(g2, g3, B, h):
-    """p(h), p'(h) and (f, f') for each B, as floats: the series at h / 2^m, doubled m times by the addition theorems."""
+    """Return p(h), p'(h) and (f, f') for each B as floats: the series at h / 2^m, doubled m times by addition theorems."""
     halvings = 0
     size = scale_of(g2, g3, B)
     while h * size > SERIES_RADIUS * 2.0**halvings:
@@ -150,7 +150,7 @@ def constants(g2, g3, B, h):
 
 @kernel
 def split_step(g2, g3, B, h):
-    """How many equal parts to take a step in, and the constants of a part.
+    """Return the number of equal parts of a step, and the constants of a part.
 
     Multiples of the period of nutation are poles of p, where the formulas cancel, and beyond about half of it the map amplifies
     what leaves the motion that its constants belong to. p(h) h^2 grows from 1 at h = 0 to about 2 there; unstable runs were
@@ -186,7 +186,7 @@ def turn(a, b, gamma, w):
 
 @small
 def unit_vertical(q):
-    """The last row of the matrix of a unit quaternion."""
+    """Return the last row of the matrix of a unit quaternion."""
     return (
         2.0 * (q[1] * q[3] - q[0] * q[2]),
         2.0 * (q[2] * q[3] + q[0] * q[1]),
@@ -248,7 +248,7 @@ class Part(NamedTuple):
 
 @kernel
 def divide_step(model, h):
-    """How many equal parts a step is taken in (`split_step`), and the constants of one."""
+    """Return the number of equal parts of a step (`split_step`), and the constants of a part."""
     J, kappa, q, L = model
     E, z, spin, nu, x0, g2, g3, B = curve(J, kappa, unit_vertical(q), L)
     parts, p_h, dp_h, f = split_step(g2, g3, B, h)

@@ -50,7 +50,7 @@ SLOWEST = 1e-60
 
 
 class Polhode(NamedTuple):
-    """Where L moves: moments in this module's axes, amplitudes, momentum, energy, parameter, frequency, s, c, d at t = 0."""
+    """The curve of L: moments in this module's axes, amplitudes, momentum, energy, parameter, frequency, s, c, d at t = 0."""
 
     J1: Any
     J2: Any
@@ -69,7 +69,7 @@ class Polhode(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What one step does: half its shift (S, C, D) and its quaternion (r0, r1, r2, r3); r0 is nan where there is none."""
+    """One step: half its shift (S, C, D) and its quaternion (r0, r1, r2, r3); r0 is nan if there is no step."""
 
     S: Any
     C: Any
@@ -81,7 +81,7 @@ class Step(NamedTuple):
 
 
 class Model(NamedTuple):
-    """Where L moves, the values of a `Polhode`, and the attitude at the start, both in this module's axes."""
+    """The values of a `Polhode` and the initial attitude, both in this module's axes."""
 
     polhode: Any
     q: Any
@@ -92,7 +92,7 @@ Coefficients = Step
 
 
 class Shift(NamedTuple):
-    """What all steps of a run have in common.
+    """Constants of all steps of a run.
 
     Of a whole shift cn, sn, cn dn, sn dn and m sn^2; m and mc; factors of a step's quaternion, y0 to y3; amplitudes of L/l.
     """
@@ -115,7 +115,7 @@ class Shift(NamedTuple):
 
 
 class State(NamedTuple):
-    """s, c, d and the complex number z of the attitude."""
+    """The state: s, c, d and the complex number z of the attitude."""
 
     s: Any
     c: Any
@@ -156,7 +156,7 @@ def polhode(J1, J2, J3, L1, L2, L3):
 
 @kernel
 def intermediate(p, C, D, r1, r3):
-    """r2: the factors r1/C, r2/(C D), r3/D, each over its amplitude, are affine in 1/J, as K = css/J + cdd is."""
+    """Return r2. The factors r1/C, r2/(C D), r3/D, divided by their amplitudes, are affine in 1/J, as K = css/J + cdd is."""
     same = p.J3 == p.J2
     one = fill_like(1.0, p.l)
     gap = choose(same, one, p.J2 * (p.J3 - p.J1))
@@ -168,7 +168,7 @@ def intermediate(p, C, D, r1, r3):
 
 @brief
 def exact_step(p, h):
-    """The step without truncation error, calibrated on the one that is symmetric about s = 0.
+    """Return the step without truncation error, calibrated on the one that is symmetric about s = 0.
 
     About its momentum the body turns by 2 f, f = int_0^(h/2) (2 E/l + w3) / (1 + L3/l) dt, which no motion makes singular. With
     (x, y, z) = (A1 C, A2 S, A3 D)/l the ends of the step are (x, -y, z) and (x, y, z), and its quaternion follows.
@@ -273,7 +273,7 @@ def calibration_series(p, tau):
 
 @brief
 def preprocessed_step(p, h, order):
-    """The DMV step of an even order, its inertia from the first order/2 terms of the exact one (Hairer & Vilmart 2006).
+    """Return the DMV step of an even order with the first order/2 terms of the exact inertia (Hairer & Vilmart 2006).
 
     On the step that is symmetric about s = 0: c_i = K_i (h/2) A_i (C, D) g with g = 1 + |c|^2, and S = nu (h/2) css g C D.
     """
@@ -307,7 +307,7 @@ def preprocessed_step(p, h, order):
 
 @brief
 def normalise(step):
-    """The same step with r0^2 + r1^2 + r3^2 = 1, so that products of many steps stay in range."""
+    """Return the same step with r0^2 + r1^2 + r3^2 = 1, so that products of many steps stay in range."""
     size = math.sqrt(step.r0 * step.r0 + step.r1 * step.r1 + step.r3 * step.r3)
     return Step(step.S, step.C, step.D, step.r0 / size, step.r1 / size, step.r2 / size, step.r3 / size)
 
@@ -323,7 +323,7 @@ def directions(p):
 
 @kernel
 def whole_shift(p, step):
-    """What all steps have in common: one whole shift, by the addition theorem from two halves.
+    """Return the constants of all steps: one whole shift, by the addition theorem from two halves.
 
     1 / (1 - m S^2 s_mid^2) = (1 + m S^2 s0 s1) / (1 - m S^4), and s0 + s1 = 2 s_mid C D / (1 - m S^2 s_mid^2), and so on.
     """
@@ -338,7 +338,7 @@ def whole_shift(p, step):
 
 @kernel
 def start(k, p, q):
-    """The state at the start, and the turn in front of `own_quaternion` that makes q its attitude."""
+    """Return the initial state, and the rotation that multiplies `own_quaternion` to give the attitude q."""
     one, zero = fill_like(1.0, p.l), fill_like(0.0, p.l)
     x, y, up = k.a1 * p.c, k.a2 * p.s, 1.0 + k.a3 * p.d
     n = 1.0 / (x * x + y * y + up * up)
@@ -367,14 +367,14 @@ def advance(k, at):
 
 @small
 def rescale(at):
-    """The same attitude with |z| = 1."""
+    """Return the same attitude with |z| = 1."""
     n = 1.0 / math.sqrt(fuse(at.z_re, at.z_re, at.z_im * at.z_im))
     return State(at.s, at.c, at.d, at.z_re * n, at.z_im * n)
 
 
 @small
 def take_steps(k, at, done, last):
-    """The state after `last` steps, given that after `done`."""
+    """Return the state after `last` steps from the state after `done` steps."""
     while done < last:
         end = min(last, done - done % RESCALE + RESCALE)
         for _ in range(end - done):
@@ -387,7 +387,7 @@ def take_steps(k, at, done, last):
 
 @small
 def own_quaternion(k, at):
-    """The attitude against axes along the momentum, of any length."""
+    """Return the quaternion, of any length, of the attitude relative to axes along the momentum."""
     x, y, up = k.a1 * at.c, k.a2 * at.s, 1.0 + k.a3 * at.d
     return (
         at.z_re * up,
@@ -463,13 +463,13 @@ def sort(a, b, parity):
 
 @kernel
 def turn_over(sign, a):
-    """The axis times 1.0 or -1.0."""
+    """Return the axis times 1.0 or -1.0."""
     return (a[0], sign * a[1], sign * a[2], sign * a[3], sign * a[4])
 
 
 @kernel
 def polhode_axes(a, b, c):
-    """The axes of the polhode out of principal ones, as `conservative.methods.moser_veselov.polhode_axes` finds them.
+    """Return the polhode's axes from principal axes, as `conservative.methods.moser_veselov.polhode_axes` does.
 
     An axis is its moment, the momentum along it, and its direction.
     """
@@ -487,7 +487,7 @@ def polhode_axes(a, b, c):
 
 @kernel
 def quaternion(x, y, z):
-    """The unit quaternion of the matrix with these columns: of four ways to read it off the one with the largest component."""
+    """Return the unit quaternion of the matrix with these columns, computed from its largest component."""
     wx, wy, wz = y[2] - z[1], z[0] - x[2], x[1] - y[0]
     xy, xz, yz = x[1] + y[0], x[2] + z[0], y[2] + z[1]
     largest, q1, q2, q3 = 1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]
@@ -501,7 +501,7 @@ def quaternion(x, y, z):
 
 @kernel
 def turn(R, a):
-    """The direction of an axis, turned by the matrix with rows R."""
+    """Return the direction of an axis, rotated by the matrix with rows R."""
     return (
         R[0] * a[2] + R[1] * a[3] + R[2] * a[4],
         R[3] * a[2] + R[4] * a[3] + R[5] * a[4],
@@ -524,7 +524,7 @@ def step_of_order(p, h, order, room):
 
 @kernel
 def has_step(p, step, h, w, longest, longest_shift, smallest_cn):
-    """Whether there is a step h, below the limits, with which no square leaves the range of floats."""
+    """Return whether there is a step h below the limits whose squares stay in the range of floats."""
     angle = math.sqrt(dot(w, w)) * h
     known = (angle == 0.0) | ((angle > SLOWEST) & (angle < longest))
     return known & (abs(p.nu) * h < longest_shift) & (smallest_cn < step.C) & (step.r0 - step.r0 == 0.0)

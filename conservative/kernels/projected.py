@@ -100,7 +100,7 @@ def combine(q, L, weights, columns, first, last, slopes):
 
 @small
 def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slopes):
-    """The state after a step from t, s. Of stage i, weights and columns begin at starts[i]; those of the step come last."""
+    """Return the state after a step from t, s. Stage i begins at starts[i] in weights and columns; the step is last."""
     q0, L0 = join(q[0], q[1], q[2], q[3]), join(L[0], L[1], L[2], 0.0)
     stages = len(starts) - 2
     for stage in range(stages):
@@ -118,7 +118,7 @@ def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slo
 
 @small
 def near_unit(q):
-    """q times 3/2 - |q|^2/2, all but 1/|q| where |q| is near 1. Its length carries no information, but must not wander off."""
+    """Return q (3 - |q|^2)/2, nearly q/|q| if |q| is near 1. The length has no meaning, but must not drift."""
     n = 1.5 - 0.5 * ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
     return (n * q[0], n * q[1], n * q[2], n * q[3])
 

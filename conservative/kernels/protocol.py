@@ -1,4 +1,4 @@
-"""What every kernel that takes steps is given and what it returns.
+"""Arguments and results of every kernel that takes steps.
 
     march(model, coefficients, workspace) -> Result
 
@@ -37,7 +37,7 @@ class Workspace(NamedTuple):
 
 
 class Result(NamedTuple):
-    """How far the steps got.
+    """Progress of the steps.
 
     `done` steps were taken, made of `stages` stages with `corrections` corrections (sweeps, projections) and `evaluations` of
     the torque, which is None where they are not counted. `size` is the relative size of the last correction or, where done <
@@ -68,5 +68,5 @@ def record(row, q, L, q_out, L_out):
 
 @small
 def loosen(result):
-    """The plain tuple of a result: all its fields, in their order."""
+    """Return the fields of a result as a plain tuple."""
     return result[:]

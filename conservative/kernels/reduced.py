@@ -6,16 +6,16 @@ The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principa
     q1 = q0 (1, a) / sqrt(1 + a.a)
     L1 = Cay(2a)' (L0 + h T) = 2 J w* - L0
 
-Round-off in L1 that has a mean shows as a drift after 10^6 steps, and it has one, 10^-20 of the energy a step, where L1 - L0 is
-formed from an a that is already rounded and from constants that are not those of the equation solved, as 4/h once it is
-rounded. So `final_correction` solves the equation for w* itself, whose residual has the size of L1 - L0 and not that of L, and
-L1 follows from its other side. The round-off that remains has no mean: errors grow as the square root of the number of steps.
+Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
+constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
+residual has the size of L1 - L0 instead of L. L1 follows from its other side. The remaining round-off has no mean, so errors
+grow with the square root of the number of steps.
 
-Arithmetic is a chain of dependent operations here, so what counts is the length of that chain and not the number of operations:
-the first guess and its tangent need no L, so that a processor works on them while it still waits for the last step's L.
+The arithmetic is a chain of dependent operations, so its length counts, not their number. The first guess and its
+tangent do not need L: the processor works on them while it waits for the L of the last step.
 
-The equation has several solutions at large steps. The step is the one on the continuous branch a(h) from a(0) = 0. Newton's
-answer is trusted where its few corrections stay near the first guess; where they do not, `continue_branch` follows the branch.
+The equation has several solutions at large steps. The step is the solution on the continuous branch a(h) from a(0) = 0.
+Newton's result is trusted if its few corrections stay near the first guess. Otherwise `continue_branch` follows the branch.
 
 Many bodies take the same steps in the same arithmetic: each is a lane with a field and moments of its own (`march_lanes`). A
 lane whose solution is not trusted is solved for alone. A lane without a solution on the continuous branch stops, and its body
@@ -94,7 +94,7 @@ class Coefficients(NamedTuple):
 
 @small
 def explicit_guess(h, J_inverse, field, q, L):
-    """a of an explicit half step of Euler's equations: third order in h."""
+    """Return a of an explicit half step of Euler's equations: third order in h."""
     rate = cross(L, times(J_inverse, L))
     if field is not None:
         rate = add(rate, body_torque(field, q))
@@ -103,7 +103,7 @@ def explicit_guess(h, J_inverse, field, q, L):
 
 @small
 def guess_ahead(past):
-    """The next a by the polynomial of degree 5 through the last six, newest first."""
+    """Return the next a from the polynomial of degree 5 through the last six, newest first."""
     return extrapolate(0, past), extrapolate(1, past), extrapolate(2, past)
 
 
@@ -117,7 +117,7 @@ def extrapolate(k, past):
 
 @small
 def gaps(J):
-    """What a x (J a) is made of: (J3 - J2) a2 a3, and so on."""
+    """Return the factors of a x (J a) = ((J3 - J2) a2 a3, ...)."""
     return (J[2] - J[1], J[0] - J[2], J[1] - J[0])
 
 
@@ -134,7 +134,7 @@ def residual(h, J, field, q, L, a):
 
 @small
 def tangent(h, J, field, q, a):
-    """The residual's derivative by a, three columns."""
+    """Return the residual's derivative by a (three columns)."""
     Ja = times(J, a)
     k0 = (J[0], a[2] * J[0] - Ja[2], Ja[1] - a[1] * J[0])
     k1 = (Ja[2] - a[2] * J[1], J[1], a[0] * J[1] - Ja[0])
@@ -185,7 +185,7 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
     one, if s^3 <= the relative error asked for, which is given as the square of s: `tolerance`. Stopping where a residual is
     small enough instead would leave an error of one sign, and the energy would drift.
 
-    Of lanes, each of another body, all go on until the last one is done; one that is done stays as it is, so that its result
+    With lanes, the loop runs until the last body is done; a lane that is done does not change, so that its result
     does not depend on its neighbours. After one correction the answer is as near to the guess as that correction is small.
     """
     rows, over = invert(tangent(h, J, field, q, guess))
@@ -211,7 +211,7 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
 
 @small
 def choose_rows(mask, a, b):
-    """The rows of one matrix or the other, in each lane."""
+    """Return the rows of one matrix or the other for each lane."""
     return choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2])
 
 
@@ -254,7 +254,7 @@ def forcing(h, field, q, L, a):
 
 @kernel
 def find_solution(h, J, J_inverse, field, q, L):
-    """Whether Newton's method from the explicit guess, trusted or not, ends at a solution of the equation."""
+    """Return whether Newton's method from the explicit guess, trusted or not, ends at a solution of the equation."""
     a = explicit_guess(h, J_inverse, field, q, L)
     for _ in range(MAX_ITERATIONS):
         correction = apply(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
@@ -376,7 +376,8 @@ def add_momentum(L, carry, gain):
 def turn_attitude(a, q, carry):
     """Return q1 = q0 (1, a) / sqrt(1 + a.a) as a compensated sum.
 
-    With 1 / sqrt(1 + a.a) = 1 + c the increment is p + c (q0 + p), p = q0 (0, a). Rounding of c has a.a times the effect of rounding of p.
+    With 1 / sqrt(1 + a.a) = 1 + c the increment is p + c (q0 + p), p = q0 (0, a). Rounding
+    of c has a.a times the effect of rounding of p.
     """
     square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # explicit, for the same bits in lanes
     root = math.sqrt(1.0 + square)
@@ -398,7 +399,7 @@ def load_past(ring, place, newest):
 
 @small
 def push(ring, place, a):
-    """Store a as the newest solution and return its place. Two copies make five successive solutions contiguous at any place."""
+    """Store a as the newest solution and return its place. Two copies keep five successive solutions contiguous."""
     place = place - 1 if place > 0 else PAST - 1
     save_rows(ring, 3 * place * WIDTH, WIDTH, a)
     save_rows(ring, 3 * (place + PAST) * WIDTH, WIDTH, a)

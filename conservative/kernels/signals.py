@@ -2,7 +2,7 @@
 
 Kernels run without the interpreter's lock, and Python's handlers of signals wait until the main thread is back in Python. A
 kernel therefore asks for them between two blocks of steps, outside of its innermost loop, whose registers a call would take.
-What a handler raises ends the kernel and comes out of it as it is, as KeyboardInterrupt. The samples of the run are lost.
+An exception of a handler, such as KeyboardInterrupt, ends the kernel and reaches its caller. The samples of the run are lost.
 """
 
 from __future__ import annotations
@@ -46,5 +46,5 @@ def call_handlers():
 
 @kernel
 def end_of_block(done, n_steps, block):
-    """The last step of a block that begins after `done` steps; `block` is the number of its steps, 0 for all of them."""
+    """Return the last step of a block of `block` steps (0: all) that begins after `done` steps."""
     return n_steps if block <= 0 else min(n_steps, done + block)

@@ -370,7 +370,7 @@ class Motion(NamedTuple):
 
 @trace
 def find_sample(bodies, turn, g, a, w):
-    """Return R_WB by rows and w_WB_B; `turn` is cosine and sine of the spin's angle, which the frame excludes."""
+    """Return R_WB by rows and w_WB_B; `turn` is cosine and sine of the angle of the frame's spin."""
     b, (cos, sin), (x, y, z) = cross(g, a), turn, times(bodies.units, w)
     w = cos * x + sin * y, cos * y - sin * x, z
     R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in bodies.axes]

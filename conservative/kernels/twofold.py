@@ -9,7 +9,7 @@ SPLIT = 134217729.0  # 2^27 + 1
 
 @kernel
 def two(x):
-    """The float x."""
+    """Return the float x as a twofold number."""
     return (x, 0.0)
 
 
@@ -21,7 +21,7 @@ def _fast(a, b):
 
 @kernel
 def plus(x, y):
-    """x + y"""
+    """Return x + y."""
     s = x[0] + y[0]
     v = s - x[0]
     return _fast(s, ((x[0] - (s - v)) + (y[0] - v)) + (x[1] + y[1]))
@@ -29,13 +29,13 @@ def plus(x, y):
 
 @kernel
 def minus(x, y):
-    """x - y"""
+    """Return x - y."""
     return plus(x, (-y[0], -y[1]))
 
 
 @kernel
 def times(x, y):
-    """x y"""
+    """Return x y."""
     p = x[0] * y[0]
     t = SPLIT * x[0]
     xh = t - (t - x[0])
@@ -49,13 +49,13 @@ def times(x, y):
 
 @kernel
 def scale(f, x):
-    """f x for a float f."""
+    """Return f x for a float f."""
     return times((f, 0.0), x)
 
 
 @kernel
 def over(x, y):
-    """x / y"""
+    """Return x / y."""
     q = x[0] / y[0]
     r = minus(x, scale(q, y))
     return _fast(q, (r[0] + r[1]) / y[0])

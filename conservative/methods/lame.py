@@ -174,7 +174,7 @@ class Tops:
 
 
 def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
-    """Return the run of many tops with `march_lanes` of `conservative.kernels.lame`; None if no body has a step of this kind."""
+    """Return the run of many tops (`march_lanes` of `conservative.kernels.lame`); None if no body has such a step."""
     kernel, n, time = kernels("lame"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
     if tops is not None:

@@ -1,4 +1,4 @@
-"""What kernels call of a potential that is made of Python functions. Source: our own."""
+"""The object that kernels call for a potential made of Python functions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ N_INPUTS, N_OUTPUTS = 27, 90
 
 
 class Callback:
-    """What kernels call with the kind of evaluation and the address of a buffer (see `conservative.kernels.function_field`).
+    """Called by kernels with the kind of evaluation and the address of a buffer (see `conservative.kernels.function_field`).
 
     Threads may call it at once: each has its own last inputs and outputs.
     """

@@ -175,7 +175,7 @@ class SpringField(SpringNumbers, PointField):
         return over, -self.rest * over, -0.5, 1
 
     def scale(self) -> Any:
-        """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
+        """Return the largest possible V, J: at the largest distance, or at 0 if that is farther from the rest length."""
         return self.stiffness / 2 * np.maximum(lengths(self.b) + lengths(self.A), self.rest) ** 2
 
 

@@ -50,11 +50,11 @@ class Potential(Protocol):
 
 @runtime_checkable
 class PotentialInTime(Protocol):
-    """What a potential offers whose energy depends on the time as well: `Turning`, and functions that say so.
+    """A potential whose energy also depends on time: `Turning`, and functions declared as time-dependent.
 
-    Energy is then not conserved. It has no `energy` and `gradient` of the attitude alone, so that nobody takes it for a field
-    that stays as it is; methods that take it say so (`conservative.Method.time_dependent`). `scale` and `kernel_field` are
-    those of `Potential`. It may have `in_units(energy, time)`, with a unit of time, s, a power of two as well.
+    The energy is then not conserved. There is no `energy` or `gradient` of the attitude only, so it cannot be mistaken for a
+    constant field. Methods that support it have `conservative.Method.time_dependent`. `scale` and `kernel_field` are those of
+    `Potential`. It may have `in_units(energy, time)`, with a unit of time, s, a power of two as well.
     """
 
     @property

@@ -175,5 +175,5 @@ class Turning:
 
 
 def static_part(potential: Any) -> Any:
-    """Return the potential that turns, of a `Turning`, else the potential, or None, as it is."""
+    """Return the potential of a `Turning` in its turning axes, and any other potential, or None, unchanged."""
     return potential.potential if isinstance(potential, Turning) else potential

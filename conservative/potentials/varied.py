@@ -39,7 +39,7 @@ class Varied:
 
 @dataclass(frozen=True, eq=False)
 class OneByOne:
-    """The potentials of n bodies, asked one after another."""
+    """The potentials of n bodies, evaluated one after another."""
 
     potentials: Sequence[Any]
 
