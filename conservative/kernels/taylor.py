@@ -340,9 +340,9 @@ def enter(*loose):
 class Bodies(NamedTuple):
     """Bodies in lanes: the numbers of `Model`, and others for steps and samples.
 
-    `h` is the step size in the units of the body. `axes` are the rows of the rotation from axes D to world axes, `R_BP` those of
-    the rotation from principal to body axes. `units` converts rates of the body's units to rad/s; its third component contains
-    the spin if the body is described in a non-spinning frame.
+    `h` is the step size in the units of the body. `axes` are the rows of the rotation from axes D to world axes, and `R_BP`
+    those of the rotation from principal to body axes. `units` converts rates of the body's units to rad/s; its third component
+    contains the spin if the body is described in a non-spinning frame.
     """
 
     J: Any
