@@ -1,7 +1,6 @@
 """Commands on a full disk end in one line that names the file, and change no file."""
 
 import json
-import re
 
 import pytest
 
@@ -68,7 +67,7 @@ def test_a_command_names_the_file_that_cannot_be_written(command, folder, tmp_pa
     assert all("heyoka" in line or line.startswith("study ") for line in logged)  # it cannot write its cache; progress
     assert error.startswith(f"Error: {words}")
     assert "File too large" in error
-    assert re.search("; expected a (file|folder)", error)
+    assert "; expected a " in error
     assert contents(folder) == before
 
 
