@@ -20,7 +20,7 @@ from conservative.trajectory import Trajectory
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement, Samples
 from ..measures.timing import Preparation, Timing, prepare_and_run
-from .selection import Missing, series, tolerance_setting
+from .selection import Missing, series, series_setting
 
 
 class Drawn(NamedTuple):
@@ -106,7 +106,7 @@ def names_of(method: Method) -> dict[str, str]:
         "version": "" if maker.package == conservative.__name__ else maker.version,
         "setting": method.setting(),
         "series": series(method),
-        "series_setting": method.setting(without=tolerance_setting(method)),
+        "series_setting": series_setting(method),
     }
 
 

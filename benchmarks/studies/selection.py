@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 from conservative import registry
 from conservative.errors import MissingEngine, NotLoadable
@@ -123,15 +123,29 @@ def takes_exact_steps(method: Method) -> bool:
     return method.order is None and tolerance_setting(method) is None
 
 
-def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
+def at_tolerance(method: Method, setting: str, tolerance: float | None) -> Method:
     """Return the method with another tolerance."""
     return replace(method, **{setting: tolerance})
 
 
 def series(method: Method) -> str:
-    """Return the name of a line in a chart: the name of the method without its tolerance."""
+    """Return the name of a line in a chart: the name of the method without its tolerance.
+
+    Without a tolerance, `Taylor` makes the steps of the grid, so its adaptive line is `taylor:tolerance`.
+    """
     setting = tolerance_setting(method)
     if setting is None:
         return method.name
-    default = next(each.default for each in fields(method) if each.name == setting)
-    return at_tolerance(method, setting, default).name if isinstance(default, float) else method.name
+    without = at_tolerance(method, setting, _default(method, setting))
+    return without.name if tolerance_setting(without) else f"{without.family}:{series_setting(method)}"
+
+
+def series_setting(method: Method) -> str:
+    """Return the setting of a line in tables: that of the method without its tolerance (see `series`)."""
+    setting = tolerance_setting(method)
+    text = method.setting(without=setting)
+    return text if setting is None or _default(method, setting) is not None else ",".join(filter(None, (text, setting)))
+
+
+def _default(method: Method, setting: str) -> Any:
+    return next(each.default for each in fields(method) if each.name == setting)

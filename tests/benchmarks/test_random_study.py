@@ -1,5 +1,6 @@
 """The study of random bodies: measured settings, instants of the errors, and timed settings."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,14 +8,18 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between
+from conservative.benchmarks.contest import costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.studies import random, selection, studies
-from conservative.benchmarks.studies.case import Case
+from conservative.benchmarks.studies.case import NOT_DRAWN, Case
 from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, TimedSetting
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.registry import method
+from conservative.reports.rows.names import with_names
+from conservative.reports.rows.points import points as points_of
 from conservative.scenes.random_body import FIELDS, random_body
 
 from .generic_study import SCENE, Broken
@@ -84,6 +89,15 @@ def test_all_settings_are_read_at_the_same_instants():
 def test_ours_with_a_tolerance_are_among_the_settings():
     assert [each.tolerance for each in random.settings(cv.Taylor())] == [None, None, None, 1e-9]
     assert not random.settings(cv.MoserVeselov())
+
+
+def test_tolerances_of_ours_are_credited_and_interpolated_as_one_line():
+    study = replace(random.random_study((cv.Taylor(tolerance=1e-9),), 1, 3, quick=True), scenes=(BODY,), drawn=(NOT_DRAWN,))
+    points = points_of(with_names(frame(studies.findings(study))), "random", untimed=True)
+    assert set(points["name"]) == {"taylor tolerance"}
+    assert len(points) == points["method"].nunique() >= 5  # measured 7; no tolerance is finer than the last decade
+    between = math.sqrt(points["error"][3] * points["error"][4])
+    assert len(costs(points, [between])) == 1  # an error between two settings, of a line and not of each setting
 
 
 def test_both_sides_have_as_many_settings():

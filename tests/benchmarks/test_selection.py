@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 
-from conservative import BadInput, MissingEngine, Reduced, registry
+from conservative import BadInput, MissingEngine, Reduced, Taylor, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
@@ -75,6 +75,7 @@ def test_tolerances_of_a_method_are_one_line():
     assert series(registry.method("scipy:rtol=1e-9")) == series(registry.method("scipy:rtol=1e-5")) == "scipy"
     assert series(registry.method("scipy:RK45,rtol=1e-5")) == "scipy:integrator=RK45"
     assert series(Reduced(tol=1e-9)) == "reduced:tol=1e-09"
+    assert {series(Taylor(tolerance=10.0**-k)) for k in (3, 9)} == {"taylor:tolerance"} != {series(Taylor())}
 
 
 @pytest.mark.parametrize(
@@ -182,6 +183,7 @@ class Adaptive(Method):
         ("convected:tol=1e-12", ("convected", "", "tol=1e-12"), "tol=1e-12"),  # the tolerance of its iteration
         ("exact", ("exact", "", ""), ""),
         ("mujoco:Euler", ("mujoco", "VERSION", "Euler"), "Euler"),
+        ("taylor:tolerance=1e-9", ("taylor", "", "tolerance=1e-09"), "tolerance"),
         ("heyoka:1e-6", ("heyoka", "VERSION", "tol=1e-06,body"), "body"),
         ("scipy:rtol=1e-9", ("scipy", "VERSION", "DOP853,rtol=1e-09"), "DOP853"),
         ("pinocchio:RK4", ("pinocchio", "VERSION", "aba+RK4"), "aba+RK4"),
