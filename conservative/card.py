@@ -57,6 +57,25 @@ class Cost:
         return self.step + self.correction * self.corrections
 
 
+class Structure(NamedTuple):
+    """Geometric properties of a step in a field that does not depend on time. `test_structure.py` measures the first two.
+
+    Attributes
+    ----------
+    symmetric
+        True if a step of -dt from the end of a step returns to its start.
+    symplectic
+        True if the map of (Q, L) is symplectic on T*SO(3). Its reduction to L, or to L and the field's axis, is then Poisson.
+    imposed
+        True if a projection after each step restores the invariants in `Method.conserves`; False if the equations of the step
+        conserve them.
+    """
+
+    symmetric: bool
+    symplectic: bool
+    imposed: bool = False
+
+
 @dataclass(frozen=True)
 class Card:
     """Declaration of a family of methods for reports, the benchmark suite and the automatic choice.
@@ -93,6 +112,8 @@ class Card:
         A name in `conservative.reports.charts.style.PALETTE`, or a colour such as "#0072B2"; None for any free colour.
     kernel
         Module in `conservative.kernels` whose function `enter` makes all steps of a run; "" if there is none.
+    structure
+        Returns the `Structure` of a setting; None if it is unknown.
     time_dependent
         True if potentials that depend on time are supported. If not, `Method.unsupported` reports them.
     """
@@ -111,6 +132,7 @@ class Card:
     cost: Callable[[Any], Cost] = lambda method: Cost(step=340.0)
     colour: str | None = None
     kernel: str = ""
+    structure: Callable[[Any], Structure | None] = lambda method: None
     time_dependent: bool = False
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..attitude import Array
-from ..card import Card
+from ..card import Card, Structure
 from ..check import positive_number
 from ..deferred_imports import kernels
 from ..errors import NotConverged
@@ -46,7 +46,9 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(pictures=("",), colour="sky")
+    card: ClassVar[Card] = Card(
+        pictures=("",), colour="sky", structure=lambda method: Structure(symmetric=True, symplectic=False)
+    )
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)

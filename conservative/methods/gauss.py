@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, triple
-from ..card import Card, Cost
+from ..card import Card, Cost, Structure
 from ..check import choice, describe, positive_integer
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -71,6 +71,7 @@ class Gauss(Method):
         cost=lambda method: Cost(step=90.0, correction=6.5 * method.stages, corrections=12.0),
         colour="indigo",
         kernel="gauss",
+        structure=lambda method: Structure(symmetric=True, symplectic=False),
     )
 
     def __post_init__(self) -> None:

@@ -38,7 +38,7 @@ import numpy as np
 
 from ..attitude import Array, to_quaternion
 from ..batch import Batch
-from ..card import Card
+from ..card import Card, Structure
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
@@ -72,7 +72,14 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(many=("",), rank=1, exact=True, colour="olive", kernel="lame")
+    card: ClassVar[Card] = Card(
+        many=("",),
+        rank=1,
+        exact=True,
+        colour="olive",
+        kernel="lame",
+        structure=lambda method: Structure(symmetric=True, symplectic=True),  # the exact flow
+    )
 
     @property
     def order(self) -> None:

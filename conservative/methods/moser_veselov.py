@@ -10,7 +10,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..batch import Batch
-from ..card import Card
+from ..card import Card, Structure
 from ..check import choice, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -77,6 +77,7 @@ class MoserVeselov(Method):
         candidates=("order=exact",),
         colour="wine",
         kernel="moser_veselov",
+        structure=lambda method: Structure(symmetric=True, symplectic=method.order in (None, 2)),  # see DERIVATION.md, 8
     )
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Triple, triple
-from ..card import Card, Cost
+from ..card import Card, Cost, Structure
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL
@@ -47,6 +47,7 @@ class Projected(Method):
         cost=lambda method: Cost(step=340.0, correction=80.0),
         colour="teal",
         kernel="projected",
+        structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
         time_dependent=True,
     )
 

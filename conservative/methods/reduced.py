@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..batch import Batch
-from ..card import Card, Cost
+from ..card import Card, Cost, Structure
 from ..check import choice, positive_number
 from ..deferred_imports import kernels
 from ..grid import Grid
@@ -92,6 +92,7 @@ class Reduced(Method):
         cost=lambda method: Cost(step=10.0, correction=50.0, corrections=method.stages),
         colour="blue",
         kernel="reduced",
+        structure=lambda method: Structure(symmetric=True, symplectic=False),
     )
 
     def __post_init__(self) -> None:

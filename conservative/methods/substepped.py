@@ -41,7 +41,11 @@ class Substepped(Method):
 
     family: ClassVar[str] = "substepped"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(report=(), time_dependent=True)  # `unsupported` asks the other method
+    card: ClassVar[Card] = Card(
+        report=(),
+        structure=lambda method: method.inner.card.structure(method.inner),
+        time_dependent=True,  # `unsupported` asks the other method
+    )
 
     def __post_init__(self) -> None:
         positive_integer("most", self.most)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion, triple
 from ..batch import Batch
-from ..card import Card, Cost
+from ..card import Card, Cost, Structure
 from ..check import describe, positive_number, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -96,6 +96,7 @@ class Taylor(Method):
         cost=lambda method: Cost(step=60.0 + 0.55 * method.terms**2, correction=40.0),
         colour="#7B61FF",
         kernel="taylor",
+        structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
         time_dependent=True,
     )
 
