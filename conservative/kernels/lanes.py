@@ -13,19 +13,19 @@ from __future__ import annotations
 
 import math
 import operator
+from functools import partial
 
 import numpy as np
 
 from .. import arithmetic
 from . import COMPILED, traced
+from .traced import FOUR as FOUR
 from .traced import REGISTER as REGISTER
 from .traced import trace
 
-WIDTH = 2 * REGISTER if COMPILED else 1
-"""Number of bodies in most kernels: two registers, so that the processor works on one while it waits for the other. Kernels
-that have no room for two use `REGISTER`."""
-FOUR = 4
-"""Floats of one register that belong to one body: stages or components."""
+WIDTH = 2 * FOUR if COMPILED else 1
+"""Number of bodies in most kernels: two registers of most processors, so that these work on one while they wait for the other.
+Kernels that have no room for two use `REGISTER`."""
 
 if COMPILED:
     from llvmlite import ir
@@ -33,9 +33,7 @@ if COMPILED:
     from numba.core.typing.templates import AbstractTemplate, infer_global, signature
     from numba.extending import intrinsic, lower_builtin
 
-    from .traced import DOUBLE, INDEX, Lanes, Mask, Symbol, pack, unpack
-
-    VECTOR = ir.VectorType(DOUBLE, REGISTER)
+    from .traced import DOUBLE, INDEX, Lanes, Mask, Symbol, floats_in_register, pack, unpack
 
     def _register(symbol, operation, first, result):
         """Let numba compile `symbol` for lanes as the operation on their symbols."""
@@ -84,8 +82,9 @@ if COMPILED:
         """Return the LLVM value of a number of this type; `array` is its numba type and value."""
         if kind == types.float64:
             return builder.load(_place(context, builder, array, index))
-        places = [_move(builder, index, i) for i in range(0, kind.width, REGISTER)]
-        registers = [builder.load(_place(context, builder, array, each, VECTOR), align=8) for each in places]
+        floats = floats_in_register(kind.width)
+        vector, places = ir.VectorType(DOUBLE, floats), [_move(builder, index, i) for i in range(0, kind.width, floats)]
+        registers = [builder.load(_place(context, builder, array, each, vector), align=8) for each in places]
         return pack(context, builder, kind, Symbol(builder, registers))
 
     def _of_width(width):
@@ -138,7 +137,7 @@ if COMPILED:
     def _write(context, builder, array, index, number):
         """Store the registers of a symbol; `array` is its numba type and value."""
         for i, register in enumerate(number.registers):
-            at = _move(builder, index, i * REGISTER)
+            at = _move(builder, index, i * (number.width // len(number.registers)))
             builder.store(register, _place(context, builder, array, at, register.type), align=8)
 
     @intrinsic
@@ -164,11 +163,18 @@ if COMPILED:
 
         return types.none(array, types.intp, types.intp, values), build
 
+    def _pick(builder, a, b, at):
+        return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, len(at)), list(at)))
+
+    def _fours(builder, number):
+        """Return the floats of a number in registers of four."""
+        parts = range(0, number.width // len(number.registers), FOUR)
+        return [_pick(builder, each, each, range(i, i + FOUR)) for each in number.registers for i in parts]
+
     def _transpose(builder, numbers):
-        """Return four registers, one per lane, from up to four registers, one per number."""
-        pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, REGISTER), at))  # noqa: E731
-        nothing = ir.Constant(VECTOR, ir.Undefined)
-        a, b, c, d = [*numbers] + [nothing] * (REGISTER - len(numbers))
+        """Return four registers, one per lane, from up to four registers of four, one per number."""
+        pick, nothing = partial(_pick, builder), ir.Constant(ir.VectorType(DOUBLE, FOUR), ir.Undefined)
+        a, b, c, d = [*numbers] + [nothing] * (FOUR - len(numbers))
         ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
         near, far = (0, 1, 4, 5), (2, 3, 6, 7)
         return pick(ab[0], cd[0], near), pick(ab[1], cd[1], near), pick(ab[0], cd[0], far), pick(ab[1], cd[1], far)
@@ -179,12 +185,11 @@ if COMPILED:
 
         def build(context, builder, sig, args):
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
-            for first in range(0, len(numbers), REGISTER):
-                four, at = numbers[first : first + REGISTER], _move(builder, args[1], first)
-                kept = ir.Constant(ir.VectorType(INDEX, len(four)), list(range(len(four))))
-                for registers in zip(*(number.registers for number in four), strict=True):
+            for first in range(0, len(numbers), FOUR):
+                four, at = numbers[first : first + FOUR], _move(builder, args[1], first)
+                for registers in zip(*(_fours(builder, number) for number in four), strict=True):
                     for lane in _transpose(builder, registers):
-                        part = builder.shuffle_vector(lane, lane, kept)
+                        part = _pick(builder, lane, lane, range(len(four)))
                         builder.store(part, _place(context, builder, (sig.args[0], args[0]), at, part.type), align=8)
                         at = builder.add(at, args[2])
             return context.get_dummy_value()
@@ -201,7 +206,7 @@ if COMPILED:
         """Return one of the floats."""
 
         def build(context, builder, sig, args):
-            if a.width == REGISTER:
+            if a.width == floats_in_register(a.width):
                 return builder.extract_element(builder.extract_value(args[0], 0), args[1])
             return builder.load(builder.gep(_copy(builder, args[0])[1], [args[1]]))
 

@@ -41,11 +41,10 @@ TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
 if COMPILED:
     from llvmlite import ir
 
-    from .traced import DOUBLE, INTEGER, REGISTER, Symbol
+    from .traced import DOUBLE, FOUR, INTEGER, Symbol
 
     MOST_STORED = 24 * (HIGHEST + 1)
     """Registers that a step may store."""
-    BYTES = 8 * REGISTER
 
     class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
         """A load that LLVM does not move. Otherwise it would keep all coefficients in registers and spill them."""
@@ -54,7 +53,8 @@ if COMPILED:
             """Write the instruction to a list of texts, as llvmlite asks it to."""
             (pointer,) = self.operands
             kind = pointer.type
-            buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {BYTES}\n")
+            align = 8 * kind.pointee.count
+            buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {align}\n")
 
     class LoopMetadata(ir.MDValue):  # type: ignore[misc]  # llvmlite has no types
         """Metadata whose first operand is itself, as LLVM's loops have it."""
@@ -68,14 +68,15 @@ if COMPILED:
             buf += (f"distinct !{{ {operands} }}", "\n")
 
     class Memory:
-        """Registers on the stack of the function that is compiled, in places 0, 1, ..."""
+        """Registers like that of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
 
-        def __init__(self, builder):
-            self.builder, self._places = builder, {}
-            with builder.goto_entry_block():
-                memory = builder.alloca(ir.VectorType(DOUBLE, REGISTER), MOST_STORED)
-                memory.align = BYTES
-                self._start = builder.bitcast(memory, ir.IntType(8).as_pointer())
+        def __init__(self, number):
+            self.builder, self._places, self.register = number.builder, {}, ir.VectorType(DOUBLE, number.width or FOUR)
+            self._bytes = 8 * self.register.count
+            with self.builder.goto_entry_block():
+                memory = self.builder.alloca(self.register, MOST_STORED)
+                memory.align = self._bytes
+                self._start = self.builder.bitcast(memory, ir.IntType(8).as_pointer())
 
         def store(self, number):
             """Store a number, unless it is stored already, and return its place."""
@@ -83,32 +84,32 @@ if COMPILED:
             if id(register) not in self._places:
                 place = len(self._places)
                 assert place < MOST_STORED
-                self.builder.store(register, self._address(count_bytes(place)), align=BYTES)
+                self.builder.store(register, self._address(self.count_bytes(place)), align=self._bytes)
                 self._places[id(register)] = place, register
             return self._places[id(register)][0]
 
         def _address(self, byte):
-            return self.builder.bitcast(self.builder.gep(self._start, [byte]), ir.VectorType(DOUBLE, REGISTER).as_pointer())
+            return self.builder.bitcast(self.builder.gep(self._start, [byte]), self.register.as_pointer())
 
         def load(self, place):
             """Return the number at a place."""
-            found = VolatileLoad(self.builder.block, self._address(count_bytes(place)), "")
+            found = VolatileLoad(self.builder.block, self._address(self.count_bytes(place)), "")
             self.builder._insert(found)
             return Symbol(self.builder, [found])
 
         def load_behind(self, place, byte):
             """Return the number at a place plus a variable number of bytes."""
-            at = self._address(self.builder.add(byte, count_bytes(place)))
-            return Symbol(self.builder, [self.builder.load(at, align=BYTES)])
+            at = self._address(self.builder.add(byte, self.count_bytes(place)))
+            return Symbol(self.builder, [self.builder.load(at, align=self._bytes)])
+
+        def count_bytes(self, registers):
+            """Return the bytes of a number of registers as a constant of machine code."""
+            return ir.Constant(INTEGER, registers * self._bytes)
 
     def gather(numbers):
         """Return three numbers as `Axes`, and one as it is."""
         numbers = tuple(numbers)
         return Axes(*numbers) if len(numbers) == 3 else numbers[0]
-
-    def count_bytes(registers):
-        """Return the bytes of a number of registers as a constant of machine code."""
-        return ir.Constant(INTEGER, registers * BYTES)
 
 
 class History:
@@ -157,7 +158,7 @@ class Series:
     def __init__(self, number):
         traced = isinstance(number, Traced)
         self.one_body = traced and not number.width
-        self._memory = Memory(number.builder) if traced else None
+        self._memory = Memory(number) if traced else None
 
     def vector(self, x, y, z):
         """Return a vector."""
@@ -217,7 +218,7 @@ class Series:
         """Return the totals with the products of i and n - i for i = 1 ... n-1, added by a loop of machine code."""
         memory, builder = self._memory, self._memory.builder
         widths = [max(len(history.places[1]) for history in pairs[0]) for pairs in sums]
-        zero = Symbol(builder, [ir.Constant(ir.VectorType(DOUBLE, REGISTER), [0.0] * REGISTER)])
+        zero = Symbol(builder, [ir.Constant(memory.register, [0.0] * memory.register.count)])
         starts = [(zero,) * width if total is None else total for (total,), width in zip(totals, widths, strict=True)]
         places = sums[0][0][0].places
         step = places[2][0] - places[1][0]  # of all histories: the same values are stored for every order
@@ -226,9 +227,9 @@ class Series:
         builder.branch(body)
         builder.position_at_end(body)
         i = builder.phi(INTEGER)
-        i.add_incoming(count_bytes(step), before)
+        i.add_incoming(memory.count_bytes(step), before)
         phis = [[builder.phi(x.registers[0].type) for x in each] for each in starts]
-        j, loaded = builder.sub(count_bytes(n * step), i), {}
+        j, loaded = builder.sub(memory.count_bytes(n * step), i), {}
 
         def read(history, byte):
             first = history.places[1]
@@ -242,13 +243,13 @@ class Series:
         for pairs, numbers in zip(sums, phis, strict=True):
             total = gather(Symbol(builder, [phi]) for phi in numbers)
             found.append(self._add([total], [(read(x, i), read(y, j)) for x, y in pairs])[0])
-        following = builder.add(i, count_bytes(step))
+        following = builder.add(i, memory.count_bytes(step))
         i.add_incoming(following, body)
         for numbers, begin, end in zip(phis, starts, found, strict=True):
             for phi, x, y in zip(numbers, begin, end if isinstance(end, Axes) else (end,), strict=True):
                 phi.add_incoming(x.registers[0], before)
                 phi.add_incoming(y.registers[0], body)
-        branch = builder.cbranch(builder.icmp_unsigned("<", following, count_bytes(n * step)), body, after)
+        branch = builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
         rolled = builder.module.add_metadata([ir.MetaDataString(builder.module, "llvm.loop.unroll.disable")])
         branch.set_metadata("llvm.loop", LoopMetadata(builder.module, [rolled]))
         builder.position_at_end(after)

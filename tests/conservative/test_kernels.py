@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -48,6 +49,30 @@ def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> 
                 continue
             bound = 1e-13 if name.endswith(", 1") else 1e-8  # measured 7e-14; 4e-9 with steps of radians on a separatrix
             np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=bound, err_msg=name)
+
+
+MANY = """
+import sys
+import numpy as np
+import conservative as cv
+from conservative.kernels.lanes import REGISTER
+from conservative.batch import Batch
+top, w = cv.scenes.asymmetric_top(), np.random.default_rng(3).normal(size=(11, 3))
+bodies = Batch(top, np.tile(top.R_WB0, (11, 1, 1)), w, None, {})
+np.save(sys.argv[2], cv.registry.method(sys.argv[1]).prepare_many(bodies, cv.Grid(0.02, 20))().R_WB)
+print(REGISTER)
+"""
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names a processor of this kind")
+@pytest.mark.parametrize("method", ["taylor:order=8", "reduced"])
+def test_registers_of_four_and_of_eight_floats_agree(method: str, tmp_path: Path) -> None:
+    """Measured: the same bits."""
+    own, short = tmp_path / "own.npy", tmp_path / "short.npy"
+    python(["-c", MANY, method, str(own)])
+    haswell = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx2,+fma"}
+    assert python(["-c", MANY, method, str(short)], **haswell, NUMBA_CACHE_DIR=str(tmp_path)) == "4"
+    np.testing.assert_allclose(np.load(short), np.load(own), rtol=0, atol=1e-15)
 
 
 QUARTER_TURN = """
