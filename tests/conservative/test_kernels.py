@@ -57,9 +57,10 @@ import numpy as np
 import conservative as cv
 from conservative.kernels.lanes import REGISTER
 from conservative.batch import Batch
+from conservative.registry import method
 top, w = cv.scenes.asymmetric_top(), np.random.default_rng(3).normal(size=(11, 3))
 bodies = Batch(top, np.tile(top.R_WB0, (11, 1, 1)), w, None, {})
-np.save(sys.argv[2], cv.registry.method(sys.argv[1]).prepare_many(bodies, cv.Grid(0.02, 20))().R_WB)
+np.save(sys.argv[2], method(sys.argv[1]).prepare_many(bodies, cv.Grid(0.02, 20))().R_WB)
 print(REGISTER)
 """
 
