@@ -9,6 +9,7 @@ import tomllib
 import click
 import nbformat
 import pytest
+import yaml
 from nbclient import NotebookClient
 
 import conservative as cv
@@ -121,3 +122,14 @@ def test_every_column_of_a_row_is_explained():
     _, _, rest = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8").partition("| column | meaning |")
     lines = [line for line in rest.partition("\n\n")[0].splitlines() if line.startswith("| `")]
     assert [name for line in lines for name in re.findall(r"`(\w+)`", line.split("|")[1])] == list(COLUMNS)
+
+
+def test_the_paper_is_cited_with_one_title_and_its_conference():
+    paper, later = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["references"]
+    assert (paper["type"], paper["year"], paper["conference"]["city"]) == ("conference-paper", 2013, "Kos")
+    assert paper["collection-title"].startswith("COMPDYN 2013: 4th ECCOMAS Thematic Conference")
+    assert (later["type"], later["year"], later["volume"]) == ("article", 2014, 269)
+    for page in ("README.md", "conservative/methods/DERIVATION.md", "benchmarks/published.md"):
+        text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        assert paper["title"] in text, page
+        assert "COMPDYN 2013" in text, page

@@ -1,4 +1,4 @@
-"""The equations of Krenk & Nielsen, numbered as in the paper, on 9 + 9 unknowns.
+"""The equations of Krenk & Nielsen (COMPDYN 2013), numbered as in the paper, on 9 + 9 unknowns.
 
 Symbols of the paper, used in this file only:
 

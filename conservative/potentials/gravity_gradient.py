@@ -1,4 +1,4 @@
-"""The gradient of gravity, as a satellite feels it. Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3."""
+"""The gradient of gravity, as a satellite feels it. Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 8.1."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class GradientField(NamedTuple):
 class GravityGradient(FieldPotential):
     """Gravity gradient of a distant centre on a body that rotates about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
 
-    This is the second-order term in size over distance (Hughes, Spacecraft Attitude Dynamics, 9.3). The torque in body axes is
+    This is the second-order term in size over distance (Hughes, Spacecraft Attitude Dynamics, 8.1). The torque in body axes is
     3 rate^2 u x J u. The direction e to the centre is fixed in the world; for a satellite use `Orbit.gravity_gradient`.
 
     Parameters

@@ -1,6 +1,6 @@
 """Fields that turn at a constant rate, as gravity does about a satellite in a circular orbit.
 
-Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3; the integral is C. G. J. Jacobi's (1836).
+Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.2; the integral is C. G. J. Jacobi's (1836).
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ def simo_wong_top(tilt: float = 0.05, t_end: float = 10.0) -> Scene:
 
 
 def lie_group_top(spin: float = 150.0, t_end: float = 2.0, slow: float = 1.0) -> Scene:
-    """Return the heavy top of the Lie-group literature, rates (0, spin, -4.61538) (Bruels, Cardona & Arnold 2012).
+    """Return the heavy top of the Lie-group literature, rates (0, spin, -4.61538) (Brüls, Cardona & Arnold 2012).
 
     A mass of 15 kg at (0, 1, 0) m has central moments (0.234375, 0.46875, 0.234375) kg m^2. The body once hangs straight down
     to 7e-7 rad, where Euler angles break down.
@@ -194,7 +194,7 @@ def lie_group_top(spin: float = 150.0, t_end: float = 2.0, slow: float = 1.0) ->
         UniformGravity(mass * 9.81, com),
         dt=0.001,
         group="top",
-        source="Bruels, Cardona & Arnold 2012",
+        source="Brüls, Cardona & Arnold 2012",
     )
     return slow_motion(top, slow)
 

@@ -186,3 +186,22 @@ def test_energy_is_relative_to_motion_and_field_and_momentum_to_its_initial_valu
 
 def test_at_rest_momentum_is_relative_to_the_momentum_that_the_field_can_make():
     assert scales((0, 0, 0)) == pytest.approx({"energy": 3.0 * 0.5, "vertical momentum": np.sqrt(1.3 * 1.5)})
+
+
+def test_the_gravity_gradient_is_the_second_order_of_newtons_law_for_point_masses():
+    points = np.concatenate([arms := np.diag([1.0, 0.7, 0.4]) @ rotation_about((1, 2, 3), 0.8), -arms])  # 1 kg each, m
+    inertia = sum(point @ point * np.eye(3) - np.outer(point, point) for point in points)
+    distance, direction_W, G_M = 100.0, np.array([0.6, 0.0, 0.8]), 5.0
+    field = cv.GravityGradient(np.sqrt(G_M / distance**3), inertia, direction_W)
+
+    def newton(R):
+        gaps = distance * direction_W - points @ R.T
+        sizes = np.linalg.norm(gaps, axis=1)
+        forces = G_M * gaps / sizes[:, None] ** 3
+        return -(G_M / sizes).sum(), np.cross(points, forces @ R).sum(axis=0)
+
+    turned, level = rotation_about((3, -1, 2), 1.3), np.eye(3)
+    difference, torque_B = field.energy(turned) - field.energy(level), turned.T @ torque_W(field, turned)
+    # the next order is (size/distance)^2 = 1e-4
+    assert newton(turned)[0] - newton(level)[0] == pytest.approx(difference, rel=3e-4)  # measured 1.6e-4
+    assert np.linalg.norm(newton(turned)[1] - torque_B) < 3e-4 * np.linalg.norm(torque_B)  # measured 1.8e-4
