@@ -189,9 +189,7 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
 
 
 def unsupported_reason(scene: Scene) -> str | None:
-    """Return why an engine with a mass model and uniform gravity does not support a scene; None if it does."""
-    if scene.potential is not None and not isinstance(scene.potential, UniformGravity):
-        return f"the engine has uniform gravity only, not {type(scene.potential).__name__}"
+    """Return why no engine with a mass model supports a scene; None if one may."""
     if mass_model(principal_axes(scene)) is None:
         return "no mass distribution has this inertia and centre of mass: a moment exceeds the sum of the other two"
     return None

@@ -16,7 +16,7 @@ ENGINE = {
     "module": "dartpy",
     "oldest": "6.19",
     "title": "semi-implicit Euler",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "as_installed": ("",),
     },

@@ -22,7 +22,7 @@ ENGINE = {
     "settings": {"solver": "Tsit5", "rtol": 0.0},
     "orders": {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8},
     "tolerance": "rtol",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("", "Dopri8", "Dopri8,rtol=1e-9"),
         "suite": ("", "Dopri8,rtol=1e-9"),

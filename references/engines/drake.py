@@ -37,7 +37,7 @@ ENGINE = {
         **{"radau1": 1, "radau3": 3},
     },
     "tolerance": "accuracy",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10"),
         "suite": ("discrete", "runge_kutta5"),

@@ -31,7 +31,7 @@ ENGINE = {
         **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
         **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
     },
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"),
         "suite": ("RK44", "RK67"),

@@ -30,7 +30,7 @@ ENGINE = {
     "settings": {"integrator": "RK4"},
     "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
     "precision": "f32",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("Euler", "RK4", "implicitfast"),
         "many": ("RK4",),

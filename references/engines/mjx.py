@@ -29,7 +29,7 @@ ENGINE = {
     "oldest": "3.6",
     "settings": {"integrator": "RK4", "precision": "f64"},
     "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("Euler", "implicitfast", "RK4", "RK4,precision=f32"),
         "many": ("RK4", "RK4,precision=f32"),

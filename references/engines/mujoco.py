@@ -2,7 +2,9 @@
 
 The loop is `mujoco.rollout` if samples are close, and `mj_step(m, d, nstep)` from sample to sample otherwise. The body's
 principal axes are MuJoCo's body axes. A free body has a free joint at its centre of mass, as in the models of MuJoCo's users. A
-body in a field has a ball joint at its fixed point. Switched off: every part of a step that such a body does not need.
+body in a field has a ball joint at its fixed point. A spring is a spatial tendon between two sites. An attraction, a gravity
+gradient and fields that turn are a passive force: a C function that MuJoCo calls in each evaluation, `mjcb_passive`, made by
+numba. Switched off: every part of a step that such a body does not need.
 
 Parameters
 ----------
@@ -14,13 +16,18 @@ threads
 References
 ----------
 Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
-Programming, `mj_step`, rollout: https://mujoco.readthedocs.io/en/stable/python.html
+Programming, `mj_step`, rollout, callbacks: https://mujoco.readthedocs.io/en/stable/python.html
+Tendons: https://mujoco.readthedocs.io/en/stable/XMLreference.html#tendon-spatial
 """
 
-from contextlib import contextmanager
+import ctypes
+from contextlib import contextmanager, nullcontext
+from functools import lru_cache
 from threading import Lock
 
 import numpy as np
+
+from .shared import FIELDS, compile_torque, pack_field
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 ENGINE = {
@@ -29,7 +36,7 @@ ENGINE = {
     "oldest": "3.6",
     "settings": {"integrator": "RK4", "threads": 1},
     "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
-    "gravity": True,
+    "fields": FIELDS,
     "card": {
         "variants": INTEGRATORS,
         "report": ("Euler", ""),
@@ -44,10 +51,13 @@ ENGINE = {
 # Parts of a step that one body without contacts, actuators, springs or sensors does not need. Bits that a version does not have
 # are skipped. Autoreset would restart a diverged run.
 SWITCHED_OFF = (
-    *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
+    *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "DAMPER", "CLAMPCTRL", "WARMSTART"),
     *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND"),
     "MULTICCD",
 )
+PASSIVE = ("SPRING", "PASSIVE")  # and these unless there is a field
+FIELD = 20131013.0
+"""First number of the field in our models: the callback, which is the process's, leaves all other models alone."""
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
 ROLLOUT_UP_TO = 8
 # Numbers that a rollout of many bodies stores at a time: 32 MiB.
@@ -63,9 +73,10 @@ def prepare(given):
     start = _start(mj, model, data, given)
     march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
     evaluations = given.n_steps * (4 if given.integrator == "RK4" else 1)
+    field = _find_callback(mj, model, data)
 
     def run():
-        with _quiet(mj):
+        with _quiet(mj, _ignore), _passive(mj, field) if field else nullcontext():
             q, w, reason = march(mj, model, data, start, given)
         return {"q": q, "w": w, "reason": reason, "evaluations": evaluations}
 
@@ -81,10 +92,11 @@ def prepare_many(bodies):
     datas = [mj.MjData(models[0]) for _ in range(given.threads)]
     start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies, strict=True)])
     room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
+    field = _find_callback(mj, models[0], datas[0])
 
     def run():
-        states = [start]
-        with _quiet(mj), Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
+        states, callback = [start], _passive(mj, field) if field else nullcontext()
+        with _quiet(mj, _ignore), callback, Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
             for n_steps in np.diff(given.steps).tolist():
                 states.append(_roll_on(pool, (models, datas), states[-1], n_steps, room))
         states = np.stack(states, axis=1)
@@ -110,7 +122,8 @@ def _model(mj, given):
     spec.option.timestep = given.dt
     spec.option.integrator = _integrator(mj, given.integrator)
     spec.option.gravity = (0, 0, -given.gravity)
-    off = (*SWITCHED_OFF, "GRAVITY") if given.gravity == 0 else SWITCHED_OFF
+    field = pack_field(given)
+    off = (*SWITCHED_OFF, *("GRAVITY",) * (given.gravity == 0), *PASSIVE * (not field.any()))
     spec.option.disableflags = sum(int(getattr(mj.mjtDisableBit, f"mjDSBL_{name}", 0)) for name in off)
     body = spec.worldbody.add_body(name="body", explicitinertial=True, mass=given.mass, ipos=given.com)
     # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
@@ -118,7 +131,62 @@ def _model(mj, given):
     body.inertia = np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
     body.iquat = given.q_com  # scalar first
     body.add_joint(type=mj.mjtJoint.mjJNT_FREE if given.free else mj.mjtJoint.mjJNT_BALL)
+    if given.stiffness and not given.turn.any():
+        tendon = spec.add_tendon(name="spring", stiffness=given.stiffness, springlength=[given.rest_length] * 2)
+        for name, owner, place in (("anchor", spec.worldbody, given.anchor), ("point", body, given.point)):
+            owner.add_site(name=name, pos=place)
+            tendon.wrap_site(name)
+    elif field.any():
+        spec.add_numeric(name="field", data=[FIELD, *field], size=1 + len(field))
     return spec.compile()
+
+
+def _find_callback(mj, model, data):
+    """Return the passive force of a model in the form that C calls; None if it has none."""
+    if not model.nnumeric:
+        return None
+    data.time = FIELD
+    time = np.float64(FIELD).view(np.int64)
+    places = [(model, model.numeric_data), (data, data.xmat), (data, data.qfrc_passive)]
+    found = [_find_word(owner, array.ctypes.data) for owner, array in places], _find_word(data, time)
+    mj.mj_resetData(model, data)
+    return _compile_callback(*found[0], found[1])
+
+
+def _find_word(owner, value):
+    """Return the place of an integer of 64 bits in one of MuJoCo's structures, whose layout changes with the version."""
+    address = owner._address
+    return next(word for word in range(1 << 17) if ctypes.c_int64.from_address(address + 8 * word).value == value)
+
+
+@lru_cache(maxsize=1)
+def _compile_callback(numeric, attitude, force, time):
+    """Return the callback, for the places of pointers to `numeric_data`, `xmat` and `qfrc_passive`, and of the time."""
+    try:
+        from numba import cfunc, types
+        from numba.extending import intrinsic
+    except ImportError:
+        raise NotImplementedError("this field needs numba next to MuJoCo") from None
+    doubles, words = types.CPointer(types.float64), types.CPointer(types.int64)
+    torque = compile_torque()
+
+    @intrinsic
+    def read(typing, address):
+        return doubles(types.int64), lambda context, builder, signature, args: builder.inttoptr(
+            args[0], context.get_value_type(doubles)
+        )
+
+    @cfunc(types.void(words, words))
+    def passive(model, data):
+        if model[numeric] == 0 or read(model[numeric])[0] != FIELD:
+            return
+        field, R, out = read(model[numeric] + 8), read(data[attitude] + 9 * 8), read(data[force])  # body 1, after the world
+        t1, t2, t3 = torque(field, R, np.int64(data[time]).view(np.float64))
+        out[0] += t1
+        out[1] += t2
+        out[2] += t3
+
+    return passive.ctypes
 
 
 def _integrator(mj, name):
@@ -182,21 +250,25 @@ def _warning(mj, data):
     return ""
 
 
-class _Quiet:
-    """Prevents MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead.
+def _ignore(message):
+    """Do not write a warning to a file in the working directory; warnings are read from the data instead."""
 
-    The first of several runs at the same time replaces the user's own handler, the last one restores it.
+
+class _Installed:
+    """A function that MuJoCo calls during a run.
+
+    The first of several runs at the same time replaces the user's own one, the last one restores it.
     """
 
-    def __init__(self):
-        self._lock, self._runs, self._before = Lock(), 0, None
+    def __init__(self, name):
+        self._name, self._lock, self._runs, self._before = name, Lock(), 0, None
 
     @contextmanager
-    def __call__(self, mj):
+    def __call__(self, mj, function):
         with self._lock:
             if self._runs == 0:
-                self._before = mj.get_mju_user_warning()
-                mj.set_mju_user_warning(lambda message: None)
+                self._before = getattr(mj, f"get_{self._name}")()
+                getattr(mj, f"set_{self._name}")(function)
             self._runs += 1
         try:
             yield
@@ -204,7 +276,7 @@ class _Quiet:
             with self._lock:
                 self._runs -= 1
                 if self._runs == 0:
-                    mj.set_mju_user_warning(self._before)
+                    getattr(mj, f"set_{self._name}")(self._before)
 
 
-_quiet = _Quiet()
+_quiet, _passive = _Installed("mju_user_warning"), _Installed("mjcb_passive")

@@ -40,7 +40,7 @@ ENGINE = {
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,
     "precision": "f32",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "free_only": {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
         "XPBD": "no settings of SolverXPBD were found with which its ball joint holds a body right",

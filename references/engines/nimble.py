@@ -17,7 +17,7 @@ ENGINE = {
     "requirements": ("numpy<2",),  # it crashes with NumPy 2
     "oldest": "0.10",
     "title": "semi-implicit Euler",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "as_installed": ("",),
     },

@@ -32,7 +32,7 @@ ENGINE = {
         **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
     },
     "tolerance": "accuracy",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"),
         "as_installed": ("RungeKuttaMerson,accuracy=1e-3",),

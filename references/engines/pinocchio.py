@@ -1,7 +1,8 @@
 """Pinocchio's `aba` and `integrate`, stepped from Python.
 
 Pinocchio is a library of algorithms without a time loop, so this loop is Python's, and calls of the library take most of the
-time of a step. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free.
+time of a step. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free. The torque of a
+field other than gravity is the joint's torque, in each call of `aba`; numba compiles it where it is installed.
 
 Parameters
 ----------
@@ -16,13 +17,15 @@ aba, integrate: https://docs.ros.org/en/kinetic/api/pinocchio/html/
 
 import numpy as np
 
+from .shared import FIELDS, compile_torque, pack_field
+
 ENGINE = {
     "package": "pin",
     "module": "pinocchio",
     "settings": {"scheme": "RK4"},
     "orders": {"Euler": 1, "RK4": 4},
     "prefix": "aba+",
-    "gravity": True,
+    "fields": FIELDS,
     "card": {
         "variants": ("Euler", "RK4"),
         "report": ("",),
@@ -63,13 +66,14 @@ def prepare_many(bodies):
 
 def _march(step, given):
     """Return samples of quaternions (n, 4), scalar first, and rates (n, 3); nan after the end of a run that diverges."""
-    q, v = np.roll(given.q0, -1), given.w0  # Pinocchio has the scalar last; velocities are in body axes
+    q, v, count = np.roll(given.q0, -1), given.w0, 0  # Pinocchio has the scalar last; velocities are in body axes
     qs, vs = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
     qs[0], vs[0] = q, v
     with np.errstate(all="ignore"):
         for sample, n_steps in enumerate(np.diff(given.steps), start=1):
             for _ in range(n_steps):
-                q, v = step(q, v)
+                q, v = step(q, v, count * given.dt)
+                count += 1
             if not np.isfinite(v).all():
                 break
             qs[sample], vs[sample] = q, v
@@ -77,7 +81,7 @@ def _march(step, given):
 
 
 def _stepper(pin, given):
-    """Return a function that makes a step from a quaternion and rates.
+    """Return a function that makes a step from a quaternion, rates and time.
 
     RK4 is k_i = dt (v, aba) at q exp(u_i), with u_3 and the last u corrected by a commutator. The signs are correct for a group
     that acts from the right, q' = q v, with v in body axes.
@@ -88,19 +92,26 @@ def _stepper(pin, given):
     model.appendBodyToJoint(joint, pin.Inertia(given.mass, given.com, given.inertia_com), pin.SE3.Identity())
     model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
     aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
+    field, torque = pack_field(given), compile_torque()
+    no_field = not field.any()
 
-    def euler(q, v):
-        v = v + dt * aba(model, data, q, v, tau)
+    def acceleration(q, v, t):
+        if no_field:
+            return aba(model, data, q, v, tau)
+        return aba(model, data, q, v, np.array(torque(field, pin.Quaternion(q).toRotationMatrix().ravel(), t)))
+
+    def euler(q, v, t):
+        v = v + dt * acceleration(q, v, t)
         return integrate(model, q, dt * v), v
 
-    def rk4(q, v):
-        k1, a1 = dt * v, dt * aba(model, data, q, v, tau)
+    def rk4(q, v, t):
+        k1, a1 = dt * v, dt * acceleration(q, v, t)
         v2 = v + a1 / 2
-        k2, a2 = dt * v2, dt * aba(model, data, integrate(model, q, k1 / 2), v2, tau)
+        k2, a2 = dt * v2, dt * acceleration(integrate(model, q, k1 / 2), v2, t + dt / 2)
         v3 = v + a2 / 2
-        k3, a3 = dt * v3, dt * aba(model, data, integrate(model, q, k2 / 2 + _cross(k1, k2) / 8), v3, tau)
+        k3, a3 = dt * v3, dt * acceleration(integrate(model, q, k2 / 2 + _cross(k1, k2) / 8), v3, t + dt / 2)
         v4 = v + a3
-        k4, a4 = dt * v4, dt * aba(model, data, integrate(model, q, k3), v4, tau)
+        k4, a4 = dt * v4, dt * acceleration(integrate(model, q, k3), v4, t + dt)
         u = (k1 + 2 * (k2 + k3) + k4 + _cross(k1, k4) / 2) / 6
         return integrate(model, q, u), v + (a1 + 2 * (a2 + a3) + a4) / 6
 

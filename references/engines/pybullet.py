@@ -27,7 +27,7 @@ ENGINE = {
     "oldest": "3.2.5",
     "settings": {"body": "multibody", "as_installed": False},
     "orders": {"multibody": 1, "maximal": 1},
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "free_only": {"maximal": "PyBullet has no joint to the world for a body in maximal coordinates"},
     "rate_limit": 100.0,  # maxJointVelocity
     "card": {

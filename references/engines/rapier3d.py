@@ -28,7 +28,7 @@ ENGINE = {
     "oldest": "0.36",
     "settings": {"substeps": 4, "as_installed": False},
     "precision": "f32",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "card": {
         "variants": ("", "substeps=1", "as_installed=true"),
         "as_installed": ("as_installed=true",),

@@ -26,7 +26,7 @@ ENGINE = {
     "settings": {"as_installed": False},
     "title": "PhysX",
     "precision": "f32",
-    "gravity": True,
+    "fields": ("UniformGravity",),
     "rate_limit": 100.0,  # max_angular_velocity
     "card": {
         "variants": ("", "as_installed=true"),

@@ -1,8 +1,12 @@
 """Functions that several adapters share. They run in the environments of engines and import nothing of this package."""
 
+import math
 from functools import lru_cache, partial
 
 import numpy as np
+
+FIELDS = ("UniformGravity", "LinearSpring", "PointAttraction", "GravityGradient", "Turning")
+"""All fields that the numbers of a run describe."""
 
 PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
 """Arrays of a MuJoCo model that depend on the body."""
@@ -16,6 +20,56 @@ def sample(given, step, read):
             step()
         samples.append({name: np.array(values, float) for name, values in read().items()})  # copies of an engine's own arrays
     return {name: np.array([each[name] for each in samples]) for name in samples[0]}
+
+
+def pack_field(given):
+    """Return the numbers of a field (22,) for `field_torque`; all are 0 if there is none but uniform gravity."""
+    rate = np.linalg.norm(given.turn)
+    normal = given.turn / rate if rate else given.turn
+    law = given.stiffness, given.stiffness * given.rest_length, given.strength
+    # A field has an anchor or a direction; the other one is 0.
+    return np.concatenate([given.anchor + given.direction, normal, [rate], given.point, law, given.gradient.ravel()])
+
+
+def field_torque(field, R, t):
+    """Return the torque of a field other than gravity about the fixed point, N m, axes F. Numba can compile it.
+
+    `field` is from `pack_field`, R are the entries (9) of the attitude by rows, F to W, and t is the time, s.
+
+        T = (stiffness - stiffness rest_length / d + strength / d^3) b x u + u x G u        u = R' a(t), d = |b - u|
+    """
+    a1, a2, a3, rate = field[0], field[1], field[2], field[6]
+    if rate != 0.0:
+        n1, n2, n3, c, s = field[3], field[4], field[5], math.cos(rate * t), math.sin(rate * t)
+        along = (1.0 - c) * (n1 * a1 + n2 * a2 + n3 * a3)
+        a1, a2, a3 = (
+            c * a1 + s * (n2 * a3 - n3 * a2) + along * n1,
+            c * a2 + s * (n3 * a1 - n1 * a3) + along * n2,
+            c * a3 + s * (n1 * a2 - n2 * a1) + along * n3,
+        )
+    u1, u2, u3 = R[0] * a1 + R[3] * a2 + R[6] * a3, R[1] * a1 + R[4] * a2 + R[7] * a3, R[2] * a1 + R[5] * a2 + R[8] * a3
+    b1, b2, b3, factor = field[7], field[8], field[9], field[10]
+    if field[11] != 0.0 or field[12] != 0.0:
+        over = 1.0 / math.sqrt((b1 - u1) ** 2 + (b2 - u2) ** 2 + (b3 - u3) ** 2)
+        factor += (field[12] * over * over - field[11]) * over
+    g1 = field[13] * u1 + field[14] * u2 + field[15] * u3
+    g2 = field[16] * u1 + field[17] * u2 + field[18] * u3
+    g3 = field[19] * u1 + field[20] * u2 + field[21] * u3
+    return (
+        factor * (b2 * u3 - b3 * u2) + u2 * g3 - u3 * g2,
+        factor * (b3 * u1 - b1 * u3) + u3 * g1 - u1 * g3,
+        factor * (b1 * u2 - b2 * u1) + u1 * g2 - u2 * g1,
+    )
+
+
+@lru_cache(maxsize=1)
+def compile_torque():
+    """Return `field_torque`, compiled where numba is installed."""
+    try:
+        from numba import njit
+    except ImportError:
+        return field_torque
+    return njit(field_torque)
 
 
 def write_mjcf(given, option="", shape=""):

@@ -20,11 +20,13 @@ from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import RunMany
 from conservative.methods.units import in_own_units
+from conservative.potentials.turning import Turning, static_part
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
 from ..engine import load, principal_axes, unsupported_reason, version
 from .environment import Distribution
-from .plain_numbers import EngineSamples, ManySamples, describe, take_axes
+from .plain_numbers import FIELDS, EngineSamples, ManySamples, describe, take_axes
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,8 @@ class EngineData(Distribution):
         Name of the setting that is a tolerance for adaptive steps. If its default is 0, that value stands for fixed steps.
     precision
         "f64" or "f32", for engines without such a setting.
-    gravity
-        True if bodies about a fixed point in uniform gravity are supported, not only free bodies.
+    fields
+        Names of the potentials that are supported, on bodies about a fixed point; `"Turning"` for those of them that turn.
     free_only
         The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
         depends on that.
@@ -70,7 +72,7 @@ class EngineData(Distribution):
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     tolerance: str = ""
     precision: str = "f64"
-    gravity: bool = False
+    fields: tuple[str, ...] = ()
     free_only: str | Mapping[str, str] = ""
     rate_limit: float = math.inf
     title: str = ""
@@ -86,7 +88,7 @@ def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]
     """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
     data = EngineData(**module.ENGINE)
     family = module.__name__.rpartition(".")[2]
-    described = {"family": family, "data": data, "adapter": module, "card": Card(**data.card)}
+    described = {"family": family, "data": data, "adapter": module, "card": Card(**data.card, time_dependent=True)}
     described |= {"__module__": module.__name__, "__doc__": module.__doc__}
     if "precision" not in data.settings:
         described["precision"] = data.precision
@@ -167,15 +169,18 @@ class AdapterMethod(Method):
         return self.data.orders[next(iter(settings.values()))] if self.data.orders else self.data.order
 
     def unsupported(self, scene: Scene) -> str | None:
-        reason = unsupported_reason(scene)
-        if scene.potential is not None:
+        reason, potential = unsupported_reason(scene), scene.potential
+        if potential is not None:
             only = self.data.free_only
             if not isinstance(only, str):
                 only = only.get(next(iter(self.settings.values())), "")
-            if not self.data.gravity:
-                reason = only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
-            elif reason is None and only:
+            kinds = list(dict.fromkeys([type(potential), type(static_part(potential))]))
+            if only:
                 reason = only
+            elif kinds == [Turning, UniformGravity] or any(
+                kind not in FIELDS or kind.__name__ not in self.data.fields for kind in kinds
+            ):
+                reason = f"not supported by our adapter: {' of '.join(kind.__name__ for kind in kinds)}"
         if reason is None and self.settings.get("as_installed"):
             return rate_limit_reason(scene, self.data.rate_limit)
         return reason

@@ -13,6 +13,10 @@ from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.methods.many import Block
 from conservative.methods.units import SI, find_units
+from conservative.potentials.gravity_gradient import GravityGradient
+from conservative.potentials.point_to_point import LinearSpring, PointAttraction
+from conservative.potentials.turning import Turning, static_part
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -21,6 +25,28 @@ from ..worker.client import EngineCrashed
 
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """Numbers that all bodies of a run have in common."""
+
+FIELDS: dict[type, tuple[str, ...]] = {
+    Turning: (),
+    UniformGravity: (),
+    LinearSpring: ("point", "anchor", "stiffness", "rest_length"),
+    PointAttraction: ("point", "anchor", "strength"),
+    GravityGradient: ("gradient", "direction"),
+}
+"""Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
+
+
+def _describe_field(axes: EngineAxes) -> dict[str, Any]:
+    """Return the numbers of all fields; those of a field that the scene does not have are 0."""
+    potential: Any = axes.scene.potential
+    numbers: dict[str, Any] = {name: np.zeros(3) for name in ("point", "anchor", "direction", "turn")}
+    numbers |= {"stiffness": 0.0, "rest_length": 0.0, "strength": 0.0, "gradient": np.zeros((3, 3))}
+    if isinstance(potential, Turning):
+        numbers["turn"] = potential.orbit.rate * potential.orbit.normal_W
+    static = static_part(potential)
+    if names := FIELDS.get(type(static)):
+        numbers |= zip(names, (np.array(value)[()] for value in static.kernel_field(axes.R_BF)), strict=True)
+    return numbers
 
 
 def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
@@ -36,6 +62,7 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
         "mass": mass.mass,
         "com": mass.com,
         "gravity": mass.gravity,
+        **_describe_field(axes),
         "moments_com": mass.body.moments,
         "q_com": to_quaternion(mass.body.R_BP),
         "inertia_com": mass.body.inertia,

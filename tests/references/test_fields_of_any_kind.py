@@ -6,17 +6,25 @@ SciPy have it in axes that turn, and `Projected` has it at the times of its stag
 `test_turning.py`).
 """
 
+import ctypes
+from types import SimpleNamespace
+
+import mujoco
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.attitude import angle_between, from_quaternion, rotation_about, to_quaternion
+from conservative.body import RigidBody
 from conservative.grid import Grid
 from conservative.potentials.potential import torque_W
 from conservative.references import precise
+from conservative.references.engine import principal_axes
+from conservative.references.engines import pinocchio
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.plain_numbers import describe
 from conservative.references.heyoka_equations import formulations
 from conservative.references.heyoka_equations.accelerations import READERS, express_field
 from conservative.references.precise import Precise
@@ -215,3 +223,105 @@ def test_only_scipy_supports_a_function_that_turns():
     assert "FunctionPotential" in Precise().unsupported(scene)
     trajectory, known = (cv.integrate(each, 0.1, SciPy()) for each in (scene, scene_in(TURNING["gravity"])))
     assert angle_between(trajectory.R_WB, known.R_WB).max() < 1e-10  # measured 1.8e-12
+
+
+IN_ENGINES = {name: FIELDS[name] for name in FIELDS} | {
+    f"turning {name}": TURNING[name] for name in (*INTEGRATED[1:], "satellite")
+}
+"""Fields that engines integrate. They do not have uniform gravity that turns."""
+
+
+def check_order(method, name, order, right=None):
+    """Check that an engine in a field converges to the truth, and its order; `right` is the field of the truth."""
+    scene = scene_in(IN_ENGINES[name])
+    truth = Precise(128).run(scene if right is None else scene_in(right), 1.0).R_WB[-1]
+    coarse, fine = (angle_between(method.prepare(scene, Grid(1 / n, n, n))().R_WB[-1], truth) for n in (50, 100))
+    assert abs(np.log2(coarse / fine) - order) < 0.1  # measured at most 0.039
+    assert fine < (0.015 if order == 1 else 1e-8)  # measured at most 0.013 and 4.7e-9
+
+
+@pytest.mark.parametrize("name", IN_ENGINES)
+@pytest.mark.parametrize(
+    ("engine", "order"),
+    [("mujoco:RK4", 4), ("mujoco:Euler", 1), ("mujoco:implicit", 1), ("pinocchio:RK4", 4), ("pinocchio:Euler", 1)],
+)
+def test_engines_converge_to_the_truth_in_every_field(engine, order, name):
+    check_order(registry.method(engine), name, order)
+
+
+@pytest.mark.parametrize("engine", ["mujoco:RK4", "pinocchio:RK4"])
+@pytest.mark.parametrize("name", ["spring", "attraction", "gradient", "turning satellite"])
+def test_an_engine_in_a_wrong_field_is_detected(engine, name):
+    """A ten-thousandth of the field, a rest length, or the direction of turning."""
+    wrong = {
+        "spring": cv.LinearSpring(3.0, POINT, ANCHOR, 0.40001),
+        "attraction": cv.PointAttraction(2.30001, POINT, ANCHOR),
+        "gradient": cv.GravityGradient(1.70001, INERTIA, CENTRE),
+        "turning satellite": cv.Orbit(0.9, -ORBIT.normal_W).gravity_gradient(INERTIA, ACROSS),
+    }
+    with pytest.raises(AssertionError):
+        check_order(registry.method(engine), name, 4, wrong[name])
+
+
+def test_a_torque_that_is_evaluated_once_in_a_step_is_detected(monkeypatch):
+    torque, calls = pinocchio.compile_torque(), []
+
+    def held(*state):
+        calls.append(torque(*state) if len(calls) % 4 == 0 else calls[-1])
+        return calls[-1]
+
+    monkeypatch.setattr(pinocchio, "compile_torque", lambda: held)
+    with pytest.raises(AssertionError):
+        check_order(registry.method("pinocchio:RK4"), "attraction", 4)
+
+
+@pytest.mark.parametrize("engine", ["mujoco:RK4", "pinocchio:RK4"])
+@pytest.mark.parametrize("name", ["spring", "attraction", "gradient", "turning satellite"])
+def test_forces_act_about_the_fixed_point_and_not_the_centre_of_mass(engine, name):
+    """Without gravity, any centre of mass with the same inertia about the fixed point gives the same motion."""
+    method, axes = registry.method(engine), principal_axes(scene_in(IN_ENGINES[name]))
+    numbers = {**method.settings, **describe(axes, Grid(0.01, 100, 100))}
+    com = np.array((0.2, -0.1, 0.3))
+    inertia = RigidBody(np.diag(axes.J) - com @ com * np.eye(3) + np.outer(com, com))
+    moved = {"com": com, "inertia_com": inertia.inertia, "moments_com": inertia.moments, "q_com": to_quaternion(inertia.R_BP)}
+    here, there = (method.adapter.prepare(SimpleNamespace(**{**numbers, **each}))()["q"][-1] for each in ({}, moved))
+    np.testing.assert_allclose(here, there, rtol=0, atol=1e-14)  # measured 4e-16
+
+
+def test_mujoco_restores_the_users_passive_force():
+    own = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(lambda model, data: None)
+    mujoco.set_mjcb_passive(own)
+    try:
+        assert registry.method("mujoco:RK4").run(scene_in(FIELDS["attraction"]), 0.1).ok
+        assert mujoco.get_mjcb_passive() is own
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+@pytest.mark.parametrize("custom", ["", "<custom><numeric name='field' data='1 2 3'/></custom>"])
+def test_mujocos_passive_force_leaves_other_models_alone(custom):
+    """The callback is the process's, and other threads may have models of their own."""
+    body = "<worldbody><body><joint type='ball'/><geom size='1'/></body></worldbody>"
+    method = registry.method("mujoco:RK4")
+    numbers = {**method.settings, **describe(principal_axes(scene_in(FIELDS["attraction"])), GRID)}
+    ours, other = (
+        method.adapter._model(mujoco, SimpleNamespace(**numbers)),
+        mujoco.MjModel.from_xml_string(f"<mujoco>{custom}{body}</mujoco>"),
+    )
+    forces = []
+    mujoco.set_mjcb_passive(method.adapter._find_callback(mujoco, ours, mujoco.MjData(ours)))
+    try:
+        for model in (ours, other):
+            data = mujoco.MjData(model)
+            mujoco.mj_forward(model, data)
+            forces.append(data.qfrc_passive.any())
+    finally:
+        mujoco.set_mjcb_passive(None)
+    assert forces == [True, False]
+
+
+def test_what_the_adapter_of_an_engine_lacks_is_named():
+    function = cv.FunctionPotential(FIELDS["gravity"].energy, FIELDS["gravity"].gradient)
+    method = registry.method("mujoco")
+    assert method.unsupported(scene_in(function)) == "not supported by our adapter: FunctionPotential"
+    assert method.unsupported(scene_in(TURNING["gravity"])) == "not supported by our adapter: Turning of UniformGravity"

@@ -7,6 +7,7 @@ from conservative import BadInput, registry
 from conservative.batch import Batch
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.grid import Grid
+from conservative.potentials.point_to_point import PointAttraction
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka, mujoco
 from conservative.references.environments.plain_numbers import ManySamples, describe_many
@@ -14,6 +15,8 @@ from conservative.references.worker.program import Runs
 
 GRID = Grid(0.01, 50, 20)
 TOPS, FREE = draw("heavy_tops", 5, seed=3), draw("free_bodies", 5, seed=3)
+ATTRACTION = TOPS.scene.rename("attracted", potential=PointAttraction(2.0, (0.3, -0.2, 0.4), (1.0, 0.5, 2.0)))
+ATTRACTED = Batch(ATTRACTION, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia, {"strength": np.arange(1.0, 6)})
 HEYOKA = "heyoka:tol=1e-15,frame=base_vectors"
 
 
@@ -31,7 +34,9 @@ def differences(block, method, bodies):
         (f"{HEYOKA},driver=ensemble", TOPS, 1e-13),  # the same
         ("mujoco:RK4", TOPS, 1e-14),  # measured 9e-16
         ("mujoco:RK4,threads=2", FREE, 1e-14),
+        ("mujoco:RK4,threads=2", ATTRACTED, 1e-14),
         ("pinocchio:scheme=RK4", TOPS, 1e-14),
+        ("pinocchio:scheme=RK4", ATTRACTED, 1e-14),
     ],
 )
 def test_many_bodies_equal_their_single_runs(name, bodies, allowed):
