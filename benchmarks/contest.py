@@ -3,6 +3,9 @@
 Errors of single settings scatter: a coarse setting can be accurate by accident. A setting is therefore credited with the
 largest error of itself and of all finer settings of its line. The cost of an error between two settings is interpolated
 (log-log), which is exact for a method with an order. Nothing is extrapolated.
+
+If several processes measured the times, the ratio of two sides has a value in each, and an interval. A body counts as won or
+lost only if 1 is outside of its interval; otherwise it is open.
 """
 
 from __future__ import annotations
@@ -10,19 +13,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import accumulate
+from functools import cached_property, lru_cache
+from itertools import accumulate, zip_longest
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from conservative.attitude import Array
 
 SMALLEST = 1e-17
 """Replaces an error of 0."""
 LINE = ("scene", "name", "family", "class")
 """Columns of points that identify a line of settings."""
 CONFIDENCE = 0.95
-"""Confidence of the interval of a geometric mean."""
+"""Confidence of intervals."""
+RESAMPLES = 4999
 
 
 def credit(errors: Sequence[float]) -> list[float]:
@@ -66,7 +72,8 @@ def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = L
     Parameters
     ----------
     points
-        Columns of `line`, `error` and `time`; the settings of each line coarse to fine. A time of NaN was not measured.
+        Columns of `line`, `error` and `time`; the settings of each line coarse to fine. A time of NaN was not measured. An
+        optional column `times` has the times of each process instead.
     errors
         Errors, in the unit of the column `error`.
     line
@@ -75,26 +82,35 @@ def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = L
     Returns
     -------
     pd.DataFrame
-        Columns of `line`, then `error` and `time`, in the order of the points, each line at the errors in their order.
+        Columns of `line`, then `error`, `time` (the geometric mean over processes) and `times` (of each process), in the order
+        of the points, each line at the errors in their order.
     """
     import pandas as pd  # here, so that studies can use this module without it
 
-    rows = [
-        (*key, error, time)
-        for key, settings in points.groupby(list(line), sort=False)
-        for measured, times in [(settings["error"].tolist(), settings["time"].tolist())]
-        for error in errors
-        if not math.isnan(time := cost(measured, times, error))
-    ]
-    return pd.DataFrame(rows, columns=[*line, "error", "time"])
+    rows = []
+    for key, settings in points.groupby(list(line), sort=False):
+        measured = settings["error"].tolist()
+        processes = _by_process(settings["times"] if "times" in settings else [(time,) for time in settings["time"]])
+        for error in errors:
+            times = tuple(cost(measured, each, error) for each in processes)
+            if known := [math.log(time) for time in times if not math.isnan(time)]:
+                rows.append((*key, error, math.exp(math.fsum(known) / len(known)), times))
+    return pd.DataFrame(rows, columns=[*line, "error", "time", "times"])
+
+
+def _by_process(times: Iterable[tuple[float, ...] | float]) -> list[tuple[float, ...]]:
+    """Return the times of settings (a tuple for each, NaN if it was not timed) by process."""
+    rows = [each if isinstance(each, tuple) else (each,) for each in times]
+    return list(zip_longest(*rows, fillvalue=math.nan))
 
 
 @dataclass(frozen=True)
 class Cheapest:
-    """The cheapest line of a side at an error: its time, s per simulated second, and its name."""
+    """The cheapest line of a side at an error: its time, s per simulated second, its name, and its time in each process."""
 
     time: float
     name: str
+    times: tuple[float, ...] = ()
 
 
 def cheapest(reached: pd.DataFrame) -> Cheapest | None:
@@ -102,7 +118,7 @@ def cheapest(reached: pd.DataFrame) -> Cheapest | None:
     if reached.empty:
         return None
     first = reached.iloc[int(reached["time"].argmin())]
-    return Cheapest(float(first["time"]), str(first["name"]))
+    return Cheapest(float(first["time"]), str(first["name"]), first["times"])
 
 
 @dataclass(frozen=True)
@@ -114,15 +130,68 @@ class Contest:
     ours: Cheapest | None
     theirs: Cheapest | None
 
+    @cached_property
+    def logs(self) -> list[float]:
+        """Logarithm of their time divided by ours, in each process; empty if a side does not reach the error."""
+        if not (self.ours and self.theirs):
+            return []
+        pairs = zip(self.theirs.times, self.ours.times, strict=False)
+        known = [math.log(theirs / ours) for theirs, ours in pairs if not math.isnan(theirs + ours)]
+        return known or [math.log(self.theirs.time / self.ours.time)]
+
     @property
     def ratio(self) -> float:
         """Their time divided by ours, above 1 if ours is faster; NaN if a side does not reach the error."""
-        return self.theirs.time / self.ours.time if self.ours and self.theirs else math.nan
+        return math.exp(math.fsum(self.logs) / len(self.logs)) if self.logs else math.nan
+
+    @cached_property
+    def interval(self) -> tuple[float, float]:
+        """Interval of the ratio over processes; NaN for fewer than two."""
+        return bootstrap([self.logs])
 
     @property
     def lost(self) -> bool:
-        """True if theirs is faster, or is the only side that reaches the error."""
-        return self.theirs is not None and (self.ours is None or self.ratio < 1)
+        """True if theirs is faster, beyond the interval if there is one, or is the only side that reaches the error."""
+        return self.theirs is not None and (self.ours is None or self._last(1) < 1)
+
+    @property
+    def won(self) -> bool:
+        """True if ours is faster, beyond the interval if there is one, or is the only side that reaches the error."""
+        return self.ours is not None and (self.theirs is None or self._last(0) > 1)
+
+    def _last(self, end: int) -> float:
+        return self.ratio if math.isnan(self.interval[end]) else self.interval[end]
+
+
+def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Return the interval of exp(mean) of logarithms of ratios: a row for each body, a column for each process.
+
+    Bodies and processes are resampled independently, so the interval contains the scatter of both (Owen 2007, The pigeonhole
+    bootstrap). Percentiles of a bootstrap of few values are too narrow; they are widened as by Hesterberg 2015 (What teachers
+    should know about the bootstrap, 5.3), for the number of bodies, or of processes for a single body: with five processes the
+    interval is about their range. NaN for a single value.
+    """
+    import numpy as np
+    from scipy.special import ndtr, stdtrit  # scipy.stats takes as long to import as everything else of a command
+
+    processes = min(map(len, logs), default=0)
+    values = np.array([row[:processes] for row in logs])
+    n = len(logs) if len(logs) > 1 else processes
+    if n < 2:
+        return math.nan, math.nan
+    bodies, times = (_resamples(count) for count in values.shape)
+    means = ((bodies @ values) * times).sum(axis=1)
+    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + CONFIDENCE) / 2))
+    low, high = np.quantile(means, (tail, 1 - tail))
+    return math.exp(low), math.exp(high)
+
+
+@lru_cache(maxsize=64)
+def _resamples(count: int) -> Array:
+    """Return the weights (RESAMPLES, count) of resampled values; the same every time."""
+    import numpy as np
+
+    return np.random.default_rng(count).multinomial(count, np.full(count, 1 / count), RESAMPLES) / count
 
 
 def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]) -> tuple[Contest, ...]:
@@ -134,7 +203,7 @@ def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], er
 def _cheapest_of_each(reached: pd.DataFrame) -> dict[tuple[str, float], Cheapest]:
     rows = reached.loc[reached.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(reached) else reached
     keys = zip(rows["scene"], rows["error"], strict=True)
-    return dict(zip(keys, map(Cheapest, rows["time"], rows["name"]), strict=True))
+    return dict(zip(keys, map(Cheapest, rows["time"], rows["name"], rows["times"]), strict=True))
 
 
 @dataclass(frozen=True)
@@ -159,22 +228,29 @@ class Ratios:
         return sum(each.ours is None and each.theirs is not None for each in self.contests)
 
     @property
-    def mean(self) -> float:
-        """Geometric mean; NaN without a ratio."""
-        return math.exp(math.fsum(self._logs) / len(self._logs)) if self.both else math.nan
+    def won(self) -> int:
+        """Number of bodies on which ours is faster beyond the interval of the body, or alone in reaching the error."""
+        return sum(each.won for each in self.contests)
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Interval of the geometric mean over bodies like these, from Student's t; NaN for fewer than two ratios."""
-        n = len(self.both)
-        if n < 2:
-            return math.nan, math.nan
-        from scipy.stats import t  # here, as importing it takes as long as everything else of a command
+    def lost(self) -> int:
+        """The same for theirs."""
+        return sum(each.lost for each in self.contests)
 
-        center = math.log(self.mean)
-        variance = math.fsum((log - center) ** 2 for log in self._logs) / (n - 1)
-        half = float(t.ppf((1 + CONFIDENCE) / 2, n - 1)) * math.sqrt(variance / n)
-        return math.exp(center - half), math.exp(center + half)
+    @property
+    def open(self) -> int:
+        """Number of bodies on which both sides reach the error and neither is faster beyond the interval."""
+        return sum(not (each.won or each.lost) for each in self.both)
+
+    @property
+    def mean(self) -> float:
+        """Geometric mean; NaN without a ratio."""
+        return math.exp(math.fsum(math.log(each.ratio) for each in self.both) / len(self.both)) if self.both else math.nan
+
+    @cached_property
+    def interval(self) -> tuple[float, float]:
+        """Interval of the geometric mean over bodies and processes like these (see `bootstrap`)."""
+        return bootstrap([each.logs for each in self.both])
 
     @property
     def worst(self) -> float:
@@ -185,7 +261,3 @@ class Ratios:
     def best(self) -> float:
         """Largest ratio; NaN without any."""
         return self.both[-1].ratio if self.both else math.nan
-
-    @property
-    def _logs(self) -> list[float]:
-        return [math.log(each.ratio) for each in self.both]

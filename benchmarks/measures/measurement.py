@@ -69,6 +69,8 @@ class Measurement(Subject):
     ----------
     bodies, way
         Number of bodies of a batch, and how they ran, such as "one at a time"; None and "" for a single body.
+    process
+        Number of the process that measured a time, if there are several (see `measures.processes`); otherwise None.
     quantity
         Invariant of a drift, or statistic of an error over many bodies; otherwise empty.
     measure, value
@@ -81,6 +83,7 @@ class Measurement(Subject):
 
     bodies: int | None = None
     way: str = ""
+    process: int | None = None
     quantity: str = ""
     measure: Measure
     value: float
@@ -99,12 +102,12 @@ class Samples(Subject):
 
 _SUBJECT = tuple(each.name for each in fields(Subject))
 _OUTCOME = ("outcome", "reason", "step", "time", "residual")
-COLUMNS = (*_SUBJECT, "bodies", "way", "quantity", "measure", "value", "unit", *_OUTCOME, "detail")
+COLUMNS = (*_SUBJECT, "bodies", "way", "process", "quantity", "measure", "value", "unit", *_OUTCOME, "detail")
 """Columns of the table of measurements, in order."""
 SAMPLE_COLUMNS = (*_SUBJECT, "quantity", "t", "value")
 """Columns of the table of samples, in order."""
-_NUMBERS = frozenset({"seed", "body", "dt", "bodies", "value", "step", "time", "residual", "t"})
-_COUNTS = ("seed", "body", "bodies")
+_NUMBERS = frozenset({"seed", "body", "dt", "bodies", "process", "value", "step", "time", "residual", "t"})
+_COUNTS = ("seed", "body", "bodies", "process")
 
 
 def flat(row: Measurement) -> dict[str, str | float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -62,12 +62,13 @@ class Case:
         subject = {"study": self.study, "scene": self.scene.name, **self.drawn._asdict(), **names_of(self.method)}
         return subject | {"role": Role(self.method.role), "dt": self.grid.dt}
 
-    def row(self, value: Value, outcome: Outcome = OK, detail: str = "") -> Measurement:
+    def row(self, value: Value, outcome: Outcome = OK, detail: str = "", process: int | None = None) -> Measurement:
         """Return one row."""
         return Measurement(
             **self._subject,
             bodies=self.bodies,
             way=self.way,
+            process=process,
             quantity=value.quantity,
             measure=value.measure,
             value=float(value.value),
@@ -79,9 +80,14 @@ class Case:
         """Return a row for each value."""
         return [self.row(value, outcome, detail) for value in values]
 
-    def time_row(self, measure: Measure, spent: float, timing: Timing) -> Measurement:
+    def time_row(self, measure: Measure, spent: float, timing: Timing, process: int | None = None) -> Measurement:
         """Return the row of a measured time, s; its detail is the number of rounds and calls."""
-        return self.row(Value(measure, spent), timing.outcome, str(timing) if timing.outcome.ok else "")
+        return self.row(Value(measure, spent), timing.outcome, str(timing) if timing.outcome.ok else "", process)
+
+    def time_rows(self, measure: Measure, timings: Sequence[Timing], unit: float) -> list[Measurement]:
+        """Return the row of each process; `unit` is what a call does, such as simulated seconds, so that times are per unit."""
+        numbers = range(len(timings)) if len(timings) > 1 else [None]
+        return [self.time_row(measure, each.minimum / unit, each, n) for n, each in zip(numbers, timings, strict=True)]
 
     def samples(self, quantity: str, t: Array, value: Array) -> Samples:
         """Return one line: values (n,) at times (n,), s."""

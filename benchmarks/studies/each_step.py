@@ -22,6 +22,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure
 from ..measures.measurement import Measurement
+from ..measures.processes import Processes
 from .case import Case
 from .line import list_settings, measure_line
 from .speed import Extend, keep_end, time_cases
@@ -46,14 +47,15 @@ KEPT: dict[Measure, Extend] = {Measure.TIME_SAMPLED: keep_each, Measure.TIME: ke
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the errors of every method up to the setting that reaches `ERROR`, and both times of that setting."""
     tell = study.count(progress, len(study.lines) + 1)
-    for scene in study.scenes:
-        truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
-        chosen: list[Case] = []
-        for method in study.lines:
-            tell(f"{scene.name}: errors of {method.name}")
-            chosen += yield from choose_setting(study, scene, method, truth)
-        tell(f"{scene.name}: timing {len(chosen)} methods")
-        yield from time_cases(study, chosen, KEPT)
+    with Processes(study.processes) as processes:
+        for scene in study.scenes:
+            truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
+            chosen: list[Case] = []
+            for method in study.lines:
+                tell(f"{scene.name}: errors of {method.name}")
+                chosen += yield from choose_setting(study, scene, method, truth)
+            tell(f"{scene.name}: timing {len(chosen)} methods")
+            yield from time_cases(study, chosen, KEPT, processes)
 
 
 def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Generator[Measurement, None, list[Case]]:

@@ -23,6 +23,7 @@ import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
@@ -39,7 +40,8 @@ from conservative.trajectory import Trajectory
 from ..contest import cost, list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..measures.timing import time_interleaved, wall_time
+from ..measures.processes import Processes
+from ..measures.timing import wall_time
 from .case import NOT_DRAWN, Case, Drawn, Success, outcome_of_error
 from .line import list_settings
 from .selection import Missing, tolerance_setting
@@ -85,7 +87,7 @@ class RandomStudy(Study):
 
 
 def random_study(
-    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False
+    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False, processes: int = 1
 ) -> RandomStudy:
     """Return the study of `bodies` random bodies in each field. The first bodies do not depend on the number.
 
@@ -98,7 +100,8 @@ def random_study(
     places = [(field, seed, index) for field in FIELDS for index in range(bodies)]
     scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
     drawn = tuple(Drawn(*place) for place in places)
-    return RandomStudy("random", scenes, methods, quick, skip_missing, remember_truths(precise), drawn=drawn)
+    find = remember_truths(precise)
+    return RandomStudy("random", scenes, methods, quick, skip_missing, find, processes=processes, drawn=drawn)
 
 
 def settings(method: Method) -> tuple[Method, ...]:
@@ -147,19 +150,20 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
     every = study.drawn if isinstance(study, RandomStudy) else (NOT_DRAWN,) * len(study.scenes)
     tell = study.count(progress, len(study.lines) + 2)
-    for scene, drawn in zip(study.scenes, every, strict=True):
-        tell(f"{scene.name}: truth")
-        coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
-        truth = study.truth(scene, coarsest).trajectory
-        lines: list[Line] = []
-        for method in study.lines:
-            tell(f"{scene.name}: errors of {method.name}")
-            cases = list_cases(Case(study.name, scene, method, coarsest, drawn), study.quick)
-            lines.append((yield from find_errors(study, cases, truth)))
-        chosen = worth_timing(lines)
-        tell(f"{scene.name}: timing {len(chosen)} settings")
-        yield from time_rows(study, chosen)
-        yield from (point.case.row(TIME, UNTIMED) for line in lines for point in line if point not in chosen)
+    with Processes(study.processes) as processes:
+        for scene, drawn in zip(study.scenes, every, strict=True):
+            tell(f"{scene.name}: truth")
+            coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
+            truth = study.truth(scene, coarsest).trajectory
+            lines: list[Line] = []
+            for method in study.lines:
+                tell(f"{scene.name}: errors of {method.name}")
+                cases = list_cases(Case(study.name, scene, method, coarsest, drawn), study.quick)
+                lines.append((yield from find_errors(study, cases, truth)))
+            chosen = worth_timing(lines)
+            tell(f"{scene.name}: timing {len(chosen)} settings")
+            yield from time_rows(study, chosen, processes)
+            yield from (point.case.row(TIME, UNTIMED) for line in lines for point in line if point not in chosen)
 
 
 def list_cases(case: Case, quick: bool = False) -> list[Case]:
@@ -210,8 +214,8 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     return list(chosen.values())
 
 
-def time_rows(study: Study, points: list[TimedSetting]) -> Iterator[Measurement]:
-    """Yield the times of the points of a body, s per simulated second, final state only, in interleaved rounds."""
+def time_rows(study: Study, points: list[TimedSetting], processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of the points of a body, s per simulated second, final state only, a row for each process."""
     runs: dict[tuple[int, Case], Run] = {}
     with time_limit(study.hang_limit):
         for number, point in enumerate(points):
@@ -221,9 +225,17 @@ def time_rows(study: Study, points: list[TimedSetting]) -> Iterator[Measurement]
                 yield point.case.row(TIME, run)
             else:
                 runs[number, case] = run
-        timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=BUDGET)
-    for (number, case), timing in timings.items():
-        yield points[number].case.time_row(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps), timing)
+        timings = processes.time(
+            runs,
+            {key: partial(key[1].method.prepare, key[1].scene, key[1].grid) for key in runs},
+            limit=study.hang_limit * (1 + len(runs)),
+            rounds=QUICK_ROUNDS if study.quick else ROUNDS,
+            min_time=CALL,
+            budget=BUDGET,
+            shared=[point.case.scene for point in points[:1]],
+        )
+    for (number, case), each in timings.items():
+        yield from points[number].case.time_rows(Measure.TIME, each, case.grid.dt * case.grid.n_steps)
 
 
 def lengthen(point: TimedSetting) -> Case:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
@@ -16,6 +17,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
+from ..measures.processes import Processes
 from ..measures.timing import Timing, time_interleaved, wall_time
 from .case import Case, Success
 from .study import Progress, Study
@@ -143,8 +145,10 @@ def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
         yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")
 
 
-def time_cases(study: Study, cases: Sequence[Case], extend: Mapping[Measure, Extend]) -> Iterator[Measurement]:
-    """Yield the times of cases, s per simulated second, all in interleaved rounds.
+def time_cases(
+    study: Study, cases: Sequence[Case], extend: Mapping[Measure, Extend], processes: Processes
+) -> Iterator[Measurement]:
+    """Yield the times of cases, s per simulated second, all in interleaved rounds, a row for each process.
 
     `extend` has the measures of each case, and the functions that lengthen the grid of their runs.
     """
@@ -156,7 +160,14 @@ def time_cases(study: Study, cases: Sequence[Case], extend: Mapping[Measure, Ext
                 yield case.row(Value(measure, math.nan), timed)
             else:
                 ready[case, measure] = timed
-    runs = {key: timed.done.run for key, timed in ready.items()}
-    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
-    for key, timing in timings.items():
-        yield ready[key].case.time_row(key[1], timing.minimum / ready[key].simulated, timing)
+    timings = processes.time(
+        {key: timed.done.run for key, timed in ready.items()},
+        {key: partial(timed.case.method.prepare, timed.case.scene, timed.case.grid) for key, timed in ready.items()},
+        limit=study.hang_limit * (1 + len(ready)),
+        rounds=min(study.rounds, ROUNDS),
+        min_time=CALL / 2,
+        budget=study.timing_budget / 2,
+        shared=list({case.scene: None for case in cases}),
+    )
+    for key, each in timings.items():
+        yield from ready[key].case.time_rows(key[1], each, ready[key].simulated)

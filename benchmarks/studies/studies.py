@@ -48,6 +48,8 @@ THROUGHPUT = "throughput"
 """Study of many random bodies."""
 MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
 """Studies of the selected scenes and methods in every report."""
+IN_TURN = ("random", "work_precision", "each_step")
+"""Studies of times that several processes measure in turn, in a full report and alone."""
 MORE = ("each_step", "sphere_curves", "paper_figures")
 """Studies of the same scenes and methods in a full report only."""
 
@@ -59,10 +61,17 @@ def cross_studies(
     quick: bool = False,
     skip_missing: bool = False,
     time_limit: float | None = None,
+    processes: int = 1,
 ) -> tuple[Study, ...]:
-    """Return the named studies of the same scenes and methods; they share their reference solutions."""
-    truths = remember_truths()
-    return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in names)
+    """Return the named studies of the same scenes and methods; they share their reference solutions.
+
+    Those in `IN_TURN` measure times in a number of `processes`.
+    """
+    truths, more = remember_truths(), {"time_limit": time_limit}
+    return tuple(
+        Study(name, scenes, methods, quick, skip_missing, truths, processes=processes if name in IN_TURN else 1, **more)
+        for name in names
+    )
 
 
 def list_hard_studies(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from conservative.check import positive_number
+from conservative.check import positive_integer, positive_number
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role
@@ -57,6 +57,8 @@ class Study:
         Source of reference solutions; studies of the same scenes can share it.
     time_limit
         Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
+    processes
+        Number of processes that time the same runs in turn, for an interval of each ratio; see `measures.processes`.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Study:
     skip_missing: bool = False
     truth: FindTruth = field(default_factory=remember_truths)
     time_limit: float | None = None
+    processes: int = 1
 
     @property
     def rounds(self) -> int:
@@ -119,6 +122,7 @@ class Study:
         for argument in ("scenes", "methods"):
             if not getattr(self, argument):
                 raise BadInput(argument, "none", "one or more")
+        positive_integer("processes", self.processes)
         if self.time_limit is not None:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
 

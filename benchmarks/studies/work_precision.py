@@ -10,6 +10,7 @@ from conservative.scene import Scene
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
+from ..measures.processes import Processes
 from . import step_ladder
 from .case import Case
 from .line import list_settings, measure_line
@@ -23,20 +24,21 @@ ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield error and time of every point. Rows of a point share scene, method and dt; those of a line share their series."""
     tell = study.count(progress, len(study.lines) + 1)
-    for scene in study.scenes:
-        good: list[Case] = []
-        for method in study.lines:
-            tell(f"{scene.name}: errors of {method.name}")
-            truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-            # More steps of a method of first order are slow and still inaccurate.
-            for point in measure_line(study, list_cases(study, scene, method, step_ladder.LENGTH), truth, ERRORS):
-                yield from point.rows()
-                if point.outcome.ok:
-                    good.append(point.case)
-                else:
-                    yield point.case.row(Value(Measure.TIME, math.nan), point.outcome)
-        tell(f"{scene.name}: timing {len(good)} points")
-        yield from time_cases(study, good, {Measure.TIME: keep_end})
+    with Processes(study.processes) as processes:
+        for scene in study.scenes:
+            good: list[Case] = []
+            for method in study.lines:
+                tell(f"{scene.name}: errors of {method.name}")
+                truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
+                # More steps of a method of first order are slow and still inaccurate.
+                for point in measure_line(study, list_cases(study, scene, method, step_ladder.LENGTH), truth, ERRORS):
+                    yield from point.rows()
+                    if point.outcome.ok:
+                        good.append(point.case)
+                    else:
+                        yield point.case.row(Value(Measure.TIME, math.nan), point.outcome)
+            tell(f"{scene.name}: timing {len(good)} points")
+            yield from time_cases(study, good, {Measure.TIME: keep_end}, processes)
 
 
 def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int | None = None) -> list[Case]:

@@ -29,7 +29,7 @@ MOST_MODULES = 16
 _idle: list[Worker] = []
 
 
-def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = ()) -> T:
+def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (), process: Worker | None = None) -> T:
     """Return the result of `work`, or raise its exception, if it takes no longer than `limit` seconds.
 
     It runs in another process, so its changes to objects are not visible here.
@@ -43,6 +43,8 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     shared
         Frozen, hashable objects that `work` refers to. They are sent once and kept; if the result contains them, they are the
         same objects again.
+    process
+        A `python_worker` that the caller closes. By default any idle one.
 
     Raises
     ------
@@ -59,10 +61,11 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     while True:
         kept = [_bytes_of(each, tuple(by_value)) for each in shared]
         content = dump((sys.path, _find_folder(), kept, dump(work, shared, by_value)))
-        worker = _take_idle() or python_worker(show_output=True)
+        worker = process or _take_idle() or python_worker(show_output=True)
         with time_limit(limit):
             answer = worker.ask("call", adapter=__name__, function="do", content=np.frombuffer(content, np.uint8))
-        _idle.append(worker)
+        if process is None:
+            _idle.append(worker)
         kind, result = answer["kind"], answer["content"].tobytes()
         if kind == "returned":
             return load(result, shared)

@@ -44,19 +44,24 @@ def points(
     -------
     pd.DataFrame
         Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see `classes`),
-        dt, error (rad) and time (s per simulated second); each line coarse to fine. An error below the resolution of the
-        reference solution is raised to it.
+        dt, error (rad), time (s per simulated second) and times (those of each process); each line coarse to fine. An error
+        below the resolution of the reference solution is raised to it.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)
-    values = {Measure.ATTITUDE_MAX.text: "error", time.text: "time"}
-    rows = rows[rows["measure"].isin(list(values)) & (rows["role"] != Role.TRUTH.value)]
-    wide = rows.pivot_table(index=_KEYS, columns="measure", values="value").reset_index()
-    wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys
-    wide = wide.reindex(columns=[*_KEYS, *values]).rename(columns=values)
+    rows = rows[rows["role"] != Role.TRUTH.value]
+    errors, timed = (rows[rows["measure"] == measure.text] for measure in (Measure.ATTITUDE_MAX, time))
+    wide = errors[[*_KEYS, "value"]].rename(columns={"value": "error"}).merge(pooled(timed, _KEYS), how="left", on=_KEYS)
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
     wide = wide.dropna(subset=["error"] if untimed else ["error", "time"]).reset_index(drop=True)
     kinds = [class_of(role, method).value for role, method in zip(wide["role"], wide["method"], strict=True)]
     return _name_lines(wide.assign(**{"class": pd.Series(kinds, index=wide.index, dtype="string")}))
+
+
+def pooled(timed: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Return rows of times with a row for each value of `keys`: `time`, the geometric mean, and `times`, of each process."""
+    wide = timed.assign(process=timed["process"].fillna(0)).pivot_table(index=keys, columns="process", values="value")
+    times = pd.Series([tuple(row) for row in wide.to_numpy()], dtype=object)
+    return wide.index.to_frame(index=False).assign(time=np.exp(np.log(wide).mean(axis=1)).to_numpy(), times=times)
 
 
 def all_points(table: pd.DataFrame) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms
 
-FORMAT = 3
+FORMAT = 4
 _BEGINNING = '{"format": '
 """First characters of every file of unfinished work."""
 _MOST_DIFFERENCES = 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, many_runs, random, selection, studies, throughput
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
@@ -29,7 +30,7 @@ class Plan:
     scenes, methods, engines
         What is compared. Engines have studies and a section of their own.
     studies
-        The studies, in the order of measurement. Each is measured in one process, so that its times can be compared.
+        The studies, in the order of measurement. Times of a full report are measured by several processes in turn.
     bodies, seed
         Number of random bodies in each field, and their seed.
     """
@@ -113,12 +114,13 @@ def plan_report(
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     made: list[Study] = []
     # Random bodies come first, as on the page. Methods that do not support them are not part of the study.
+    processes = PROCESSES if full and not quick else 1
     if bodies and (drawn := random.select(every)):
-        made.append(random.random_study(drawn, bodies, seed, quick, skip_missing))
+        made.append(random.random_study(drawn, bodies, seed, quick, skip_missing, processes))
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
-    made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit)
+    made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit, processes)
     if named:
         made += studies.cross_studies(studies.ENGINES, chosen, named, quick, skip_missing, time_limit)
     if full and not (names or quick):

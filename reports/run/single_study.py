@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
 from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.processes import PROCESSES, QUICK_PROCESSES
 from conservative.benchmarks.studies import (
     engine_selection,
     hard_cases,
@@ -71,9 +72,10 @@ def plan_study(
         named = selection.methods(methods or None, skip_missing, of_family.get(name, selection.all_variants))
         others = engine_selection.select_engines(engines, skip_missing) if engines else ()
         compared = tuple(dict.fromkeys((*named, *others)))
+    processes = (QUICK_PROCESSES if quick else PROCESSES) if name in studies.IN_TURN else 1
     if name == studies.RANDOM:
         number = DEFAULT_BODIES if bodies is None else bodies
-        return random.random_study(compared, number, seed or 0, quick, skip_missing)
+        return random.random_study(compared, number, seed or 0, quick, skip_missing, processes)
     if name == studies.THROUGHPUT:
         counts = tuple(read_count("sizes", size) for size in sizes)
         numbers = {"sizes": counts or None, "bodies": bodies, "seed": seed, "time_limit": time_limit}
@@ -86,7 +88,7 @@ def plan_study(
     else:
         usual = {"stability": lambda: selection.scenes(stability.SCENES), "hard_cases": hard_cases.scenes}
         chosen = usual.get(name, selection.scenes)()
-    return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit)
+    return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit, processes=processes)
 
 
 def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:

@@ -17,6 +17,7 @@ from ..charts.style import families_of
 from ..document.cells import DASH, grade_ratio, number, numeric, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, MethodClass, class_of
+from ..rows.points import pooled
 
 TERMS = (
     "All bodies differ: asymmetric, in rotated frames, heavy tops with no point on an axis, or free, drawn from a seed. "
@@ -66,7 +67,7 @@ def body_costs(rows: pd.DataFrame) -> pd.DataFrame:
     values = {measure: rows[rows["measure"] == measure.text] for measure in (Measure.ATTITUDE_MAX, Measure.TIME)}
     errors = values[Measure.ATTITUDE_MAX][[*setting, "quantity", "value"]].dropna()
     errors = errors.rename(columns={"quantity": "statistic", "value": "error"})
-    times = values[Measure.TIME][[*setting, "bodies", "value"]].dropna().rename(columns={"value": "time"})
+    times = pooled(values[Measure.TIME].dropna(subset=["value"]), [*setting, "bodies"])
     sizes = times[[*LINE, "bodies"]].drop_duplicates()  # each setting counts at each size, whether it was timed there or not
     points = errors.merge(sizes, on=LINE).merge(times, how="left", on=[*setting, "bodies"])
     reached = costs(points, ERRORS, [*LINE, "statistic", "bodies"])

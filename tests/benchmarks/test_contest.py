@@ -3,9 +3,21 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within, list_deciding
+from conservative.benchmarks.contest import (
+    SMALLEST,
+    Cheapest,
+    Contest,
+    Ratios,
+    bootstrap,
+    cost,
+    costs,
+    credit,
+    first_within,
+    list_deciding,
+)
 
 ERRORS, TIMES = [1e-1, 1e-3, 1e-5], [1.0, 2.0, 4.0]
 
@@ -63,21 +75,66 @@ def test_the_settings_that_decide_are_the_first_that_is_credited_and_the_one_bef
     assert list_deciding([1e-1, 1e-2, 1e-7, 1e-4, 1e-8], error) == deciding
 
 
-def ratios(*values):
-    return Ratios(
-        tuple(Contest(str(i), 1e-6, Cheapest(1.0, "ours"), Cheapest(value, "theirs")) for i, value in enumerate(values))
-    )
+def contest(*values, name="0"):
+    """Return a contest with these ratios in as many processes."""
+    return Contest(name, 1e-6, Cheapest(1.0, "ours", (1.0,) * len(values)), Cheapest(values[0], "theirs", values))
 
 
-def test_the_interval_of_the_mean_is_that_of_the_logarithms():
-    result = ratios(2.0, 4.0, 8.0)
-    half = 4.302652729911275 * math.log(2) / math.sqrt(3)  # Student's t of two degrees of freedom, 97.5 %
-    assert result.mean == pytest.approx(4.0)
-    assert result.interval == pytest.approx((4.0 * math.exp(-half), 4.0 * math.exp(half)))
-    assert all(map(math.isnan, ratios(2.0).interval))
+def ratios(*rows):
+    return Ratios(tuple(contest(*row, name=str(i)) for i, row in enumerate(rows)))
 
 
-def test_the_interval_holds_the_mean_as_often_as_it_should():
+def test_a_body_is_won_or_lost_only_outside_of_its_interval():
+    won, lost, even = contest(1.2, 1.3, 1.1, 1.2, 1.25), contest(0.8, 0.9, 0.85, 0.8, 0.9), contest(1.1, 0.95, 1.3, 1.2, 1.05)
+    assert won.ratio == pytest.approx((1.2 * 1.3 * 1.1 * 1.2 * 1.25) ** 0.2)
+    assert won.interval == pytest.approx((1.12, 1.29), abs=0.02)  # with five processes about their range
+    assert [(each.won, each.lost) for each in (won, lost, even)] == [(True, False), (False, True), (False, False)]
+    found = Ratios((won, lost, even, Contest("3", 1e-6, None, Cheapest(1.0, "theirs", (1.0,) * 5))))
+    assert (found.won, found.open, found.lost, found.only_theirs) == (1, 1, 2, 1)
+    assert contest(0.99).lost  # a single process has no interval
+
+
+def test_times_are_paired_by_process():
+    """A process that is slow for both sides changes no ratio, and one without a time of a side has none."""
+    ours, theirs = Cheapest(1.0, "ours", (1.0, 7.0, math.nan)), Cheapest(2.0, "theirs", (2.0, 14.0, 2.0))
+    slow = Contest("0", 1e-6, ours, theirs)
+    assert slow.interval == pytest.approx((2.0, 2.0))
+    assert len(slow.logs) == 2
+
+
+def test_costs_are_those_of_each_process():
+    lines = {"scene": "s", "name": "a", "family": "a", "class": "c", "error": ERRORS}
+    points = pd.DataFrame({**lines, "time": TIMES, "times": [(1.0, 2.0), (2.0, 4.0), math.nan]})
+    found = costs(points, [1e-2, 1e-5])
+    assert found["times"].tolist() == [pytest.approx((math.sqrt(2), 2 * math.sqrt(2)))]
+    assert found["time"].tolist() == [pytest.approx(2)]
+
+
+def share_within(bodies, processes, body=0.0, process=0.0, noise=0.0, trials=300):
+    """Return how often the interval of the mean contains the true one, for a scatter of bodies, processes and both."""
+    rng, inside = np.random.default_rng(7), 0
+    for _ in range(trials):
+        parts = rng.normal(0, body, (bodies, 1)), rng.normal(0, process, processes), rng.normal(0, noise, (bodies, processes))
+        low, high = bootstrap(sum(parts).tolist())
+        inside += low <= 1.0 <= high
+    return inside / trials
+
+
+@pytest.mark.parametrize(
+    ("count", "scatter", "measured"),
+    [
+        ((10, 1), {"body": 0.3}, 0.933),
+        ((1, 5), {"noise": 0.03}, 0.903),
+        ((20, 5), {"body": 0.2, "noise": 0.05}, 0.947),
+        ((20, 5), {"body": 0.05, "process": 0.05}, 0.903),
+    ],
+)
+def test_the_interval_holds_the_mean_as_often_as_it_should(count, scatter, measured):
+    assert share_within(*count, **scatter) == pytest.approx(measured, abs=0.03)
+
+
+def test_without_the_scatter_of_processes_the_interval_would_be_too_narrow():
     rng = np.random.default_rng(7)
-    result = [ratios(*np.exp(rng.normal(0.5, 0.3, 10))).interval for _ in range(400)]
-    assert 0.92 < np.mean([low <= math.exp(0.5) <= high for low, high in result]) < 0.98  # measured 0.935
+    logs = 0.05 * rng.normal(size=5) + 0.01 * rng.normal(size=(20, 1))
+    both, bodies = (np.ptp(np.log(bootstrap(each.tolist()))) for each in (logs, logs.mean(axis=1, keepdims=True)))
+    assert both > 3 * bodies

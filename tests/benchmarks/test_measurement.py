@@ -24,7 +24,7 @@ ROW = Measurement(
     value=1e-15,
 )
 FAILED = dataclasses.replace(ROW, value=math.nan, outcome=Outcome(OutcomeKind.NOT_CONVERGED, "why", 3, 0.02, 0.5))
-NUMBERS = {"seed", "body", "bodies", "dt", "value", "step", "time", "residual"}
+NUMBERS = {"seed", "body", "bodies", "process", "dt", "value", "step", "time", "residual"}
 LINE = Samples(
     study="long_runs",
     scene="brick_flip",

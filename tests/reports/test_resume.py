@@ -113,7 +113,7 @@ def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    "content", ['{"format": 99, "studies": {}}', '{"format": 3, "studies": {"paper": {}}}', '{"format": 3, "comm']
+    "content", ['{"format": 99, "studies": {}}', '{"format": 4, "studies": {"paper": {}}}', '{"format": 4, "comm']
 )
 def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -31,7 +31,7 @@ def contest(error, *groups):
 def test_the_cheapest_of_several_lines_counts():
     dear = (point("dear", "ours", 1e-4, 5.0), point("dearer", "engine", 1e-4, 90.0))
     found = contest(1e-4, *OURS, *ENGINE, *dear)
-    assert found.ours == Cheapest(4.0, "ours")
+    assert found.ours == Cheapest(4.0, "ours", (4.0,))
     assert found.theirs.name == "engine"
 
 
