@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, rotation_about, triple
+from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, hat, rotation_about, triple
 from ..check import build_unchecked, describe, finite_array, positive_number, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, PotentialFailed
@@ -33,7 +33,9 @@ class FunctionPotential:
 
         V* = G + (V(R1) - V(R0) - <G, D>) / <D, D> D        G = dV/dR at Rbar
 
-    It conserves energy to round-off for any V. For tiny steps, where the numerator is only round-off, V* = G.
+    It conserves energy to round-off for any V. For tiny steps, where the numerator is only round-off, V* = G. With
+    `axis_W` the last D is the part of D that changes R' axis_W. The momentum about the axis is then conserved to round-off as
+    well (DERIVATION.md, section 5).
 
     If the functions depend on time, energy is not conserved, and the only invariant is the momentum about `axis_W`. `Projected`
     and SciPy support this.
@@ -108,12 +110,22 @@ class FunctionPotential:
         V_1 = self.energy.at(R_1)
         mean, step = (R_0 + R_1) / 2, R_1 - R_0
         gradient = self.gradient.at(mean)
-        along = float(np.sum(gradient * step))
+        along_step = step
+        if self.axis_W is not None:
+            # Neither part of V* may have a torque about the axis e. That of the gradient at the mean, which is not a rotation, is
+            # 0 unless the functions are symmetric on rotations only.
+            e = self.axis_W
+            turn = hat(e) @ mean
+            gradient = gradient - np.sum(gradient * turn) / np.sum(turn * turn) * turn
+            along_step = np.outer(e, e @ step)
+        along, square = float(np.sum(gradient * step)), float(np.sum(along_step * step))
         lacking = V_1 - V_0 - along
-        # The last is what rounding the attitude changes V by, which is more than V where V is small by cancellation.
-        if abs(lacking) <= _ROUND_OFF * (abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())):
+        # The last is what rounding the attitude changes V by, which is more than V where V is small by cancellation. In a spin
+        # about the axis nothing else is lacking, and the square is 0 or round-off.
+        size = abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())
+        if square == 0 or abs(lacking) <= _ROUND_OFF * size:
             return gradient
-        return gradient + lacking / np.sum(step * step) * step
+        return gradient + lacking / square * along_step
 
     def in_units(self, energy: float, time: float = 1.0) -> FunctionPotential:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
