@@ -112,8 +112,8 @@ class FunctionPotential:
         gradient = self.gradient.at(mean)
         along_step = step
         if self.axis_W is not None:
-            # Neither part of V* may have a torque about the axis e. That of the gradient at the mean, which is not a rotation, is
-            # 0 unless the functions are symmetric on rotations only.
+            # Neither part of V* may have a torque about the axis e. The gradient has one if the functions are symmetric on
+            # rotations only: the mean is not a rotation.
             e = self.axis_W
             turn = hat(e) @ mean
             gradient = gradient - np.sum(gradient * turn) / np.sum(turn * turn) * turn

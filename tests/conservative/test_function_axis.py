@@ -18,7 +18,7 @@ QUARTIC = cv.FunctionPotential(
 
 
 def polynomial(seed):
-    """Return a scene with a random V of g = R'e, of degree 4 to 6: a product of powers; body, frames and axis are random too."""
+    """Return a scene with a random V of g = R'e, of degree 4 to 6; body, frames and axis are random too."""
     rng = np.random.default_rng(seed)
     e, b, c = (x / np.linalg.norm(x) for x in rng.normal(size=(3, 3)))
     powers, size = rng.integers(2, 4, 2), rng.uniform(2, 6)
@@ -100,8 +100,8 @@ def test_the_step_is_symmetric(scene):
 
 @pytest.mark.parametrize("exponent", [*range(1, 17, 2), math.inf])
 def test_a_spin_about_the_axis_with_any_disturbance(exponent):
-    # The axis hardly moves in the body, or not at all. The difference of energies is then round-off, here of 100 J, and must not
-    # be divided by that motion.
+    # The axis hardly moves in the body, or not at all. The difference of energies is then round-off, here of 100 J, and must
+    # not be divided by that motion.
     turn = rotation_about((3, -1, 2), 1.3)
     w, field = turn @ (10.0**-exponent, 0, 9), other_rows(turn[:, 2], 3, 1, 100)
     scene = cv.Scene("sleeping", body_in_axes(turn, 1.0, 1.6, 2.2), turn.T, w, 5.0, field)
