@@ -1,13 +1,13 @@
 """Gauss collocation for a body with a fixed point in uniform gravity or without a field.
 
 Unknowns are the momentum L and the vertical gamma = R' e_z, both in principal axes (for a free body gamma is the direction of
-the world momentum): a closed system of six with quadratic invariants only,
+the world momentum): a closed system of six,
 
     L' = L x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
 
-energy L.w/2 + c.gamma, L.gamma and gamma.gamma, which collocation at Gauss points keeps whatever the step. What is left of the
-attitude is one angle about the vertical, a quadrature. With the minimal rotation M that takes gamma to a unit vector a fixed in
-the body, and a constant rotation C that takes a to e_z,
+with the quadratic invariants energy L.w/2 + c.gamma, L.gamma and gamma.gamma, which collocation at Gauss points keeps at any
+step. What is left of the attitude is one angle about the vertical, a quadrature. With the minimal rotation M that takes gamma
+to a unit vector a fixed in the body, and a constant rotation C that takes a to e_z,
 
     R = Rz(phi) C M(gamma),    phi' = w.(gamma + a) / (1 + gamma.a),    R1 = Rz(phi1 - phi0) R0 M(gamma0)' M(gamma1).
 
