@@ -12,8 +12,9 @@ conserved instead of the energy, and the momentum about the axis is not conserve
 The coefficients of a step come from the field's recurrence (`series`). After the step, g and a are made orthonormal. Energy and
 momentum about the axis are restored to their initial values as in `projected`: by Newton's method along their gradients with
 respect to L and to a rotation of the body. The series conserves the momentum about an axis of symmetry, so these gradients
-exclude it. The momentum of a free body is l g for any g, so w follows from g, and only the energy is restored. Source: E.
-Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
+exclude it. The momentum of a free body is l g for any g, so w follows from g, and only the energy is restored. One correction
+leaves the square of a step's error, which is enough between samples; samples are corrected to round-off. Source: E. Hairer, C.
+Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 """
 
 from __future__ import annotations
@@ -38,7 +39,10 @@ PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
 ENOUGH, NOISE = 2.0**-50, 2.0**-46
-"""Relative defect after which no further correction is made, and the largest defect that round-off alone can cause."""
+"""Relative defect after which a sample is not corrected further, and the largest defect that round-off alone can cause."""
+BETWEEN = 2.0**-24
+"""Relative defect after which a step is not corrected further. Each step is projected onto the initial values, so what is left
+does not add up, and it is at most 1/4096 of the step's own error, whose square it is."""
 ROUND_OFF = 2.0**-50
 """Relative defect up to which nothing is corrected."""
 FAR, LEFT = 0.1, 1e-6
@@ -239,7 +243,7 @@ def find_correction(field, constants, body, kept, scales, g, a, w):
 
 
 @trace
-def correct(field, body, g, a, w):
+def correct(field, body, enough, g, a, w):
     """Return (g, a, w) of `find_correction`, the relative defect that remains, and whether to correct once more.
 
     The square of the defect remains, and the share that regularisation leaves of the part above round-off.
@@ -247,20 +251,18 @@ def correct(field, body, g, a, w):
     g, a, w, defect, rest = find_correction(field, *body, g, a, w)
     beyond_noise = choose(defect > NOISE, defect - NOISE, 0.0)
     left = defect * defect + choose(rest < 1.0, rest, 1.0) * beyond_noise
-    return g, a, w, left, (left > ENOUGH) & (defect < FAR)
+    return g, a, w, left, (left > enough) & (defect < FAR)
 
 
 @partial(kernel, forceinline=True)
-def project(field, body, g, a, w, active):
+def project(field, body, enough, g, a, w, left, needed):
     """Return (g, a, w) projected onto the invariants, the number of corrections, and the relative defect that remains.
 
-    Bodies that are not active, and those that need no further correction, do not change.
+    Bodies that need no correction, or none after some corrections, do not change. `left` is their defect before.
     """
-    g, a, w, left, needed = correct(field, body, g, a, w)
-    needed = needed & active
-    corrections = 1
+    corrections = 0
     while corrections < MOST_CORRECTIONS and some(needed):
-        g1, a1, w1, left1, needed1 = correct(field, body, g, a, w)
+        g1, a1, w1, left1, needed1 = correct(field, body, enough, g, a, w)
         g, a, w, left = choose(needed, (g1, a1, w1, left1), (g, a, w, left))
         needed = needed & needed1
         corrections += 1
@@ -308,8 +310,9 @@ def march(model, coefficients, workspace):
                     longest = SAFETY * factor * part
                 left_over -= part
                 taken += 1
-                g, a, w, more, defect = project(field, body, g1, a1, w1, True)
-                corrections += more
+                g, a, w, defect, needed = correct(field, body, BETWEEN, g1, a1, w1)
+                g, a, w, more, defect = project(field, body, BETWEEN, g, a, w, defect, needed)
+                corrections += 1 + more
                 if tolerance > 0.0:
                     rest = left_over if left_over > 0.0 else h
                     part = rest / math.ceil(rest / longest) if longest < rest else rest
@@ -321,7 +324,10 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or done == n_steps:
                 until_sample = every
                 row += 1
-                record(row, product(left, quaternion(g, a)), times(model.J, w), q_out, L_out)
+                # The motion continues from the state before, so that it does not depend on the samples.
+                g1, a1, w1, more, _ = project(field, body, ENOUGH, g, a, w, defect, defect > ENOUGH)
+                corrections += more
+                record(row, product(left, quaternion(g1, a1)), times(model.J, w1), q_out, L_out)
         if done < n_steps:
             call_handlers()
     return Result(done, parts * order, corrections, computed * order, defect, False)
@@ -399,12 +405,15 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
             end = min(until, sampled)
             while step < end:
                 (g, a, w), _, _ = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
-                g, a, w, _, left = project(bodies.field, body, g, a, w, failed < 0.5)
+                g, a, w, left, needed = correct(bodies.field, body, BETWEEN, g, a, w)
+                g, a, w, _, left = project(bodies.field, body, BETWEEN, g, a, w, left, needed & (failed < 0.5))
                 failed = choose(left < LEFT, failed, failed + 1.0)
                 step += 1
             if step == sampled:
                 turn = load_rows(turns.reshape(-1), 2 * n * min(row, len(turns) - 1) + at, n, 2, REGISTER)
-                sample = find_sample(bodies, turn, g, a, w)
+                needed = (left > ENOUGH) & (failed < 0.5)
+                g1, a1, w1, _, _ = project(bodies.field, body, ENOUGH, g, a, w, left, needed)
+                sample = find_sample(bodies, turn, g1, a1, w1)
                 save_columns(R_WB, 9 * (at * samples + row), 9 * samples, sample[:9])
                 save_columns(w_WB_B, 3 * (at * samples + row), 3 * samples, sample[9:])
         save_rows(motions.reshape(-1), at, n, (g, a, w, failed))
