@@ -19,12 +19,15 @@ Simulator: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_simulator
 Its defaults: https://github.com/RobotLocomotion/drake/blob/master/systems/analysis/simulator_config.h
 Fixed steps: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_integrator_base.html
 BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball_rpy_joint.html
+Springs: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_linear_spring_damper.html
 No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
 """
 
 from contextlib import suppress
 
 import numpy as np
+
+from .shared import FIELDS, field_torque, pack_field
 
 ENGINE = {
     "package": "drake",
@@ -37,7 +40,7 @@ ENGINE = {
         **{"radau1": 1, "radau3": 3},
     },
     "tolerance": "accuracy",
-    "fields": ("UniformGravity",),
+    "fields": FIELDS,
     "card": {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10"),
         "suite": ("discrete", "runge_kutta5"),
@@ -109,11 +112,32 @@ def _build(drake, given):
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -given.gravity])
     if not given.free:
         plant.AddJoint(drake.BallRpyJoint("support", plant.world_frame(), body.body_frame()))
+    native = given.rest_length and not given.turn.any()
+    if native:
+        ends = plant.world_body(), given.anchor, body, given.point
+        plant.AddForceElement(drake.LinearSpringDamper(*ends, given.rest_length, given.stiffness, 0.0))
     plant.Finalize()
+    if not native and pack_field(given).any():
+        field = builder.AddSystem(_field_system(drake, pack_field(given).tolist()))
+        builder.Connect(plant.get_state_output_port(), field.get_input_port())
+        builder.Connect(field.get_output_port(), plant.get_applied_generalized_force_input_port())
     simulator = drake.Simulator(builder.Build())
     if not discrete:
         _choose(drake, simulator, given)
     return plant, body, simulator
+
+
+def _field_system(drake, field):
+    """Return a system whose input is the state of a `BallRpyJoint`, and whose output is its torque, which is in world axes."""
+    system = drake.LeafSystem()
+    state = system.DeclareVectorInputPort("state", 6)
+
+    def torque(context, output):
+        R = drake.RollPitchYaw(state.Eval(context)[:3]).ToRotationMatrix().matrix()
+        output.SetFromVector(R @ field_torque(field, R.ravel().tolist(), context.get_time()))
+
+    system.DeclareVectorOutputPort("torque", 3, torque)
+    return system
 
 
 def _choose(drake, simulator, given):

@@ -2,8 +2,9 @@
 
 Explicit integrators work on the Lie group (`useLieGroupIntegration`), with a rotation vector as the node's coordinates; so do
 the implicit ones, with a full Newton iteration to 1e-12. Explicit ones support no joints. A body about a fixed point is
-therefore a free body with the moments about that point as its central ones and two loads: its weight at the centre of mass,
-and the reaction force of the support at the fixed point. Switched off: files of solutions (`writeSolutionToFile`),
+therefore a free body with the moments about that point as its central ones, so heavy that this point stays. Its weight is a
+force at the centre of mass, and a spring is an `ObjectConnectorSpringDamper`. All other fields are a torque from a user
+function in Python, in each evaluation. Switched off: files of solutions (`writeSolutionToFile`),
 accelerations at the end of a step (`computeEndOfStepAccelerations`), adaptive steps (`automaticStepSize`). Each call includes
 the start of a solver.
 
@@ -22,6 +23,8 @@ Settings: https://exudyn.readthedocs.io/en/latest/docs/RST/structures/Structures
 
 import numpy as np
 
+from .shared import FIELDS, field_torque, pack_field
+
 ENGINE = {
     "package": "exudyn",
     "module": "exudyn",
@@ -31,7 +34,7 @@ ENGINE = {
         **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
         **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
     },
-    "fields": ("UniformGravity",),
+    "fields": FIELDS,
     "card": {
         "variants": ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"),
         "suite": ("RK44", "RK67"),
@@ -40,6 +43,8 @@ ENGINE = {
 }
 
 EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "VelocityVerlet")
+HEAVY = 1e25
+"""Mass of a body about a fixed point over its largest moment, 1/m^2: forces move that point by less than round-off."""
 
 
 def prepare(given):
@@ -50,8 +55,9 @@ def prepare(given):
     mbs, default = exu.SystemContainer().AddSystem(), given.integrator == "default"
     # The explicit integrators raise with the default, Euler parameters.
     kind = {} if default else {"nodeType": exu.NodeType.RotationRotationVector}
+    mass = given.mass if given.free else HEAVY * given.moments.max()
     body = mbs.CreateRigidBody(
-        inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
+        inertia=RigidBodyInertia(mass=mass, inertiaTensor=np.diag(given.moments)),
         referenceRotationMatrix=given.R0,
         initialAngularVelocity=given.w0_W,
         **kind,
@@ -76,12 +82,28 @@ def prepare(given):
 
 
 def _load(mbs, body, given):
-    """Add the weight at the centre of mass, and the reaction force at the fixed point."""
-    from exudyn.itemInterface import LoadForceVector, MarkerBodyRigid
+    """Add the weight or the field to a body."""
+    from exudyn import OutputVariableType
+    from exudyn.itemInterface import LoadForceVector, LoadTorqueVector, MarkerBodyRigid, ObjectConnectorSpringDamper
 
-    for place, sign in ((given.com, -1), (np.zeros(3), 1)) if given.gravity else ():
-        marker = mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=place.tolist()))
-        mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=[0, 0, sign * given.mass * given.gravity]))
+    def mark(place, body=body):
+        return mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=place.tolist()))
+
+    field = pack_field(given).tolist()
+    if given.gravity:
+        mbs.AddLoad(LoadForceVector(markerNumber=mark(given.com), loadVector=[0, 0, -given.mass * given.gravity]))
+    elif given.stiffness and not given.turn.any():
+        ends = [mark(given.point), mark(given.anchor, mbs.CreateGround())]
+        length = {"referenceLength": given.rest_length, "stiffness": given.stiffness}
+        mbs.AddObject(ObjectConnectorSpringDamper(markerNumbers=ends, **length))
+    elif any(field):
+
+        def torque(mbs, t, _):
+            R = mbs.GetObjectOutputBody(body, OutputVariableType.RotationMatrix, [0, 0, 0])
+            return field_torque(field, R.tolist(), t)
+
+        load = {"bodyFixed": True, "loadVectorUserFunction": torque}
+        mbs.AddLoad(LoadTorqueVector(markerNumber=mark(np.zeros(3)), **load))
 
 
 def _settings(exu, given):
