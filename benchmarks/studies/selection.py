@@ -13,7 +13,7 @@ from conservative.method import Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
-TOLERANCES = ("tol", "rtol", "tolerance")
+TOLERANCES = ("tol", "rtol", "tolerance", "accuracy")
 """Settings that control the accuracy of adaptive methods instead of dt."""
 
 Settings = Callable[[Method], tuple[Method, ...]]
@@ -131,7 +131,7 @@ def at_tolerance(method: Method, setting: str, tolerance: float | None) -> Metho
 def series(method: Method) -> str:
     """Return the name of a line in a chart: the name of the method without its tolerance.
 
-    Without a tolerance, `Taylor` makes the steps of the grid, so its adaptive line is `taylor:tolerance`.
+    Without a tolerance, `Taylor` and some engines make the steps of the grid, so the adaptive line is `taylor:tolerance`.
     """
     setting = tolerance_setting(method)
     if setting is None:
@@ -144,7 +144,9 @@ def series_setting(method: Method) -> str:
     """Return the setting of a line in tables: that of the method without its tolerance (see `series`)."""
     setting = tolerance_setting(method)
     text = method.setting(without=setting)
-    return text if setting is None or _default(method, setting) is not None else ",".join(filter(None, (text, setting)))
+    if setting is None or tolerance_setting(at_tolerance(method, setting, _default(method, setting))):
+        return text
+    return ",".join(filter(None, (text, setting)))
 
 
 def _default(method: Method, setting: str) -> Any:

@@ -24,8 +24,8 @@ ENGINE = {
     "tolerance": "rtol",
     "fields": ("UniformGravity",),
     "card": {
-        "variants": ("", "Dopri8", "Dopri8,rtol=1e-9"),
-        "suite": ("", "Dopri8,rtol=1e-9"),
+        "variants": ("", "Dopri8", "Dopri8,rtol=1e-12"),
+        "suite": ("", "Dopri8,rtol=1e-12"),
     },
 }
 

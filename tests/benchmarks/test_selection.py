@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from types import ModuleType
 from typing import ClassVar
 
 import pytest
@@ -10,12 +11,14 @@ from conservative import BadInput, MissingEngine, Reduced, Taylor, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
+from conservative.benchmarks.studies.line import list_settings
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, methods, series, tolerance_setting
 from conservative.benchmarks.suite.points import Point
 from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.outcome import OutcomeKind
+from conservative.references.environments.adapter import LocalEngine, method_class
 from conservative.references.environments.environment import Environment, MissingEnvironment
 
 from .generic_study import SCENE
@@ -203,6 +206,20 @@ def test_a_method_of_another_package_has_its_version_and_its_name_once():
     selected = names_of(Adaptive(stol=4, tol=1e-9))
     assert (selected["family"], selected["version"], selected["setting"]) == ("adaptive", "1.0", "stol=4,tol=1e-09")
     assert (selected["series"], selected["series_setting"]) == ("adaptive:stol=4", "stol=4")
+
+
+def test_steps_and_accuracies_of_an_engine_are_two_lines():
+    """Drake's, OpenSim's and Diffrax's tolerances are lines, apart from the same integrator's fixed steps."""
+    settings = {"integrator": "RK5", "accuracy": 0.0}
+    module = ModuleType("engines.stepped")
+    module.ENGINE = {"package": "numpy", "module": "numpy", "settings": settings, "orders": {"RK5": 5}, "tolerance": "accuracy"}
+    engine = method_class(module, LocalEngine)
+    fixed, loose, tight = engine(), engine("RK5", 1e-6), engine("RK5", 1e-12)
+    assert tolerance_setting(fixed) is None
+    assert tolerance_setting(loose) == "accuracy"
+    assert series(fixed) != series(loose) == series(tight) == "stepped:RK5,accuracy"
+    found = list_settings(Case("study", BRICK, loose, Grid(0.5, 12)), [], (2, 0.5, 1e-12))
+    assert [case.method for case in found] == [engine("RK5", 0.5), tight]  # 2 is out of range
 
 
 def test_a_method_with_a_missing_engine_has_the_name_that_was_given():
