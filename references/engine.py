@@ -9,6 +9,7 @@ Engines get the body in axes F in which its inertia is diagonal. Both conversion
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module, metadata
@@ -21,9 +22,12 @@ from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.grid import Grid
 from conservative.invariants import axial_direction
+from conservative.potentials.turning import Turning
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
-from conservative.trajectory import Counters, Trajectory, finite_prefix
+from conservative.trajectory import Counters, Trajectory
+
+from .samples import States, to_body_axes
 
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
@@ -113,18 +117,34 @@ class EngineAxes:
         return potential.moment_B @ self.R_BF if isinstance(potential, UniformGravity) else np.zeros(3)
 
     def trajectory(
-        self, grid: Grid, label: str, R_WF: Array, w: Array, work: Counters, reason: str = "the state is not finite"
+        self, grid: Grid, label: str, states: States, work: Counters, reason: str = "the state is not finite"
     ) -> Trajectory:
-        """Return the samples in body axes from attitudes (n, 3, 3) and rates (n, 3) in F.
+        """Return the samples in body axes from states of this body.
 
-        Samples end before the first that is not finite or missing; `reason` is the reason. Attitudes are returned unchanged, so
-        the norm error of an engine's quaternion is visible in `R_WB`.
+        Samples end before the first that is not finite or missing; `reason` is the reason.
         """
-        # A product for each matrix takes several times as long.
-        R_WB, w_WB_B = (R_WF.reshape(-1, 3) @ self.R_BF.T).reshape(R_WF.shape), w @ self.R_BF.T
-        good = finite_prefix(R_WB, w_WB_B)
+        R_WB, w_WB_B, finite = to_body_axes(grid.t, states, self.R_BF[None])
+        good = int(finite[0])
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
-        return Trajectory(self.scene, grid.t[:good], R_WB[:good], w_WB_B[:good], label, work, failure)
+        return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure)
+
+
+@dataclass(frozen=True, eq=False)
+class EngineRun:
+    """A run of an engine: its own loop, and the conversion of the result. A benchmark can time the loop alone."""
+
+    own_loop: Callable[[], Any]
+    convert: Callable[[Any], Trajectory]
+
+    def __call__(self) -> Trajectory:
+        return self.convert(self.own_loop())
+
+
+def orbit_turn(scene: Scene) -> Array | None:
+    """Return rate, rad/s, and axis of an orbit in which the scene's field is constant, as `samples.States` has it; or None."""
+    if not isinstance(scene.potential, Turning):
+        return None
+    return np.array([[scene.potential.orbit.rate, *scene.potential.orbit.normal_W]])
 
 
 def principal_axes(scene: Scene) -> EngineAxes:

@@ -18,7 +18,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from conservative.attitude import from_quaternion, to_quaternion
+from conservative.attitude import to_quaternion
 from conservative.card import Card, Maker
 from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
@@ -34,6 +34,7 @@ from conservative.trajectory import Counters, Trajectory
 
 from .engine import STEP_LIMIT, EngineAxes, limit_reason, pace_reason, version
 from .heyoka_equations import forms
+from .samples import QUATERNION, States
 
 Reals = NDArray[Any]
 """An array of `heyoka.real`."""
@@ -182,8 +183,7 @@ class Precise(Method):
         def run() -> Trajectory:
             reason, steps, reals = solve(t, scene)
             doubles = np.array([[float(x) for x in row] for row in reals]).reshape(-1, 7)
-            R_WB, work = from_quaternion(doubles[:, :4]), Counters(steps)
-            return axes.trajectory(grid, self.label, R_WB, doubles[:, 4:], work, reason)
+            return axes.trajectory(grid, self.label, States(QUATERNION, doubles[None]), Counters(steps), reason)
 
         return run
 

@@ -35,6 +35,7 @@ class Measure(Enum):
     BODY_STEPS = "body-steps per second", "1/s"
     TIME = "time per simulated second", "s/s"
     TIME_SAMPLED = "time per simulated second, each step kept", "s/s"
+    TIME_OWN_LOOP = "time per simulated second, each step kept, engine's own loop", "s/s"
     TIME_MEDIAN = "time per simulated second median", "s/s"
     PREPARE = "prepare time", "s"
     FIRST_CALL = "first call time", "s"

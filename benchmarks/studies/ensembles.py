@@ -1,4 +1,4 @@
-"""Ensembles of thousands of different random bodies of one kind.
+"""Ensembles of thousands of random bodies of one kind: all different, or many starts of one heavy top.
 
 Body number i does not depend on the number of bodies. Bodies are drawn with NumPy's PCG64 from (seed, number of the kind):
 
@@ -6,7 +6,9 @@ Body number i does not depend on the number of bodies. Bodies are drawn with Num
   is 1 kg m^2 and the condition at most 5.5;
 * principal axes and initial attitude: rotations uniform on the group, so inertias are full matrices;
 * initial rates: normal, 2 rad/s along each axis, with a median of 3.2 rad/s;
-* heavy tops: centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform.
+* heavy tops: centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform;
+* one body: the first body of these draws, weight times distance such that the motion lasts 20 characteristic times, the square
+  root of the mean moment of inertia over weight times distance. Only initial attitudes and rates differ.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from conservative.check import choice
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-KINDS = ("heavy_tops", "free_bodies")
+KINDS = ("heavy_tops", "free_bodies", "one_body")
 DURATION = 12.0
 """Length of the motion, s."""
 RATE = 2.0
@@ -43,10 +45,10 @@ def draw(kind: str, n: int, seed: int = 0) -> Batch:
     inertia = (inertia + inertia.swapaxes(1, 2)) / 2
     parameters: dict[str, Array] = {}
     potential = None
-    if kind == "heavy_tops":  # with a weight of 1 N
+    if kind != "free_bodies":  # with a weight of 1 N
         direction, (low, high) = tables[4].standard_normal((n, 3)), MOMENT
-        length = (low + (high - low) * tables[5].random(n)) / np.linalg.norm(direction, axis=1)
-        parameters["com_B"] = direction * length[:, None]
+        length = (20 / DURATION) ** 2 if kind == "one_body" else low + (high - low) * tables[5].random(n)
+        parameters["com_B"] = direction * (length / np.linalg.norm(direction, axis=1))[:, None]
         potential = UniformGravity(1.0, parameters["com_B"][0])
     first = Scene(kind, RigidBody(inertia[0]), R_WB0[0], w_WB_B0[0], DURATION, potential, group="random", source="ours")
-    return Batch(first, R_WB0, w_WB_B0, inertia, parameters)
+    return Batch(first, R_WB0, w_WB_B0, None, {}) if kind == "one_body" else Batch(first, R_WB0, w_WB_B0, inertia, parameters)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,8 +22,9 @@ from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import STEP_LIMIT, limit_reason, pace_reason, symmetric_axes, version
+from ..engine import STEP_LIMIT, EngineRun, limit_reason, pace_reason, symmetric_axes, version
 from ..heyoka_equations import accelerations, forms, formulations
+from ..samples import States, to_body_axes
 
 FRAMES = ("body", "non_spinning", "lean", "base_vectors")
 _TOLERANCES_AND_FRAMES = tuple(f"tol={tol},frame={frame}" for frame in FRAMES[:3] for tol in ("1e-6", "1e-9", "1e-12", "1e-16"))
@@ -59,22 +60,28 @@ class Heyoka(Method):
         non-spinning frame if there is one, or base vectors. At equal error, base vectors take 17 to 30 % less time than "body"
         (measured in four fields).
     width, driver
-        Settings of `prepare_many` for the frames "body" and "base_vectors": the number of bodies in a batch, by default the
-        number that heyoka recommends for the processor; and whether batches run in a loop ("batch") or in heyoka's function for
-        ensembles, on one thread ("ensemble"). Other frames integrate one body at a time.
+        Settings of `prepare_many`: the number of bodies in a batch, by default the number that heyoka recommends for the
+        processor; and whether batches run in a loop ("batch") or in heyoka's function for ensembles, on one thread
+        ("ensemble"). Bodies whose equations differ in their form run one at a time.
+    numbers
+        "compiled": the numbers of body and field are constants of the compiled code, which then serves this body only;
+        "parameters": they are runtime parameters, and the code serves all bodies of the same form.
 
     Raises
     ------
     BadInput
-        tol is out of range, the frame or the driver is unknown, or the width is not an integer of 1 to 64.
+        tol is out of range, frame, driver or numbers are unknown, or the width is not an integer of 1 to 64.
     MissingEngine
         heyoka is not installed.
+
+    `prepare_many` raises BadInput if numbers are compiled and the equations of the bodies differ.
     """
 
     tol: float = 1e-16
     frame: str = "body"
     width: int | None = None
     driver: str = "batch"
+    numbers: str = "parameters"
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
@@ -85,7 +92,7 @@ class Heyoka(Method):
         suite=("tol=1e-9", "tol=1e-16"),
         many=(
             *("frame=base_vectors", "frame=base_vectors,width=8", "frame=base_vectors,width=16"),
-            *("frame=base_vectors,driver=ensemble", "frame=lean"),
+            *("frame=base_vectors,driver=ensemble", "frame=lean", "frame=base_vectors,width=8,numbers=compiled"),
         ),
         colour="green",
         time_dependent=True,
@@ -97,6 +104,7 @@ class Heyoka(Method):
             raise BadInput("tol", describe(self.tol), allowed)
         choice("frame", self.frame, FRAMES)
         choice("driver", self.driver, ("batch", "ensemble"))
+        choice("numbers", self.numbers, ("parameters", "compiled"))
         if self.width is not None and not 1 <= positive_integer("width", self.width) <= WIDEST:
             raise BadInput("width", describe(self.width), f"an integer from 1 to {WIDEST}, or None")
         version("heyoka", "heyoka")
@@ -110,7 +118,9 @@ class Heyoka(Method):
         parts = {"tol": f"tol={self.tol:g}", "frame": self.frame}
         if self.width:
             parts["width"] = f"width={self.width}"
-        return parts if self.driver == "batch" else parts | {"driver": self.driver}
+        if self.driver != "batch":
+            parts["driver"] = self.driver
+        return parts if self.numbers == "parameters" else parts | {"numbers": f"numbers={self.numbers}"}
 
     @property
     def order(self) -> None:
@@ -128,8 +138,9 @@ class Heyoka(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
-        integrators, label = forms.compile_double(problem.form, self.tol, problem.fast_math), self.label
+        integrators, label = self.integrators(problem), self.label
         propagate, t = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid, grid.t
+        samples = formulations.gather([problem])
 
         @cache
         def find_reason() -> str:  # once, so that repeated runs, which are timed, do not pay for it
@@ -137,26 +148,36 @@ class Heyoka(Method):
                 _begin(integrator, problem)
                 return pace_reason(scene, integrator, float(t[-1]))
 
-        def run() -> Trajectory:
+        def own_loop() -> tuple[Array, int, str]:
             reason = find_reason()
             with integrators.borrow() as integrator:
                 _begin(integrator, problem)
-                states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, t)
-            R_WF, w = problem.readout(t[: len(states)], states)
-            return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), reason)
+                return (problem.start[None], 0, reason) if reason else propagate(integrator, t)
 
-        return run
+        def convert(found: tuple[Array, int, str]) -> Trajectory:
+            states, steps, reason = found
+            return problem.axes.trajectory(grid, label, samples(states[None]), Counters(steps), reason)
+
+        return EngineRun(own_loop, convert)
+
+    def integrators(self, problem: formulations.Formulation, width: int = 0) -> forms.Integrators:
+        """Return compiled integrators of a scene, of `width` bodies at once."""
+        numbers = tuple(problem.parameters) if self.numbers == "compiled" else ()
+        return forms.compile_double(problem.form, self.tol, problem.fast_math, numbers, width)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         scenes = [bodies.take(i) for i in range(len(bodies))]
         if not scenes or any(self.unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
             return None
         problems = [getattr(formulations, self.frame)(scene) for scene in scenes]
-        together = _gather(problems, self.tol, self.width or int(forms.heyoka().recommended_simd_size()))
-        if together is None:
+        if any(problem.form != problems[0].form for problem in problems):
             return None
+        if self.numbers == "compiled" and any(problem.parameters != problems[0].parameters for problem in problems):
+            raise BadInput("numbers", "'compiled' for bodies that differ", "bodies with the same equations, or 'parameters'")
+        width = self.width or int(forms.heyoka().recommended_simd_size())
+        together = _gather(problems, self.integrators(problems[0], width), width)
         march, t = _run_batches if self.driver == "batch" else _run_ensemble, grid.t
-        return lambda: together.read(march(together, t), len(bodies))
+        return lambda: together.read(march(together, t), t)
 
 
 def _begin(integrator: Any, problem: formulations.Formulation) -> None:
@@ -195,51 +216,36 @@ class Batches:
         Integrators, and the number of bodies that each integrates at once.
     parameters, start
         Parameters (k, n) and initial states (m, n); n is a multiple of the width.
-    attitudes
-        Maps states without rates (.., m - 3) to attitudes (.., 3, 3) in the axes of the field.
-    R_WD, R_BF
-        Rotations (n, 3, 3) of each body: the field's axes to world axes, and the axes of its equations to body axes.
+    samples
+        Makes the states of all bodies out of their values.
+    R_BF
+        Rotations (n, 3, 3), axes of the equations to body axes; not padded.
     """
 
     integrators: forms.Integrators
     width: int
     parameters: Array
     start: Array
-    attitudes: Callable[[Array], Array]
-    R_WD: Array
+    samples: Callable[[Array], States]
     R_BF: Array
 
-    def read(self, states: Array, count: int) -> Block:
-        """Return the samples of the first `count` bodies from states (samples, m, n)."""
-        samples = len(states)
-        rows = np.ascontiguousarray(states.transpose(2, 0, 1))[:count]
-        R_DF = self.attitudes(rows[..., :-3].reshape(count * samples, -1)).reshape(count, samples, 3, 3)
-        R_FB = self.R_BF[:count, None].swapaxes(-1, -2)
-        R_WB, w_WB_B = self.R_WD[:count, None] @ R_DF @ R_FB, (rows[..., None, -3:] @ R_FB)[..., 0, :]
-        return Block(R_WB, w_WB_B, np.isfinite(rows).all(axis=(1, 2)))
+    def read(self, states: Array, t: Array) -> Block:
+        """Return the samples of the bodies from states (samples, m, n) at times t."""
+        values = states[..., : len(self.R_BF)].transpose(2, 0, 1)
+        R_WB, w_WB_B, finite = to_body_axes(t, self.samples(values), self.R_BF)
+        return Block(R_WB, w_WB_B, finite == len(t))
 
 
-@lru_cache(maxsize=64)
-def _compile_batch(form: forms.Form, tol: float, fast_math: bool, width: int) -> forms.Integrators:
-    equations = form.build()
-    start = [[0.0] * width for _ in equations]
-    return forms.Integrators(forms.heyoka().taylor_adaptive_batch(equations, start, tol=tol, fast_math=fast_math))
-
-
-def _gather(problems: Sequence[formulations.Formulation], tol: float, width: int) -> Batches | None:
-    """Return scenes as batches; None if their forms differ, or if attitudes depend on more than states."""
-    first = problems[0]
-    if first.attitudes is None or any(problem.form != first.form for problem in problems):
-        return None
+def _gather(problems: Sequence[formulations.Formulation], integrators: forms.Integrators, width: int) -> Batches:
+    """Return scenes of one form as batches."""
     padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
     return Batches(
-        integrators=_compile_batch(first.form, tol, first.fast_math, width),
+        integrators=integrators,
         width=width,
         parameters=np.array([problem.parameters for problem in padded]).T,
         start=np.array([problem.start for problem in padded]).T,
-        attitudes=first.attitudes,
-        R_WD=np.array([problem.R_WD for problem in padded]),
-        R_BF=np.array([problem.axes.R_BF for problem in padded]),
+        samples=formulations.gather(problems),
+        R_BF=np.array([problem.axes.R_BF for problem in problems]),
     )
 
 

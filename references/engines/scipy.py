@@ -21,9 +21,10 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import EngineAxes, limit_reason, load, principal_axes, version
+from ..engine import EngineAxes, limit_reason, load, orbit_turn, principal_axes, version
 from ..heyoka_equations.accelerations import READERS, express_field
 from ..heyoka_equations.forms import kinematics_in_world
+from ..samples import QUATERNION, States
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
@@ -106,11 +107,8 @@ class SciPy(Method):
             return finish(y.T, Counters(solver.steps, evaluations=int(solution.nfev)), solution.message)
 
         def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
-            with np.errstate(all="ignore"):
-                R_WF = R_WD @ from_quaternion(y[:, :4])
-            if turn_D is not None and isinstance(scene.potential, Turning):
-                R_WF = scene.potential.orbit.R_WO(grid.t[: len(y)]) @ R_WF
-            return axes.trajectory(grid, self.label, R_WF, y[:, 4:], work, *reason)
+            turn = None if turn_D is None else orbit_turn(scene)
+            return axes.trajectory(grid, self.label, States(QUATERNION, y[None], R_WD[None], turn), work, *reason)
 
         return run
 

@@ -24,7 +24,7 @@ from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from ..engine import load, principal_axes, unsupported_reason, version
+from ..engine import EngineRun, load, principal_axes, unsupported_reason, version
 from .environment import Distribution
 from .plain_numbers import FIELDS, EngineSamples, ManySamples, describe, take_axes
 
@@ -220,7 +220,7 @@ class LocalEngine(AdapterMethod):
             run = self._load().prepare(SimpleNamespace(**self.settings, **describe(axes, grid)))
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
-        return lambda: samples.trajectory(run())
+        return EngineRun(run, samples.trajectory)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Prepare the run of many bodies; return None if the engine does not support it for these bodies."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.attitude import to_quaternion
 from conservative.batch import Batch
 from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
@@ -21,6 +21,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import EngineAxes, mass_model, principal_axes
+from ..samples import MATRIX, QUATERNION, States, to_body_axes
 from ..worker.client import EngineCrashed
 
 SHARED = ("free", "dt", "n_steps", "every", "steps")
@@ -90,29 +91,26 @@ def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
     return {**shared, **rows, "rows": list(rows)}
 
 
-def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return attitudes (*shape, 3, 3) and rates (*shape, 3) in F. Raise `EngineCrashed` if an answer has other shapes."""
-    if "q" in answer:
-        q = np.asarray(answer["q"], float)
-        R_WF = from_quaternion(q.reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3)
-    else:
-        R_WF = np.asarray(answer["R"], float)
-    w = np.asarray(answer["w"] if "w" in answer else answer["w_W"], float)
-    if R_WF.shape != (*shape, 3, 3) or w.shape != (*shape, 3):
-        raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {w.shape}, not {shape} samples")
-    return R_WF, w if "w" in answer else (w[..., None, :] @ R_WF)[..., 0, :]
+def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
+    """Return the samples of n bodies, shape (n, s), or of one, (s,). Raise `EngineCrashed` if an answer has other shapes."""
+    kind, name, each = (QUATERNION, "q", (4,)) if "q" in answer else (MATRIX, "R", (3, 3))
+    attitudes, rates = np.asarray(answer[name]), np.asarray(answer["w" if "w" in answer else "w_W"])
+    if attitudes.shape != (*shape, *each) or rates.shape != (*shape, 3):
+        raise EngineCrashed(f"it returned attitudes {attitudes.shape} and rates {rates.shape}, not {shape} samples")
+    values = np.concatenate([attitudes.reshape(*shape, -1), rates], axis=-1, dtype=float)
+    return States(kind, values.reshape(-1, *values.shape[-2:]), rates_in_world="w" not in answer)
 
 
 class ManySamples:
     """Converts the answer of an engine for n bodies into a block of samples in body axes."""
 
     def __init__(self, axes: Sequence[EngineAxes], grid: Grid) -> None:
-        self._R_FB, self._shape = np.array([each.R_BF.T for each in axes])[:, None], (len(axes), grid.n_samples)
+        self._R_BF, self._t = np.array([each.R_BF for each in axes]), grid.t
 
     def trajectory(self, answer: Mapping[str, Any]) -> Block:
-        R_WF, w = _read(answer, self._shape)
-        R_WB, w_WB_B = R_WF @ self._R_FB, (w[..., None, :] @ self._R_FB)[..., 0, :]
-        return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)) & np.isfinite(w_WB_B).all(axis=(1, 2)))
+        states = _read(answer, (len(self._R_BF), len(self._t)))
+        R_WB, w_WB_B, finite = to_body_axes(self._t, states, self._R_BF)
+        return Block(R_WB, w_WB_B, finite == len(self._t))
 
     def failure(self, failure: IntegrationFailed) -> Block:
         raise failure
@@ -125,9 +123,9 @@ class EngineSamples:
         self.axes, self.grid, self.label = axes, grid, label
 
     def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
-        R_WF, w = _read(answer, (self.grid.n_samples,))
+        states = _read(answer, (self.grid.n_samples,))
         work = Counters(answer.get("steps", self.grid.n_steps), evaluations=answer.get("evaluations"))
-        return self.axes.trajectory(self.grid, self.label, R_WF, w, work, answer.get("reason") or "the state is not finite")
+        return self.axes.trajectory(self.grid, self.label, states, work, answer.get("reason") or "the state is not finite")
 
     def failure(self, failure: IntegrationFailed) -> Trajectory:
         """Return a trajectory without samples."""

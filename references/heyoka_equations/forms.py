@@ -44,10 +44,10 @@ class Form:
     equations: Callable[[Sequence[Expression]], Equations]
     used: tuple[bool, ...]
 
-    def build(self) -> Equations:
-        """Return the equations with numbered runtime parameters, and zeros for unused ones."""
-        places = iter(range(len(self.used)))
-        return self.equations([heyoka().par[next(places)] if used else 0.0 for used in self.used])
+    def build(self, numbers: Sequence[float] = ()) -> Equations:
+        """Return the equations with `numbers` as constants, or with numbered runtime parameters, and zeros for unused ones."""
+        values = iter([float(x) for x in numbers] or [heyoka().par[i] for i in range(sum(self.used))])
+        return self.equations([next(values) if used else 0.0 for used in self.used])
 
 
 def form_of(equations: Callable[[Sequence[Expression]], Equations], parameters: Sequence[Any]) -> tuple[Form, list[Any]]:
@@ -78,10 +78,15 @@ class Integrators:
 
 
 @lru_cache(maxsize=64)
-def compile_double(form: Form, tol: float, fast_math: bool = False) -> Integrators:
-    """Return integrators of a form in double precision, for a relative tolerance."""
-    equations = form.build()
-    return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol, fast_math=fast_math))
+def compile_double(
+    form: Form, tol: float, fast_math: bool = False, numbers: tuple[float, ...] = (), width: int = 0
+) -> Integrators:
+    """Return integrators of a form in double precision, for a relative tolerance; of `width` bodies at once, of one if 0."""
+    equations, hy = form.build(numbers), heyoka()
+    if not width:
+        return Integrators(hy.taylor_adaptive(equations, [0.0] * len(equations), tol=tol, fast_math=fast_math))
+    start = [[0.0] * width for _ in equations]
+    return Integrators(hy.taylor_adaptive_batch(equations, start, tol=tol, fast_math=fast_math))
 
 
 @dataclass(frozen=True)

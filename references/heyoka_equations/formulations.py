@@ -5,19 +5,18 @@ The forms are in `conservative.references.heyoka_equations.forms`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion, to_quaternion
-from conservative.potentials.turning import Turning
+from conservative.attitude import Array, to_quaternion
 from conservative.scene import Scene
 
-from ..engine import EngineAxes, principal_axes, symmetric_axes
+from ..engine import EngineAxes, orbit_turn, principal_axes, symmetric_axes
+from ..samples import AXIS_AND_ANGLE, NON_SPINNING, QUATERNION, RATES_AND_ANGLE, ROWS, States
 from . import forms
 from .accelerations import express_field, order_axes
 
@@ -38,27 +37,33 @@ class Formulation:
         Axes F of the equations.
     form, parameters, start
         Equations, values of their parameters, initial state.
-    readout
-        Maps times (n,) and states (n, m) to attitudes (n, 3, 3) and rates (n, 3) in F.
+    kind, constants
+        Form of the state (`conservative.references.samples`) and its constants (4,).
+    R_WD
+        Rotation (3, 3) from the axes in which the attitude is to world axes.
     fast_math
         True if the compiler may reorder sums.
-    attitudes, R_WD
-        If R_WF is R_WD attitudes(states without rates), this function and R_WD; otherwise None and the identity.
     """
 
     axes: EngineAxes
     form: forms.Form
     parameters: list[float]
     start: Array
-    readout: Callable[[Array, Array], tuple[Array, Array]]
+    kind: int
+    constants: Sequence[float]
+    R_WD: Array
     fast_math: bool = False
-    attitudes: Callable[[Array], Array] | None = None
-    R_WD: Array = dataclass_field(default_factory=lambda: np.eye(3))
+
+
+def gather(problems: Sequence[Formulation]) -> Callable[[Array], States]:
+    """Return a function that makes states of bodies of one form out of their values (n, s, m)."""
+    R_WD, constants = np.array([each.R_WD for each in problems]), np.array([each.constants for each in problems])
+    return lambda values: States(problems[0].kind, values, R_WD, constants)
 
 
 def body(scene: Scene) -> Formulation:
     """Return quaternion and rates in principal axes."""
-    return _with_attitude(scene, forms.quaternion, to_quaternion, from_quaternion)
+    return _with_attitude(scene, forms.quaternion, to_quaternion, QUATERNION)
 
 
 def base_vectors(scene: Scene) -> Formulation:
@@ -66,36 +71,19 @@ def base_vectors(scene: Scene) -> Formulation:
 
     The second row is their cross product. The rows are not orthonormalised, so their drift shows in the samples.
     """
-    formulation = _with_attitude(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), _from_rows)
+    formulation = _with_attitude(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), ROWS)
     return replace(formulation, fast_math=True)  # measured: 3 to 7 % less time; for the quaternion 2 to 5 % more
 
 
-def _with_attitude(
-    scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], read: Callable[[Array], Array]
-) -> Formulation:
-    """Return Euler's equations with those of an attitude that `write` and `read` convert from and to matrices."""
+def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], kind: int) -> Formulation:
+    """Return Euler's equations with those of an attitude that `write` makes of a matrix."""
     field = express_field(scene)
     axes, R_WD = field.axes, field.R_WD
     equations = forms.EulerEquations(attitude, field.acceleration)
     form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *field.parameters])
-
-    def readout(t: Array, states: Array) -> tuple[Array, Array]:
-        R = R_WD @ read(states[:, :-3])
-        return scene.potential.orbit.R_WO(t) @ R if isinstance(scene.potential, Turning) else R, states[:, -3:]
-
     start = np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0])
-    steady = None if isinstance(scene.potential, Turning) else read
-    return Formulation(axes, form, parameters, start, readout, attitudes=steady, R_WD=R_WD)
-
-
-def _from_rows(rows: Array) -> Array:
-    """Return matrices (n, 3, 3) from third and first rows (n, 6)."""
-    (g1, g2, g3), (a1, a2, a3) = rows[:, :3].T, rows[:, 3:].T
-    out = np.empty((len(rows), 3, 3))
-    out[:, 0], out[:, 2] = rows[:, 3:], rows[:, :3]
-    # Not `np.cross`, which takes as long as a hundred steps of an integration.
-    out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = g2 * a3 - g3 * a2, g3 * a1 - g1 * a3, g1 * a2 - g2 * a1
-    return out
+    turn = orbit_turn(scene)
+    return Formulation(axes, form, parameters, start, kind, [0.0] * 4 if turn is None else turn[0], R_WD)
 
 
 def non_spinning(scene: Scene) -> Formulation:
@@ -104,12 +92,8 @@ def non_spinning(scene: Scene) -> Formulation:
     assert axes is not None  # checked by `Heyoka.unsupported`
     u0, spin = _slow_rates(axes)
     form, parameters = forms.form_of(forms.non_spinning, [axes.moment[2] / axes.J[0], u0[2]])
-
-    def readout(t: Array, states: Array) -> tuple[Array, Array]:
-        R_WF = from_quaternion(states[:, :4]) @ _about_3(spin * t)
-        return R_WF, _body_rates(axes, R_WF, states[:, 4:6], u0[2])
-
-    return Formulation(axes, form, parameters, np.concatenate([axes.q0, u0[:2]]), readout)
+    start = np.concatenate([axes.q0, u0[:2]])
+    return Formulation(axes, form, parameters, start, NON_SPINNING, _slow_constants(axes, spin, u0[2]), np.eye(3))
 
 
 def lean(scene: Scene) -> Formulation:
@@ -133,16 +117,8 @@ def _free_rates_and_angle(scene: Scene) -> Formulation:
     slope = momentum / axes.J[2]
     numerator = (L0 @ axes.w0 - momentum * slope) / axes.J[2]
     form, parameters = forms.form_of(forms.free_rates_and_angle, [*_gyroscopic(axes), slope, numerator])
-    base = axes.R_WF0 @ _least(L0[None] / momentum)[0]
-
-    def readout(t: Array, states: Array) -> tuple[Array, Array]:
-        w = states[:, :3]
-        L = w * axes.J
-        direction = L / np.sqrt(np.einsum("ni,ni->n", L, L))[:, None]
-        to_momentum = np.swapaxes(_least(direction), 1, 2)
-        return base @ _about_3(slope * t + states[:, 3]) @ to_momentum, w
-
-    return Formulation(axes, form, parameters, np.append(axes.w0, 0.0), readout)
+    base = axes.R_WF0 @ _least(L0 / momentum)
+    return Formulation(axes, form, parameters, np.append(axes.w0, 0.0), RATES_AND_ANGLE, [slope, *axes.J.tolist()], base)
 
 
 def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
@@ -150,15 +126,10 @@ def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
     u0, spin = _slow_rates(axes)
     u0, n0, k = world @ u0, R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
     form, parameters = forms.form_of(forms.axis_and_angle, [k, u0[2], u0 @ n0 + u0[2]])
-    turned = _least(n0[None])[0].T @ R0
+    turned = _least(n0).T @ R0
     p0 = float(np.arctan2(turned[1, 0], turned[0, 0]))
-
-    def readout(t: Array, states: Array) -> tuple[Array, Array]:
-        n = states[:, :3]
-        R = _least(n / np.sqrt(np.einsum("ni,ni->n", n, n))[:, None]) @ _about_3(states[:, 5] + spin * t)
-        return world @ R, _body_rates(axes, R, states[:, 3:5], u0[2])
-
-    return Formulation(axes, form, parameters, np.array([*n0, *u0[:2], p0]), readout)
+    start = np.array([*n0, *u0[:2], p0])
+    return Formulation(axes, form, parameters, start, AXIS_AND_ANGLE, _slow_constants(axes, spin, u0[2]), world)
 
 
 def _gyroscopic(axes: EngineAxes) -> list[float]:
@@ -172,11 +143,10 @@ def _slow_rates(axes: EngineAxes) -> tuple[Array, float]:
     return axes.R_WF0 @ (axes.J * axes.w0) / J1, (1 - J3 / J1) * float(axes.w0[2])
 
 
-def _body_rates(axes: EngineAxes, R_WF: Array, u12: Array, u3: float) -> Array:
-    """Return body rates (n, 3) from u = l/J1, whose third component is constant."""
-    u = np.empty((len(u12), 1, 3))
-    u[:, 0, :2], u[:, 0, 2] = u12, u3
-    return (u @ R_WF)[:, 0] * (axes.J[0] / axes.J)
+def _slow_constants(axes: EngineAxes, spin: float, u3: float) -> list[float]:
+    """Return the constants of a state in the slow frame."""
+    J1, J2, J3 = axes.J.tolist()
+    return [spin, u3, J1 / J2, J1 / J3]
 
 
 def _heights(axes: EngineAxes) -> tuple[float, float]:
@@ -211,21 +181,7 @@ def _order_axes(axes: EngineAxes) -> EngineAxes:
 
 
 def _least(n: Array) -> Array:
-    """Return the smallest rotations (k, 3, 3) from e_3 to unit vectors (k, 3), none of which is -e_3."""
-    x, y, z = n.T
+    """Return the smallest rotation (3, 3) from e_3 to a unit vector (3,) that is not -e_3."""
+    x, y, z = n.tolist()
     a, b = x / (1 + z), y / (1 + z)
-    out = np.empty((len(n), 3, 3))
-    out[:, 0, 0], out[:, 1, 1] = 1 - x * a, 1 - y * b
-    out[:, 0, 1] = out[:, 1, 0] = -x * b
-    out[:, :, 2], out[:, 2, 0], out[:, 2, 1] = n, -x, -y
-    return out
-
-
-def _about_3(angle: Array) -> Array:
-    """Return rotations (n, 3, 3) about the third axis by angles (n,), rad."""
-    out = np.zeros((len(angle), 3, 3))
-    out[:, 0, 0] = out[:, 1, 1] = np.cos(angle)
-    out[:, 1, 0] = np.sin(angle)
-    out[:, 0, 1] = -out[:, 1, 0]
-    out[:, 2, 2] = 1
-    return out
+    return np.array([[1 - x * a, -x * b, x], [-x * b, 1 - y * b, y], [-x, -y, z]])

@@ -33,19 +33,22 @@ class EachStep:
     ----------
     interval
         Time between two steps of the scene, s.
-    stored, final
-        Costs (see `contest.costs`) at `ERROR` of runs with every step stored, and of runs with the final state only.
+    stored, own_loop, final
+        Costs (see `contest.costs`) at `ERROR` of runs with every step stored, of the same without an engine's conversion of its
+        states, and of runs with the final state only.
     """
 
     interval: float
     stored: pd.DataFrame
+    own_loop: pd.DataFrame
     final: pd.DataFrame
 
     @property
     def runs(self) -> dict[str, pd.DataFrame]:
-        """The costs of both kinds of runs by name."""
+        """The costs of each kind of runs by name."""
         return {
             f"every {self.interval:.3g} s stored": self.stored,
+            f"every {self.interval:.3g} s stored, engines without conversion": self.own_loop,
             f"every {self.interval:.3g} s, final state only": self.final,
         }
 
@@ -62,8 +65,10 @@ class EachStep:
 def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
     """Return the costs with every step stored on a scene; None without the study."""
     rows = table[(table["study"] == STUDY) & (table["scene"] == scene)]
-    stored, final = (costs(points(rows, STUDY, time), [ERROR]) for time in (Measure.TIME_SAMPLED, Measure.TIME))
-    return None if stored.empty else EachStep(float(rows["dt"].max()), stored, final)
+    times = (Measure.TIME_SAMPLED, Measure.TIME_OWN_LOOP, Measure.TIME)
+    stored, engines, final = (costs(points(rows, STUDY, time), [ERROR]) for time in times)
+    own_loop = pd.concat([stored[~stored["name"].isin(engines["name"])], engines])
+    return None if stored.empty else EachStep(float(rows["dt"].max()), stored, own_loop, final)
 
 
 def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[Contest]:

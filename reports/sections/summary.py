@@ -40,8 +40,8 @@ SAMPLE_TERMS = (
     f"All methods have the same {SAMPLES} samples in the duration of a scene. An exact solution can take one step from sample "
     "to sample, so its cost per simulated second depends on their number. The cost of a sample is therefore measured with "
     f"every step of the scene stored, at {tolerance(ERROR)} rad over all samples: for a run that stores attitude matrices and "
-    "rates at every step (for an engine including our conversion of its state, which is a large part for heyoka), and for a "
-    "run that stores the final state only, in which a solver can take longer steps."
+    "rates at every step (for an engine with and without the conversion of its states), and for a run that stores the final "
+    "state only, in which a solver can take longer steps."
 )
 """Explanation of samples and their cost."""
 CAVEAT = (

@@ -9,7 +9,7 @@ import pytest
 from conservative import BadInput, MissingEngine, MoserVeselov, Reduced
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import many_runs, studies, throughput
-from conservative.benchmarks.studies.ensembles import draw
+from conservative.benchmarks.studies.ensembles import DURATION, KINDS, draw
 from conservative.benchmarks.studies.many_runs import Way
 from conservative.benchmarks.studies.selection import Missing
 from conservative.grid import Grid
@@ -47,6 +47,18 @@ def test_bodies_differ_and_do_not_depend_on_their_number():
     assert np.abs(draw("heavy_tops", 3, seed=2).inertia - few.inertia).min() > 1e-6
     with pytest.raises(BadInput):
         draw("other", 3)
+
+
+def test_starts_of_one_body_differ_and_the_body_does_not():
+    starts = draw("one_body", 5)
+    first, last = starts.take(0), starts.take(4)
+    assert first.body is last.body is starts.scene.body
+    assert first.potential is last.potential
+    assert np.abs(first.R_WB0 - last.R_WB0).max() > 0.1
+    assert np.abs(first.w_WB_B0 - last.w_WB_B0).max() > 0.1
+    J = first.body.moments
+    assert 20 * np.sqrt(J.mean() / np.linalg.norm(first.potential.moment_B)) == pytest.approx(DURATION)
+    assert draw("one_body", 5, seed=1).scene.body.moments[0] != J[0]
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +112,7 @@ def test_without_a_truth_there_is_one_row_of_each_kind(monkeypatch):
 
     monkeypatch.setattr(throughput, "Heyoka", refuse)
     skipping = throughput.throughput_study((Ours(),), quick=True, skip_missing=True)
-    assert [row.outcome.kind for row in studies.rows(skipping)] == [OutcomeKind.MISSING] * 2
+    assert [row.outcome.kind for row in studies.rows(skipping)] == [OutcomeKind.MISSING] * len(KINDS)
     with pytest.raises(MissingEngine):
         list(studies.rows(throughput.throughput_study((Ours(),), quick=True)))
 

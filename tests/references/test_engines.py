@@ -27,6 +27,7 @@ from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.start import _BLOCK
 from conservative.references.precise import Precise
+from conservative.references.samples import QUATERNION, States
 from conservative.scenes.tops import cone
 from conservative.trajectory import Counters
 
@@ -172,10 +173,9 @@ def test_steps_from_sample_to_sample_are_all_counted(free):
 @pytest.mark.parametrize("bad", [1, 3])
 def test_samples_before_the_first_that_is_not_finite_are_valid(bad, free):
     grid = Grid(0.1, 5)
-    R = np.broadcast_to(np.eye(3), (6, 3, 3))
-    w = np.ones((6, 3))
-    w[bad] = np.nan
-    trajectory = principal_axes(free).trajectory(grid, "planted", R, w, Counters(5))
+    states = np.ones((1, 6, 7))
+    states[0, bad, 5] = np.nan
+    trajectory = principal_axes(free).trajectory(grid, "planted", States(QUATERNION, states), Counters(5))
     assert len(trajectory) == bad
     assert isinstance(trajectory.failure, cv.Diverged)
     assert trajectory.outcome.time == trajectory.t[-1] == grid.t[bad - 1]

@@ -11,10 +11,11 @@ from conservative.potentials.point_to_point import PointAttraction
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka, mujoco
 from conservative.references.environments.plain_numbers import ManySamples, describe_many
+from conservative.references.heyoka_equations import formulations
 from conservative.references.worker.program import Runs
 
 GRID = Grid(0.01, 50, 20)
-TOPS, FREE = draw("heavy_tops", 5, seed=3), draw("free_bodies", 5, seed=3)
+TOPS, FREE, ONE = (draw(kind, 5, seed=3) for kind in ("heavy_tops", "free_bodies", "one_body"))
 ATTRACTION = TOPS.scene.rename("attracted", potential=PointAttraction(2.0, (0.3, -0.2, 0.4), (1.0, 0.5, 2.0)))
 ATTRACTED = Batch(ATTRACTION, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia, {"strength": np.arange(1.0, 6)})
 HEYOKA = "heyoka:tol=1e-15,frame=base_vectors"
@@ -32,6 +33,8 @@ def differences(block, method, bodies):
     [
         (HEYOKA, TOPS, 1e-13),  # measured 5e-15
         (f"{HEYOKA},driver=ensemble", TOPS, 1e-13),  # the same
+        ("heyoka:tol=1e-15,frame=lean", FREE, 1e-13),  # measured 0
+        (f"{HEYOKA},width=8,numbers=compiled", ONE, 1e-13),  # measured 0
         ("mujoco:RK4", TOPS, 1e-14),  # measured 9e-16
         ("mujoco:RK4,threads=2", FREE, 1e-14),
         ("mujoco:RK4,threads=2", ATTRACTED, 1e-14),
@@ -46,7 +49,7 @@ def test_many_bodies_equal_their_single_runs(name, bodies, allowed):
     assert first.finished.all()
     assert differences(first, method, bodies).max() < allowed
     assert np.array_equal(first.R_WB, again.R_WB)
-    other = Batch(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, bodies.inertia[::-1].copy(), bodies.parameters)
+    other = Batch(bodies.scene, bodies.R_WB0[::-1].copy(), bodies.w_WB_B0, bodies.inertia, bodies.parameters)
     assert differences(first, method, other)[0] > 1e-3
 
 
@@ -83,13 +86,26 @@ def test_a_worker_receives_many_bodies():
     assert differences(block, registry.method("mujoco:RK4"), TOPS).max() < 1e-14  # measured 9e-16
 
 
-@pytest.mark.parametrize("settings", ["width=0", "width=65", "driver=other"])
+def test_compiled_numbers_are_constants_of_one_body():
+    scene = ONE.take(0)
+    for numbers, stored in (("parameters", 9), ("compiled", 0)):
+        method = registry.method(f"heyoka:tol=1e-9,frame=base_vectors,numbers={numbers}")
+        integrators = method.integrators(formulations.base_vectors(scene))
+        with integrators.borrow() as integrator:
+            assert len(integrator.pars) == stored
+    with pytest.raises(BadInput, match="bodies that differ"):
+        method.prepare_many(TOPS, GRID)
+
+
+@pytest.mark.parametrize("settings", ["width=0", "width=65", "driver=other", "numbers=other"])
 def test_bad_settings_of_batches(settings):
     with pytest.raises(BadInput):
         registry.method(f"heyoka:{settings}")
 
 
 def test_bodies_that_cannot_run_at_once_are_refused():
-    assert registry.method("heyoka:frame=lean").prepare_many(FREE, GRID) is None
+    at_rest = FREE.w_WB_B0 * [[0], [1], [1], [1], [1]]  # a body at rest has no momentum to turn about: another form
+    other = Batch(FREE.scene, FREE.R_WB0, at_rest, FREE.inertia, FREE.parameters)
+    assert registry.method("heyoka:frame=lean").prepare_many(other, GRID) is None
     small = Batch(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-29, TOPS.parameters)
     assert registry.method("mujoco:RK4").prepare_many(small, GRID) is None

@@ -68,7 +68,7 @@ CRASHES = {
     "raise": "KeyError: 'no such key'",
     "babble": "an answer that cannot be read",
     "import": "signal 11 (SIGSEGV)",
-    "shape": "it returned attitudes (50, 3, 3)",
+    "shape": "it returned attitudes (50, 4)",
 }
 
 

@@ -115,7 +115,7 @@ def test_numbers_of_bodies_are_read_as_people_write_them():
     planned = plan_study("throughput", methods=("mujoco:RK4",), sizes=("1", "1e3"), bodies=3, seed=2, quick=True)
     assert (planned.sizes, planned.bodies, planned.seed, planned.quick) == ((1, 1000), 3, 2, True)
     assert [method.name for method in planned.methods] == ["mujoco"]
-    assert [scene.name for scene in planned.scenes] == ["heavy_tops", "free_bodies"]
+    assert [scene.name for scene in planned.scenes] == ["heavy_tops", "free_bodies", "one_body"]
 
 
 def test_a_failed_row_has_its_reason():

@@ -1,0 +1,65 @@
+"""The compiled conversion of engines' states against products of NumPy, and the run of an engine without it."""
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import from_quaternion
+from conservative.grid import Grid
+from conservative.potentials.turning import Orbit
+from conservative.references.engines.heyoka import FRAMES, Heyoka
+from conservative.references.samples import MATRIX, QUATERNION, ROWS, States, to_body_axes
+
+BODIES, SAMPLES = 3, 5
+DRAW = np.random.default_rng(4)
+T = np.linspace(0, 2, SAMPLES)
+
+
+def draw(*shape):
+    """Return quaternions of norms 0.9 to 1.1, as engines return them."""
+    q = DRAW.normal(size=(*shape, 4))
+    return q / np.linalg.norm(q, axis=-1, keepdims=True) * DRAW.uniform(0.9, 1.1, (*shape, 1))
+
+
+R_BF, R_WD = from_quaternion(draw(BODIES)), from_quaternion(draw(BODIES))
+q, w = draw(BODIES, SAMPLES), DRAW.normal(size=(BODIES, SAMPLES, 3))
+R_DF = from_quaternion(q)
+UNIT = from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+FORMS = [
+    (QUATERNION, q, R_DF),
+    (MATRIX, R_DF.reshape(BODIES, SAMPLES, 9), R_DF),
+    (ROWS, np.concatenate([UNIT[..., 2, :], UNIT[..., 0, :]], axis=-1), UNIT),
+]
+
+
+@pytest.mark.parametrize(("kind", "attitudes", "R"), FORMS, ids=["quaternion", "matrix", "rows"])
+@pytest.mark.parametrize("in_world", [False, True])
+def test_each_form_is_the_product_of_its_rotations(kind, attitudes, R, in_world):
+    orbit = Orbit(0.7, (0.6, 0, 0.8))
+    constants = np.array([[0.0] * 4, [orbit.rate, *orbit.normal_W], [0.0] * 4])  # the axes of the second body turn
+    states = States(kind, np.concatenate([attitudes, w], axis=-1), R_WD, constants, in_world)
+    R_WB, w_WB_B, finite = to_body_axes(T, states, R_BF)
+    expected = R_WD[:, None] @ R @ R_BF[:, None].swapaxes(-1, -2)
+    expected[1] = orbit.R_WO(T) @ expected[1]
+    in_F = (w[..., None, :] @ R)[..., 0, :] if in_world else w
+    np.testing.assert_allclose(R_WB, expected, atol=3e-15)  # measured 7e-16
+    np.testing.assert_allclose(w_WB_B, in_F @ R_BF.swapaxes(-1, -2), atol=5e-15)
+    assert finite.tolist() == [SAMPLES] * BODIES
+
+
+@pytest.mark.parametrize("column", [0, 6])
+def test_samples_count_up_to_the_first_that_is_not_finite(column):
+    values = np.concatenate([q, w], axis=-1)
+    values[1, 2, column] = np.nan
+    values[2, 0, column] = np.inf
+    assert to_body_axes(T, States(QUATERNION, values), R_BF)[2].tolist() == [SAMPLES, 2, 0]
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_the_own_loop_of_heyoka_is_its_run_without_the_conversion(frame):
+    scene = cv.scenes.lagrange_top(t_end=0.5)
+    run = Heyoka(1e-12, frame).prepare(scene, Grid(0.01, 50))
+    states, steps, _ = run.own_loop()
+    trajectory = run()
+    assert states.shape[0] == len(trajectory) == 51
+    assert steps == trajectory.counters.steps
