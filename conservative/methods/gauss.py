@@ -37,8 +37,8 @@ class Gauss(Method):
     `kernels/gauss.py`. One stage is the implicit midpoint rule for L and gamma; the attitude is not that of the midpoint rule.
 
     The method is symmetric in time, so the attitude error of a regular motion grows linearly. The errors of `Taylor` and
-    `Projected` grow quadratically, unless energy and momenta determine the motion up to its phase, as for free bodies and
-    symmetric tops. The stages are solved to round-off, because stages with larger residuals are not symmetric.
+    `Projected` grow quadratically, except those of `Taylor` on free bodies and symmetric tops, whose integrals it restores.
+    The stages are solved to round-off, because stages with larger residuals are not symmetric.
 
     Steps of several radians, for which the iteration does not converge, fail with `NotConverged`.
 
