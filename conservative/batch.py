@@ -44,7 +44,7 @@ class Batch:
     def __len__(self) -> int:
         return len(self.R_WB0)
 
-    def __getitem__(self, part: slice) -> Batch:
+    def __getitem__(self, part: slice | Array) -> Batch:
         inertia = None if self.inertia is None else self.inertia[part]
         parameters = {name: values[part] for name, values in self.parameters.items()}
         return Batch(self.scene, self.R_WB0[part], self.w_WB_B0[part], inertia, parameters)

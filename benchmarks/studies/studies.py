@@ -48,7 +48,7 @@ THROUGHPUT = "throughput"
 """Study of many random bodies."""
 MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
 """Studies of the selected scenes and methods in every report."""
-IN_TURN = ("random", "work_precision", "each_step")
+IN_TURN = ("random", "work_precision", "each_step", "throughput")
 """Studies of times that several processes measure in turn, in a full report and alone."""
 MORE = ("each_step", "sphere_curves", "paper_figures")
 """Studies of the same scenes and methods in a full report only."""

@@ -4,11 +4,11 @@
 tolerances and in every way it has: many bodies at once, on one thread and on two, and for our methods also one body at a time.
 
 * The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Rows contain the median and the 95th
-  percentile over the first `bodies` of a kind. The reference solution is heyoka in double precision with a tolerance below
-  round-off; another row contains its agreement with another formulation.
-* The time is that of a prepared run over the same motion, final state only, in interleaved rounds. The time of the preparation
-  has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest that reaches it and the one
-  before it, and exact solutions.
+  percentile over the first `bodies` of a kind. Each body has a reference solution that an independent one confirms
+  (`conservative.references.truth`); a body for which they disagree is dropped.
+* The time is that of a prepared run over the same motion, final state only, in interleaved rounds and several processes. The
+  time of the preparation has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest that
+  reaches it and the one before it, and exact solutions.
 * With increasing numbers of bodies, a setting is skipped as soon as a call would exceed the time budget.
 """
 
@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,17 +29,20 @@ from conservative.errors import BadInput, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.engines.heyoka import SMALLEST_TOL, Heyoka
+from conservative.references.exact.method import Exact
+from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene
 
 from ..contest import list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..measures.timing import Timing, time_interleaved
+from ..measures.processes import Processes
+from ..measures.timing import Timing
 from .case import Case, Drawn
 from .ensembles import DURATION, KINDS, draw
 from .line import list_settings
-from .many_runs import ManyDone, Way, attempt_many, list_ways
+from .many_runs import ManyDone, RunBlocks, Way, attempt_many, list_ways, prepare_blocks
+from .paper import agreement_row
 from .selection import Missing, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
 from .study import Progress, Study
@@ -119,16 +123,17 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Bodies of one kind, and the exact attitudes (n, samples, 3, 3) of those whose errors are measured."""
+    """Bodies of one kind, the indices (n,) of those whose errors are measured, and their exact attitudes (n, samples, 3, 3)."""
 
     study: ThroughputStudy
     bodies: Batch
+    measured: Array
     truth: Array
 
     @property
     def few(self) -> Batch:
         """The bodies whose errors are measured."""
-        return self.bodies[: len(self.truth)]
+        return self.bodies[self.measured]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,37 +155,40 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     assert isinstance(study, ThroughputStudy)
     ways = [way for method in study.competitors for way in list_ways(method)]
     tell = study.count(progress, len(ways) + len(study.sizes))
-    for scene in study.scenes:
-        try:
-            kind = yield from find_truth(study, scene)
-        except MissingEngine as error:
-            if not study.skip_missing:
-                raise
-            case = _case(study, scene, Missing("heyoka", error=error), SAMPLES)
-            yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
-            continue
-        points: list[BatchSetting] = []
-        for way in ways:
-            tell(f"{scene.name}: errors of {way.method.name}")
-            points += select_deciding((yield from measure_errors(kind, way)))
-        for size in study.sizes:
-            tell(f"{scene.name}: timing {size} bodies")
-            points = yield from time_rows(kind, points, size)
+    with Processes(study.processes) as processes:
+        for scene in study.scenes:
+            try:
+                kind = yield from find_truth(study, scene)
+            except MissingEngine as error:
+                if not study.skip_missing:
+                    raise
+                case = _case(study, scene, Missing("heyoka", error=error), SAMPLES)
+                yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
+                continue
+            points: list[BatchSetting] = []
+            for way in ways:
+                tell(f"{scene.name}: errors of {way.method.name}")
+                points += select_deciding((yield from measure_errors(kind, way)))
+            for size in study.sizes:
+                tell(f"{scene.name}: timing {size} bodies")
+                points = yield from time_rows(kind, points, size, processes)
 
 
 def find_truth(study: ThroughputStudy, scene: Scene) -> Generator[Measurement, None, Kind]:
-    """Yield the largest difference of two formulations of the reference solution, rad; return the bodies."""
-    bodies = draw(scene.name, max(*study.sizes, study.bodies), study.seed)
-    methods = [Heyoka(SMALLEST_TOL, frame) for frame in ("base_vectors", "body")]
-    cases = [_case(study, bodies.scene, method, SAMPLES) for method in methods]
-    attitudes = []
-    for case in cases:
-        done = attempt_many(Way(case.method, together=False), bodies[: study.bodies], case.grid, study.hang_limit)
-        assert isinstance(done, ManyDone), done
-        attitudes.append(done.block.R_WB)
-    agreement = float(angle_between(*attitudes).max(axis=1).max())
-    yield cases[0].row(Value(Measure.AGREEMENT, agreement), detail=methods[1].label)
-    return Kind(study, bodies, attitudes[0])
+    """Yield the largest difference of two reference solutions, rad, and a row for each dropped body; return the bodies.
+
+    A body whose two solutions disagree is dropped, and its row has the reason.
+    """
+    bodies, grid, truths = draw(scene.name, max(*study.sizes, study.bodies), study.seed), _grid(SAMPLES), dict[int, Truth]()
+    for i in range(study.bodies):
+        try:
+            truths[i] = study.truth(bodies.take(i), grid)
+        except Disagreement as error:
+            case = Case(study.name, scene, Exact(), grid, Drawn(scene.name, study.seed, i))
+            yield case.row(Value(Measure.AGREEMENT, error.agreement_rad), Outcome(OutcomeKind.SKIPPED, str(error)))
+    worst = max(truths.values(), key=lambda truth: truth.agreement_rad)
+    yield replace(agreement_row(study, scene, grid.dt, worst), field=scene.name, seed=study.seed)
+    return Kind(study, bodies, np.array(list(truths)), np.array([each.trajectory.R_WB for each in truths.values()]))
 
 
 def _case(study: ThroughputStudy, scene: Scene, method: Method, n: int) -> Case:
@@ -228,9 +236,11 @@ def select_deciding(line: list[BatchSetting]) -> list[BatchSetting]:
     return [line[i] for i in sorted(chosen)]
 
 
-def time_rows(kind: Kind, points: list[BatchSetting], size: int) -> Generator[Measurement, None, list[BatchSetting]]:
+def time_rows(
+    kind: Kind, points: list[BatchSetting], size: int, processes: Processes
+) -> Generator[Measurement, None, list[BatchSetting]]:
     """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
-    study, ready = kind.study, dict[BatchSetting, ManyDone]()
+    study, ready, prepares = kind.study, dict[BatchSetting, ManyDone](), {}
     for point in (replace(each, case=replace(each.case, bodies=size)) for each in points):
         done: ManyDone | Outcome | None = refuse_long(point, size, study.longest_run)
         if done is None:
@@ -240,15 +250,28 @@ def time_rows(kind: Kind, points: list[BatchSetting], size: int) -> Generator[Me
             yield point.case.row(Value(Measure.TIME, math.nan), done)
         else:
             ready[point] = done
-    runs = {point: done.run for point, done in ready.items()}
-    timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=study.timing_budget)
+            prepares[point] = partial(prepare_drawn, way, point.case.drawn, size, keep_end(point.case.grid))
+    timings = processes.time(
+        {point: done.run for point, done in ready.items()},
+        prepares,
+        limit=study.hang_limit * (1 + len(ready)),
+        rounds=QUICK_ROUNDS if study.quick else ROUNDS,
+        min_time=CALL,
+        budget=study.timing_budget,
+    )
     timed = []
-    for point, timing in timings.items():
+    for point, (timing, *others) in timings.items():
         prepare = ready[point].prepare / size
-        yield from time_body(point.case, size, timing, prepare)
+        yield from time_body(point.case, size, [timing, *others], prepare)
         if timing.outcome.ok:
             timed.append(replace(point, spent=min(point.spent, timing.minimum / size), prepare=prepare))
     return timed
+
+
+def prepare_drawn(way: Way, drawn: Drawn, size: int, grid: Grid) -> RunBlocks:
+    """Return the run of the first bodies of a kind and seed."""
+    assert drawn.seed is not None
+    return prepare_blocks(way, draw(drawn.field, size, drawn.seed), grid)
 
 
 def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
@@ -259,10 +282,11 @@ def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
     return None
 
 
-def time_body(case: Case, size: int, timing: Timing, prepare: float) -> Iterator[Measurement]:
+def time_body(case: Case, size: int, timings: list[Timing], prepare: float) -> Iterator[Measurement]:
     """Yield the cost of a body in a batch: time, s per simulated second, steps per second, and preparation, s."""
+    yield from case.time_rows(Measure.TIME, timings, size * DURATION)
+    timing = timings[0]
     a_body = timing.minimum / size
-    yield case.time_row(Measure.TIME, a_body / DURATION, timing)
     if timing.outcome.ok and tolerance_setting(case.method):
         yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
     else:

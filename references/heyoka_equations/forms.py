@@ -77,7 +77,7 @@ class Integrators:
             self._idle.append(integrator)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def compile_double(
     form: Form, tol: float, fast_math: bool = False, numbers: tuple[float, ...] = (), width: int = 0
 ) -> Integrators:

@@ -127,5 +127,6 @@ def plan_report(
         made += studies.list_hard_studies(compared, skip_missing, time_limit)
     # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
     if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *named), quick=True))):
-        made.append(throughput.throughput_study(many, quick=True, seed=seed, skip_missing=skip_missing, time_limit=time_limit))
+        more = {"skip_missing": skip_missing, "time_limit": time_limit, "processes": processes}
+        made.append(throughput.throughput_study(many, quick=True, seed=seed, **more))
     return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed)

@@ -80,7 +80,7 @@ def plan_study(
         counts = tuple(read_count("sizes", size) for size in sizes)
         numbers = {"sizes": counts or None, "bodies": bodies, "seed": seed, "time_limit": time_limit}
         given = {key: value for key, value in numbers.items() if value is not None}
-        return throughput.throughput_study(compared, quick=quick, skip_missing=skip_missing, **given)
+        return throughput.throughput_study(compared, quick=quick, skip_missing=skip_missing, processes=processes, **given)
     if name == "hard_cases":
         compared = hard_cases.settings(compared)
     if scenes:

@@ -1,6 +1,6 @@
 """The study of throughput: random bodies, ways to run them, and the timed settings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +16,9 @@ from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.engines.catalogue import MuJoCo
+from conservative.references.engines.scipy import SciPy
+from conservative.references.precise import Precise
+from conservative.references.truth import TIGHTEST, Disagreement, reference
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,32 @@ def test_errors_fall_and_times_are_of_each_number_of_bodies(rows):
 
 def test_the_truths_agree(rows):
     (row,) = [row for row in rows if row.measure is Measure.AGREEMENT]
-    assert row.value < 1e-9  # measured 5e-12
-    assert "body" in row.detail
+    assert row.value < 1e-9  # measured 4e-13
+    assert row.label == " and ".join(each.label for each in (Precise(), SciPy("DOP853", TIGHTEST)))
+
+
+def keep_result(generator, results):
+    results.append((yield from generator))
+
+
+def test_a_body_whose_truths_disagree_is_dropped():
+    bodies = draw("heavy_tops", 3)
+
+    def find(scene, grid):
+        if np.array_equal(scene.w_WB_B0, bodies.w_WB_B0[1]):
+            raise Disagreement("planted", ("one", "other"), 0.5, 1e-8)
+        return reference(scene, grid)
+
+    study = throughput.throughput_study((Ours("RK4"),), quick=True, sizes=(2,), bodies=3, truth=find, processes=2)
+    study = replace(study, scenes=study.scenes[:1])
+    found = list(studies.rows(study))
+    dropped, kept = [row for row in found if row.measure is Measure.AGREEMENT]
+    assert (dropped.body, dropped.value, dropped.outcome.kind) == (1, 0.5, OutcomeKind.SKIPPED)
+    assert kept.value < 1e-9
+    kinds = []
+    list(keep_result(throughput.find_truth(study, study.scenes[0]), kinds))
+    assert np.array_equal(kinds[0].few.w_WB_B0, bodies.w_WB_B0[[0, 2]])
+    assert {row.process for row in of(found, "ours", Measure.TIME, bodies=2, way="") if row.outcome.ok} == {0, 1}
 
 
 def test_an_engine_that_raises_has_a_row(rows):
@@ -106,15 +133,14 @@ def test_a_missing_engine_is_an_error_or_an_outcome():
         many_runs.attempt_many(Way(absent), bodies, grid, 10.0)
 
 
-def test_without_a_truth_there_is_one_row_of_each_kind(monkeypatch):
+def test_without_a_truth_there_is_one_row_of_each_kind():
     def refuse(*_):
         raise MissingEngine("heyoka", "heyoka")
 
-    monkeypatch.setattr(throughput, "Heyoka", refuse)
-    skipping = throughput.throughput_study((Ours(),), quick=True, skip_missing=True)
+    skipping = throughput.throughput_study((Ours(),), quick=True, skip_missing=True, truth=refuse)
     assert [row.outcome.kind for row in studies.rows(skipping)] == [OutcomeKind.MISSING] * len(KINDS)
     with pytest.raises(MissingEngine):
-        list(studies.rows(throughput.throughput_study((Ours(),), quick=True)))
+        list(studies.rows(throughput.throughput_study((Ours(),), quick=True, truth=refuse)))
 
 
 class OursFails(Fails):
