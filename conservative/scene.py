@@ -117,10 +117,11 @@ class Scene:
 
     @property
     def integrable(self) -> bool:
-        """True if a closed form of the motion exists: three invariants are known, one for each degree of freedom.
+        """True if three invariants of the scene are known, one for each degree of freedom, so that it is integrable.
 
         This holds for free bodies and for scenes with three invariants, including `extra_invariants` (Arnold, Mathematical
-        Methods of Classical Mechanics, section 49, Liouville's theorem).
+        Methods of Classical Mechanics, section 49, Liouville's theorem). False is no proof of the opposite: a body in a fixed
+        gravity gradient has a third integral that `invariants` does not list (see `GravityGradient`).
         """
         return self.free or len(self.invariants) >= 3
 

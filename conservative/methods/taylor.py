@@ -47,7 +47,8 @@ class Taylor(Method):
     The coefficients of a step follow from recurrences, because every product in the equations of motion is a product of two
     series; the powers in the torque of a spring or an attraction have a recurrence of their own (Barton, Willers & Zahar,
     1971). Energy, momenta and orthonormality are conserved to round-off by projection (Hairer, Lubich & Wanner, Geometric
-    Numerical Integration, IV.4). Steps must be well below the period of the fastest rotation.
+    Numerical Integration, IV.4). The method is neither symmetric in time nor symplectic. Steps must be well below the period of
+    the fastest rotation.
 
     For random bodies in gravity, the fastest orders are 8 to 10 for errors of 1e-2 to 1e-4 rad, 12 to 14 for 1e-5 to 1e-9, and
     14 to 16 below. In the other fields they are about two lower.

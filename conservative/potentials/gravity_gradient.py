@@ -107,6 +107,8 @@ class GravityGradient(FieldPotential):
 
     This is the second-order term in size over distance (Hughes, Spacecraft Attitude Dynamics, 8.1). The torque in body axes is
     3 rate^2 u x J u. The direction e to the centre is fixed in the world; for a satellite use `Orbit.gravity_gradient`.
+    With a fixed direction the motion is integrable (F. de Brun, 1893): |L|^2 - 3 rate^2 det(J) u' J^-1 u is constant as well.
+    No method here conserves it to round-off.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
 def section(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
     """Return the section of a report from the ratios; `bodies` is their number in each field, `seed` their seed."""
     example = f"`conservative run random_body:field=spring,seed={seed},index=0` runs the first on a spring."
-    drawn = f"Not integrable: no closed form is known. Bodies in each field: {bodies}, from seed {seed}; {example}"
+    drawn = f"Our closed forms do not solve these motions. Bodies in each field: {bodies}, from seed {seed}; {example}"
     points, figure = chart_points(ratios), None
     if len(points):
         picture = figures.random_ratios(points, bodies, seed)
@@ -218,4 +218,4 @@ def sentence(ratios: Iterable[RandomRatios]) -> str:
         parts.append(f"{missed} more are not reached by both")
     bodies = "one random body" if len(every.both) == 1 else f"{len(every.both)} random bodies"
     times = f"{factor(max(every.mean, 1 / every.mean))} times as fast as {sides[1]} ({'; '.join(parts)})."
-    return f"On {bodies} in fields, which are not integrable, {sides[0]} reaches {goal} {times}"
+    return f"On {bodies} in fields, {sides[0]} reaches {goal} {times}"

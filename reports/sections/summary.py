@@ -166,7 +166,7 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
     """Return a sentence on the faster side at `MIDDLE`, without our closed forms, and on the speed of the closed forms."""
     ours, engine = cheapest(of_classes(reached, MethodClass.GENERAL)), cheapest(of_classes(reached, *OF_ENGINES))
     solution = cheapest(of_classes(reached, MethodClass.SOLUTION))
-    parts = [f"{scene} {'is integrable, with a closed form' if integrable else 'is not integrable: no closed form is known'}."]
+    parts = [f"{scene} {'is integrable' if integrable else 'has fewer than three known invariants'}."]
     goal = f"{tolerance(MIDDLE)} rad"
     if ours and engine:
         first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
