@@ -107,7 +107,7 @@ def test_a_body_whose_truths_disagree_is_dropped():
             raise Disagreement("planted", ("one", "other"), 0.5, 1e-8)
         return reference(scene, grid)
 
-    study = throughput.throughput_study((Ours("RK4"),), quick=True, sizes=(2,), bodies=3, truth=find, processes=2)
+    study = throughput.throughput_study((MuJoCo("RK4"),), quick=True, sizes=(2,), bodies=3, truth=find, processes=2)
     study = replace(study, scenes=study.scenes[:1])
     found = list(studies.rows(study))
     dropped, kept = [row for row in found if row.measure is Measure.AGREEMENT]
@@ -116,7 +116,7 @@ def test_a_body_whose_truths_disagree_is_dropped():
     kinds = []
     list(keep_result(throughput.find_truth(study, study.scenes[0]), kinds))
     assert np.array_equal(kinds[0].few.w_WB_B0, bodies.w_WB_B0[[0, 2]])
-    assert {row.process for row in of(found, "ours", Measure.TIME, bodies=2, way="") if row.outcome.ok} == {0, 1}
+    assert {row.process for row in of(found, "mujoco", Measure.TIME, bodies=2) if row.outcome.ok} == {0, 1}
 
 
 def test_an_engine_that_raises_has_a_row(rows):
