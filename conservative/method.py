@@ -118,7 +118,8 @@ class Method(ABC):
 
         Work that is needed once per scene belongs here and not in the run, which is timed. The run is not checked; use
         `check(scene, grid, run())`. It can be called repeatedly and starts from the initial state each time. Runs of separate
-        calls of `prepare` can execute in parallel threads; the same run cannot.
+        calls of `prepare` can execute in parallel threads; the same run cannot. It can have an attribute `own_loop`, a
+        function that integrates and does not convert the samples.
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:

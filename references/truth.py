@@ -4,9 +4,10 @@
     free body, Lagrange top, compound pendulum      `Exact`                 `Precise`
     any other field that `Precise` knows            `Precise`               `SciPy` (DOP853, the tightest tolerance)
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
+    random bodies (`confirm`)                       `Precise` (96 bits)     Gauss collocation, extended precision (`collocate`)
 
 The difference contains the error of the second solution: a few rounding units in the first line, about 1e-11 rad in the others,
-and more if a motion amplifies errors.
+and more if a motion amplifies errors. For random bodies it is 1e-16 to 1e-14 rad.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from .collocation import collocate
 from .engines.scipy import SciPy
 from .exact.method import Exact
 from .precise import Precise
@@ -29,6 +31,12 @@ CHECKED_RADIANS = 100.0
 """A closed form is checked over this angle only, rad: multi-precision integration takes seconds for it."""
 CHECKED_SAMPLES = 16
 
+BITS = 96
+"""Precision of the reference solutions of random bodies."""
+CONFIRMED = 1e-13
+"""Largest difference of two reference solutions of a random body, rad: a tenth of the smallest error that is compared."""
+PARTS = (2, 8, 32, 128)
+"""Steps of the collocation between two samples. More are tried while the difference is larger than `CONFIRMED`."""
 TIGHTEST = 2.3e-14
 """Smallest relative tolerance of SciPy."""
 
@@ -95,6 +103,25 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     if not agreement <= allowed:
         raise Disagreement(scene.name, names, agreement, allowed)
     return Truth(trajectory, agreement, names, until, not isinstance(first, Exact | Precise))
+
+
+def confirm(scene: Scene, grid: Grid) -> Truth:
+    """Return the reference solution of a random body, which two independent integrators agree on.
+
+    Raises
+    ------
+    Disagreement
+        They differ by more than `CONFIRMED`.
+    MissingEngine
+        heyoka is not installed.
+    """
+    method = Precise(BITS)
+    trajectory, end = method.solve(scene, grid), float(grid.t[-1])
+    for parts in PARTS:
+        second = collocate(scene, grid, parts)
+        if (agreement := difference(trajectory, second)) <= CONFIRMED:
+            return Truth(trajectory, agreement, (method.label, second.label), end)
+    raise Disagreement(scene.name, (method.label, second.label), agreement, CONFIRMED)
 
 
 def difference(a: Trajectory, b: Trajectory) -> float:

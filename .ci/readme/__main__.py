@@ -66,7 +66,7 @@ def main() -> None:
 
         report, *random = options.measured
         with ROWS.open(encoding="utf-8", newline="") as file:
-            bodies = [row for row in csv.DictReader(file) if row["command"] == measure.RANDOM]
+            bodies = [row for row in csv.DictReader(file) if row["command"].startswith("conservative study random")]
         new = [*measure.scene_rows(report), *(measure.random_rows(*random) if random else bodies)]
         with ROWS.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, measure.COLUMNS, lineterminator="\n")

@@ -20,7 +20,7 @@ ENGINES = {"heyoka": "heyoka", "SciPy": "scipy", "MuJoCo": "mujoco", "Pinocchio"
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
 RANDOM_ERRORS = (1e-3, 1e-6, 1e-9, 1e-12)
-RANDOM = "conservative study random --bodies 40 --seed 1001 --methods gauss,projected,taylor,heyoka"
+RANDOM = "conservative study random --bodies 20 --seed 1002 --methods gauss,projected,taylor,heyoka"
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
 
 

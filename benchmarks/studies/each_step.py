@@ -20,7 +20,7 @@ from functools import partial
 from typing import Any
 
 from conservative.grid import Grid, grid_for
-from conservative.method import Method
+from conservative.method import Method, Role
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -80,7 +80,7 @@ def time_chosen(study: Study, scene: Scene, chosen: Iterable[Case], processes: P
                 yield case.row(Value(measure, math.nan), done)
                 continue
             runs[case, measure], prepares[case, measure] = done.run, partial(case.method.prepare, scene, grid)
-            if measure == Measure.TIME_SAMPLED and hasattr(done.run, "own_loop"):
+            if measure == Measure.TIME_SAMPLED and case.method.role == Role.ENGINE and hasattr(done.run, "own_loop"):
                 own = case, Measure.TIME_OWN_LOOP
                 runs[own], prepares[own] = done.run.own_loop, partial(_prepare_own_loop, case.method, scene, grid)
     timings = processes.time(

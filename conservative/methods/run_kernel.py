@@ -67,6 +67,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
             failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
         return Trajectory(scene, t_good, R_WB, w_WB_B, label, counters, failure)
 
+    run.__dict__["own_loop"] = partial(enter, 0, q, L)
     return run
 
 

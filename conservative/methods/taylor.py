@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import wraps
 from typing import Any, ClassVar
 
 import numpy as np
@@ -149,6 +150,7 @@ class Taylor(Method):
 def turn_samples(run: Run, orbit: Orbit) -> Run:
     """Return a run whose attitudes are turned from the axes of an orbit to the world's."""
 
+    @wraps(run)
     def run_and_turn() -> Trajectory:
         found = run()
         return replace(found, R_WB=orbit.R_WO(found.t) @ found.R_WB)

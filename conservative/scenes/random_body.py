@@ -1,22 +1,28 @@
-"""Random bodies in four kinds of field.
+"""Random bodies in five kinds of field: distribution 2.
 
 A body is drawn from NumPy's bit generator PCG64, seeded with (seed, number of the field, index), so it is the same to
 round-off on every machine. Below, u is uniform in [0, 1), drawn again for each use.
 
-* Moments J1 <= J2 <= J3. The condition J3/J1 is 1.1 to 100, log-uniform. J2 is uniform between max(J1, J3 - J1) and J3, so a
-  mass distribution with these moments exists. Their mean is 0.1 to 10 kg m^2, log-uniform. A high condition means a needle.
+* Moments J1 <= J2 <= J3. Ray's asymmetry parameter (2 B - A - C)/(A - C), where A, B, C are the inverse moments, is uniform
+  from -1 (long and thin) to 1 (flat). J3/J1 is 1.1 to 100, log-uniform, but at most 1 + sqrt(2/(1 + kappa)), so that a mass
+  distribution with these moments exists. The mean moment is 0.1 to 10 kg m^2, log-uniform.
 * The body axes are turned from the principal axes by a rotation uniform on the group, so the inertia is a full matrix. The
   initial attitude is another such rotation.
 * The initial rates are 0.3 to 3 rad/s, log-uniform. The body's point is 0.1 to 1 m from the pivot, log-uniform. Both have
   directions that are uniform, except that each component along a principal axis is at least a tenth of the length. Gravity is
   along the world's -z. The directions of its gradient and of an anchor are uniform in the world.
+* The gradient of gravity turns with a circular orbit, whose normal is uniform. The fixed gradient does not turn.
 * The anchor of a spring or an attraction is (1 + g) times as far from the pivot as the body's point, g = 0.2 to 3,
   log-uniform. There is no collision, but the force of an attraction can vary by a factor of 121. The spring's rest length is u
   times the anchor's distance.
-* Strength: half of the range of the field's energy over all attitudes is 0.3 to 3 times the initial kinetic energy,
-  log-uniform.
+* Strength: the initial kinetic energy is 0.1 to 30 times the range of the field's energy over all attitudes, log-uniform.
 
 The motion lasts `TURN` rad at the initial rate.
+
+Distribution 1, until the first results with seeds 1000 and 1001, had no turning field, no fast tops (0.17 to 1.7 times the
+range), and log-uniform moments, with nearly prolate bodies in 80 % of the cases.
+
+Source of the asymmetry parameter: B. S. Ray, Z. Phys. 78, 74 (1932).
 """
 
 from __future__ import annotations
@@ -33,18 +39,19 @@ from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from ..potentials.potential import Potential
+from ..potentials.turning import Orbit, Turning
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
-FIELDS = ("gravity", "spring", "attraction", "gradient")
-"""Uniform gravity, a linear spring with a rest length, an attraction by 1/r, and gravity's gradient."""
+FIELDS = ("gravity", "spring", "attraction", "gradient", "fixed_gradient")
+"""Uniform gravity, a linear spring with a rest length, an attraction by 1/r, and gravity's gradient in an orbit and fixed."""
 CONDITION = (1.1, 100.0)
 MEAN_MOMENT = (0.1, 10.0)
 RATE = (0.3, 3.0)
 ARM = (0.1, 1.0)
 GAP = (0.2, 3.0)
-ENERGY = (0.3, 3.0)
-"""Log-uniform ranges: J3/J1; kg m^2; rad/s; m; g of the anchor; half of the field's range over the initial kinetic energy."""
+ENERGY = (0.1, 30.0)
+"""Log-uniform ranges: J3/J1; kg m^2; rad/s; m; g of the anchor; initial kinetic energy over the range of the field's."""
 OFF_AXIS = 0.1
 """Smallest component of a direction along each principal axis."""
 TURN = 12.0
@@ -69,7 +76,7 @@ def random_body(field: str = FIELDS[0], seed: int = 0, index: int = 0) -> Scene:
     w_P, point_P = _log_uniform(draw, RATE) * _off_axes(draw), _log_uniform(draw, ARM) * _off_axes(draw)
     inertia = R_BP @ np.diag(J) @ R_BP.T
     body = RigidBody((inertia + inertia.T) / 2)
-    energy = _log_uniform(draw, ENERGY) * float(w_P @ (J * w_P)) / 2
+    energy = float(w_P @ (J * w_P)) / 4 / _log_uniform(draw, ENERGY)  # half of the field's range
     potential = _BUILDERS[field](draw, energy, R_BP @ point_P, body)
     name = "random_body" if (field, seed, index) == (FIELDS[0], 0, 0) else name_of(field, seed, index)
     t_end = TURN / float(np.linalg.norm(w_P))
@@ -116,9 +123,10 @@ def _rotation(draw: Draw) -> Array:
 
 
 def _moments(draw: Draw) -> Array:
-    condition = _log_uniform(draw, CONDITION)
-    least = max(1.0, condition - 1)
-    J = np.array((1.0, least + draw() * (condition - least), condition))
+    kappa = 2 * draw() - 1
+    most = min(CONDITION[1], 1 + math.sqrt(2 / (1 + kappa))) if kappa > -1 else CONDITION[1]
+    condition = _log_uniform(draw, (CONDITION[0], most))
+    J = np.array((1.0, 2 * condition / ((condition - 1) * kappa + condition + 1), condition))
     return J * (_log_uniform(draw, MEAN_MOMENT) / J.mean())
 
 
@@ -138,18 +146,25 @@ def _attraction(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> P
     return PointAttraction(energy / half_range(PointAttraction(1.0, point_B, anchor_W)), point_B, anchor_W)
 
 
-def _gradient(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Potential:
+def _gradient(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Turning:
+    normal_W, other_W = _direction(draw), _direction(draw)
+    orbit = Orbit(_fixed_gradient(draw, energy, point_B, body).rate, normal_W)
+    return orbit.gravity_gradient(body.inertia, np.cross(normal_W, other_W))
+
+
+def _fixed_gradient(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> GravityGradient:
     direction_W = _direction(draw)
     unit = GravityGradient(1.0, body.inertia, direction_W)
     range_ = unit.scale() * (1 - body.moments.min() / body.moments.max())
     return GravityGradient(math.sqrt(2 * energy / range_), body.inertia, direction_W)
 
 
-_BUILDERS: dict[str, Callable[[Draw, float, Array, RigidBody], Potential]] = {
+_BUILDERS: dict[str, Callable[[Draw, float, Array, RigidBody], Potential | Turning]] = {
     "gravity": _gravity,
     "spring": _spring,
     "attraction": _attraction,
     "gradient": _gradient,
+    "fixed_gradient": _fixed_gradient,
 }
 
 

@@ -139,23 +139,30 @@ class Heyoka(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
         integrators, label = self.integrators(problem), self.label
-        propagate, t = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid, grid.t
+        t, end = grid.t, float(grid.t[-1])
+        propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
         samples = formulations.gather([problem])
 
         @cache
         def find_reason() -> str:  # once, so that repeated runs, which are timed, do not pay for it
             with integrators.borrow() as integrator:
                 _begin(integrator, problem)
-                return pace_reason(scene, integrator, float(t[-1]))
+                return pace_reason(scene, integrator, end)
 
         def own_loop() -> tuple[Array, int, str]:
             reason = find_reason()
             with integrators.borrow() as integrator:
                 _begin(integrator, problem)
+                if grid.n_samples == 2 and not reason:  # nothing but the integration, which can take 10 us
+                    outcome, _, _, steps, *_ = integrator.propagate_until(end, max_steps=STEP_LIMIT)
+                    return integrator.state.copy(), steps, outcome
                 return (problem.start[None], 0, reason) if reason else propagate(integrator, t)
 
-        def convert(found: tuple[Array, int, str]) -> Trajectory:
+        def convert(found: tuple[Array, int, Any]) -> Trajectory:
             states, steps, reason = found
+            if states.ndim == 1:
+                reason = limit_reason(steps, 1.0) or f"heyoka: {reason.name}"
+                states = np.array([problem.start, states if steps < STEP_LIMIT else np.full_like(states, np.nan)])
             return problem.axes.trajectory(grid, label, samples(states[None]), Counters(steps), reason)
 
         return EngineRun(own_loop, convert)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.studies import ENGINES, HARD
+from conservative.benchmarks.studies.studies import ENGINES, HARD, RANDOM
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
@@ -54,8 +54,8 @@ def unsupported(table: pd.DataFrame) -> Table:
 
 
 def truths(table: pd.DataFrame) -> Table:
-    """Return the difference of the two independent reference solutions, for each scene and step."""
-    rows = table[table["measure"] == Measure.AGREEMENT.text]
+    """Return the difference of the two independent reference solutions, for each scene and step, without random bodies."""
+    rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["study"] != RANDOM)]
     body = [
         [row["scene"], numeric(row["dt"], f"{row['dt']:g}"), row["label"], numeric(row["value"])] for _, row in rows.iterrows()
     ]

@@ -18,7 +18,7 @@ from conservative.outcome import OutcomeKind
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, factor, grade_ratio, numeric, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
-from ..rows.names import OF_ENGINES, display_name, of_classes, without_outcome
+from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, without_outcome
 from ..rows.points import joined, points
 from .summary import MIDDLE, MOST, Summary, cheapest_of_each, classes_table, geometric_mean
 
@@ -49,8 +49,8 @@ class RandomRatios(Ratios):
 
 
 def supported_rows(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the study, without methods that do not support a field."""
-    return without_outcome(table[table["study"] == RANDOM], OutcomeKind.UNSUPPORTED)
+    """Return the rows of the study about methods, without those that do not support a field."""
+    return without_outcome(of_study(table, RANDOM), OutcomeKind.UNSUPPORTED)
 
 
 def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:

@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.attitude import angle_between
+from conservative.attitude import rotation_about
 from conservative.benchmarks.contest import costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
+from conservative.benchmarks.measures.processes import Processes
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import NOT_DRAWN, Case
-from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, TimedSetting
+from conservative.benchmarks.studies.random import DECADES, SAMPLES, TimedSetting
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.references import truth
 from conservative.registry import method
 from conservative.reports.rows.names import with_names
 from conservative.reports.rows.points import points as points_of
@@ -134,10 +136,31 @@ def test_an_isolated_good_point_is_timed_by_its_credited_error():
     assert random.worth_timing([line]) == line[1:3]
 
 
-def test_the_run_that_is_timed_is_longer_in_the_same_steps():
-    quick, slow = made_up("projected", 1e-3, 1e-9), made_up("projected", 1e-3, 1.0)
-    assert random.lengthen(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
-    assert random.lengthen(slow).grid == Grid(0.1, 12, 12)
+def test_the_timed_motion_is_the_one_whose_errors_are_read(monkeypatch):
+    """Final state only, and as long as the scene. 50 times as long, a method could be faster on another part of the motion."""
+    prepared, study = [], random.random_study(METHODS, 1, 3, quick=True)
+    real = random.prepare_unchecked
+    monkeypatch.setattr(random, "prepare_unchecked", lambda case: prepared.append(case) or real(case))
+    point = line_of(METHODS[0])[3]
+    with Processes() as processes:
+        (row,) = random.time_rows(study, [TimedSetting(point, None, 1e-6, 1e-6)], processes)
+    assert [case.grid for case in prepared] == [Grid(point.grid.dt, point.grid.n_steps, point.grid.n_steps)]
+    assert prepared[0].grid.dt * prepared[0].grid.n_steps == pytest.approx(BODY.t_end)
+    assert row.value > 0
+
+
+@pytest.mark.parametrize("name", ["taylor", "projected", "gauss", "heyoka", "heyoka:frame=base_vectors"])
+@pytest.mark.parametrize("field", ["gravity", "gradient"])
+def test_the_timed_loop_reaches_the_final_state(name, field):
+    """`own_loop` of a run leaves the kernel's arrays, or heyoka's state, as the run itself does."""
+    scene = random_body(field, 3, 0)
+    run = method(name)
+    if run.unsupported(scene):
+        pytest.skip("its field turns")
+    run = run.prepare(scene, Grid(scene.t_end / 48, 48, 48))
+    before, counted = run(), run.own_loop()
+    assert counted is None or counted[0] == before.counters.steps == 48  # ours return their counters
+    assert np.array_equal(run().R_WB, before.R_WB)
 
 
 @pytest.mark.parametrize(
@@ -156,8 +179,17 @@ def test_a_bug_of_ours_is_no_outcome():
         random.prepare_unchecked(Case("random", SCENE, Ours("raises"), Grid(0.1, 12, 12)))
 
 
-def test_truth_agrees_with_another_one():
-    scene = random_body("attraction", 3, 0)
-    grid = Grid(scene.t_end / SAMPLES, SAMPLES)
-    result, other = random.precise(scene, grid).trajectory, method("scipy:rtol=1e-12").solve(scene, grid)
-    assert angle_between(result.R_WB, other.R_WB).max() < 1e-9  # measured 4e-12
+def test_bodies_whose_truths_disagree_are_not_compared(monkeypatch):
+    """Planted: a second solution that is wrong by 1e-12 rad."""
+    real = truth.collocate
+
+    def wrong(*arguments):
+        found = real(*arguments)
+        return replace(found, R_WB=found.R_WB @ rotation_about((1.0, 2.0, 3.0), 1e-12))
+
+    monkeypatch.setattr(truth, "collocate", wrong)
+    study = random.random_study(METHODS, 1, 3, quick=True)
+    (row,) = studies.findings(replace(study, scenes=study.scenes[:1], drawn=study.drawn[:1]))
+    assert (row.measure, row.outcome.kind) == (Measure.AGREEMENT, OutcomeKind.SKIPPED)
+    assert row.value == pytest.approx(1e-12, rel=0.05)
+    assert (row.field, row.seed, row.body) == ("gravity", 3, 0)

@@ -7,6 +7,7 @@ import conservative as cv
 from conservative.attitude import angle_between, rotation_about
 from conservative.grid import Grid
 from conservative.references import truth
+from conservative.scenes.random_body import FIELDS, random_body
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)
 
@@ -81,3 +82,38 @@ def test_a_trajectory_that_ended_early_differs():
     whole, half = (truth.Exact().prepare(scene, Grid(0.1, n))() for n in (20, 10))
     assert truth.difference(whole, half) == np.inf
     assert truth.difference(whole, whole) == angle_between(whole.R_WB, whole.R_WB).max() == 0
+
+
+@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize("index", [0, 1])
+def test_two_independent_solutions_of_a_random_body_agree(field, index):
+    scene = random_body(field, 7, index)
+    solution = truth.confirm(scene, Grid(scene.t_end / 12, 12))
+    assert solution.agreement_rad < 1e-13  # measured 0 to 7e-14
+    assert solution.names[0].startswith("heyoka==")
+    assert "collocation" in solution.names[1]
+
+
+@pytest.mark.parametrize("factor", [1 + 1e-12, 1 - 1e-11])
+def test_a_law_that_is_slightly_wrong_is_no_confirmation(monkeypatch, factor):
+    """Planted in the field of the second solution only."""
+    scene = random_body("spring", 7, 0)
+    other = scene.rename("other", potential=replace_stiffness(scene.potential, factor))
+    real = truth.collocate
+    monkeypatch.setattr(truth, "collocate", lambda _, *grid: real(other, *grid))
+    with pytest.raises(truth.Disagreement) as caught:
+        truth.confirm(scene, Grid(scene.t_end / 12, 12))
+    assert caught.value.agreement_rad > caught.value.allowed_rad == truth.CONFIRMED
+
+
+def replace_stiffness(spring, factor):
+    return cv.LinearSpring(spring.stiffness * factor, spring.point_B, spring.anchor_W, spring.rest_length)
+
+
+def test_collocation_is_of_order_24():
+    scene, grid = cv.scenes.brick_flip(), Grid(6.0, 1)
+    exact = truth.Exact().solve(scene, grid).R_WB
+    errors = [angle_between(truth.collocate(scene, grid, parts).R_WB, exact).max() for parts in (14, 18, 40)]
+    order = np.log(errors[0] / errors[1]) / np.log(18 / 14)
+    assert order == pytest.approx(24, abs=3)  # measured 23.1
+    assert errors[2] < 2e-15  # measured 4e-16

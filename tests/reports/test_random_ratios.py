@@ -19,7 +19,7 @@ from conservative.reports.run.terms import terms
 from conservative.reports.sections import random_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
 from conservative.reports.sections.report import build
-from conservative.scenes.random_body import name_of
+from conservative.scenes.random_body import FIELDS, name_of
 
 from .made_up import measurements
 from .rows import frame, row, texts
@@ -109,6 +109,12 @@ def test_every_decade_and_every_field_has_its_row():
 def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
     missing = line(0, "mujoco", "engine", [(math.nan, math.nan)], outcome="unsupported")
     assert {each.engine for each in found(*TWICE, missing)} == {ANY, "heyoka"}
+
+
+def test_a_body_without_a_confirmed_truth_is_in_no_count():
+    dropped = {"scene": name_of(FIELD, 7, 9), "field": FIELD, "seed": 7, "body": 9, "role": "truth", "outcome": "skipped"}
+    contest = against(found(*TWICE, [row("random", "precise:bits=96", Measure.AGREEMENT, 1e-12, **dropped)]))
+    assert len(contest.contests) == 1
 
 
 def test_without_an_engine_there_are_no_ratios():
@@ -212,7 +218,7 @@ def test_how_many_bodies_a_report_has():
     assert plan_report([], METHODS, full=True).bodies == BODIES
     assert plan_report([], METHODS, full=True, quick=True).bodies == QUICK_BODIES
     first = plan_report(["brick_flip"], METHODS, bodies=1).studies[0]
-    assert (first.name, len(first.scenes)) == ("random", 4)
+    assert (first.name, len(first.scenes)) == ("random", len(FIELDS))
     assert plan_report([], METHODS, bodies=0).studies[0].name != "random"
 
 
