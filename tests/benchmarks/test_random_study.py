@@ -158,8 +158,8 @@ def test_the_timed_loop_reaches_the_final_state(name, field):
     if run.unsupported(scene):
         pytest.skip("its field turns")
     run = run.prepare(scene, Grid(scene.t_end / 48, 48, 48))
-    before, counted = run(), run.own_loop()
-    assert counted is None or counted[0] == before.counters.steps == 48  # ours return their counters
+    before, counts = run(), run.own_loop()
+    assert before.counters.steps == counts[1 if name.startswith("heyoka") else 0]
     assert np.array_equal(run().R_WB, before.R_WB)
 
 
