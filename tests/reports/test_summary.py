@@ -65,9 +65,7 @@ def test_scenes_are_integrable_or_not(name, integrable):
 def test_a_sentence_compares_general_integrators_and_tells_of_a_solution_apart():
     between = 6e-6 * (8 / 6) ** 0.75 / (2e-6 * 2**0.75)  # three of four decades from 1e-3 to 1e-7
     sentence = told(OURS, SOLVER, SOLUTION).sentence
-    assert sentence.startswith(
-        "made_up is integrable. Our fastest general integrator, gauss, reaches 1e-6 rad "
-    )
+    assert sentence.startswith("made_up is integrable. Our fastest general integrator, gauss, reaches 1e-6 rad ")
     assert (
         f"{between:.1f} times as fast as the fastest engine, scipy. lame, which solves integrable motions only, is" in sentence
     )
