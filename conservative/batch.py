@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .attitude import Array, to_quaternion
 from .body import RigidBody
@@ -16,6 +17,9 @@ from .potentials.potential import AnyPotential
 from .potentials.turning import Turning, static_part
 from .potentials.varied import OneByOne, Varied
 from .scene import Scene
+
+NEARLY = 1e-11
+"""Relative difference of moments below which the symmetry of a body is checked completely; larger than any tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +48,7 @@ class Batch:
     def __len__(self) -> int:
         return len(self.R_WB0)
 
-    def __getitem__(self, part: slice | Array) -> Batch:
+    def __getitem__(self, part: slice | NDArray[Any]) -> Batch:
         inertia = None if self.inertia is None else self.inertia[part]
         parameters = {name: values[part] for name, values in self.parameters.items()}
         return Batch(self.scene, self.R_WB0[part], self.w_WB_B0[part], inertia, parameters)
@@ -93,6 +97,24 @@ class Batch:
             body = self.scene.body
             return np.broadcast_to(body.moments, (n, 3)), np.broadcast_to(body.R_BP, (n, 3, 3))
         return principal_axes(self.inertia)
+
+    @cached_property
+    def symmetry_axes_B(self) -> Array:
+        """Unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan without one.
+
+        They are nan for all bodies if the scene itself has no such axis.
+        """
+        if self.scene.symmetry_axis_B is None:
+            return np.full((1, 3), np.nan)
+        if self.inertia is None and not self.parameters:
+            return self.scene.symmetry_axis_B[None]
+        axes_B = np.full((len(self), 3), np.nan)
+        J = np.sort(self.principal[0], axis=1)
+        for i in np.flatnonzero(np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]).tolist():
+            axis = self.take(i).symmetry_axis_B
+            if axis is not None:
+                axes_B[i] = axis
+        return axes_B
 
     @cached_property
     def q_WP0(self) -> Array:

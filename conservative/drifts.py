@@ -21,8 +21,6 @@ from .potentials.turning import Turning, static_part
 from .scene import Scene
 
 ORTHONORMALITY = "orthonormality"
-NEARLY = 1e-11
-"""Relative difference of moments below which the symmetry of a body is checked completely; larger than any tolerance."""
 _NO_ENERGIES = np.empty((0, 0))
 
 
@@ -82,7 +80,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
     L_W = np.einsum("nij,nj->ni", bodies.R_WB0, L_B)
     rows[:, 6] = np.einsum("nij,nj->ni", rows[:, 3:6], L_W)
     if scene.symmetry_axis_B is not None:
-        rows[:, 7] = np.nan_to_num(find_axial(bodies)) / momentum[:, None]
+        rows[:, 7] = np.nan_to_num(bodies.symmetry_axes_B) / momentum[:, None]
         rows[:, 8, 2] = np.einsum("ni,ni->n", rows[:, 7], L_B)
     own = [each for each in scene.invariants if each not in scene.extra_invariants]
     if any(each.unit == "J" for each in own):
@@ -120,7 +118,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
             drift = (values - start[:, None]) / each.scale
             columns.append(sizes(drift.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1))
         elif each.name == AXIAL_MOMENTUM:
-            columns.append(np.where(np.isnan(find_axial(bodies)[:, 0]), np.nan, measured[:, 3]))
+            columns.append(np.where(np.isnan(bodies.symmetry_axes_B[:, 0]), np.nan, measured[:, 3]))
         else:
             columns.append(measured[:, 2 if each.unit == MOMENTUM_UNIT else 1])
     return np.stack(columns, axis=1)
@@ -131,22 +129,6 @@ def momenta_of(bodies: Batch) -> Array:
     if bodies.inertia is None:
         return np.asarray(bodies.w_WB_B0 @ bodies.scene.body.inertia)
     return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
-
-
-def find_axial(bodies: Batch) -> Array:
-    """Return unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan without one."""
-    if bodies.scene.symmetry_axis_B is None:
-        return np.full((1, 3), np.nan)
-    if bodies.inertia is None and not bodies.parameters:
-        return bodies.scene.symmetry_axis_B[None]
-    axes_B = np.full((len(bodies), 3), np.nan)
-    J = np.sort(bodies.principal[0], axis=1)
-    nearly_symmetric = np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]
-    for i in np.flatnonzero(nearly_symmetric).tolist():
-        axis = bodies.take(i).symmetry_axis_B
-        if axis is not None:
-            axes_B[i] = axis
-    return axes_B
 
 
 def find_axes(bodies: Batch) -> Array:

@@ -100,7 +100,7 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
 
 
 def invariants_of(
-    body: RigidBody, potential: AnyPotential | None, w_WB_B0: Array, energy_scale: float
+    body: RigidBody, potential: AnyPotential | None, w_WB_B0: Array, energy_scale: float, axis: Array | None
 ) -> tuple[Invariant, ...]:
     """Return the invariants that follow from body and potential, with scales from the initial state.
 
@@ -116,6 +116,8 @@ def invariants_of(
         Initial angular velocity (3,), rad/s, body axes.
     energy_scale
         Reference scale of the energy, J, above 0.
+    axis
+        Unit vector (3,), body axes, about which body and field are symmetric, or None (`axial_direction`).
     """
     conserved = list(_energies(body, potential, energy_scale))
     # A scene that starts at rest has no momentum. The momentum that gravity can produce is the scale instead.
@@ -125,7 +127,6 @@ def invariants_of(
     elif (line := potential.axis_W) is not None:
         name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
         conserved.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
-    axis = axial_direction(body, potential)
     if axis is not None:
         conserved.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(conserved)

@@ -149,7 +149,8 @@ class Scene:
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
         """Conserved quantities of the exact motion: energy, momenta, and `extra_invariants`."""
-        return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
+        own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
+        return (*own, *self.extra_invariants)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
         """Return attitudes (n, 3, 3) at times (n,), s, relative to the axes in which the field is fixed."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..batch import Batch
-from ..drifts import arrange_drifts, find_reference
+from ..drifts import ReferenceValues, arrange_drifts, find_reference
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..grid import Grid
 from ..method import Method
@@ -80,18 +80,21 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     run, reference = method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
     if run is None:
         block, alone = Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool)), np.arange(n)
+        measured = np.empty((n, 5))
     else:
         block = run()
         measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
         alone = np.flatnonzero(~(block.finished & are_accepted(method, bodies, grid, measured)))
-    failures = {}
+        alone = np.setdiff1d(alone, list(block.failures))
+    failures = dict(block.failures)
     for i in alone.tolist():
         pause()
         failure = run_alone(method, bodies, grid, i, block)
         if failure is not None:
             failures[i] = failure
     if len(alone):
-        measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
+        part = ReferenceValues(bodies[alone], reference.rows[alone])
+        measured[alone] = part.measure(grid, grid.t, block.R_WB[alone], block.w_WB_B[alone])
     return BlockResult(block.R_WB, block.w_WB_B, arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B), failures)
 
 
@@ -110,7 +113,7 @@ def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> 
         return are_within(0, slice(None))
     moments = bodies.principal[0]
     good = are_within(int(np.argmin(moments.max(axis=1) / moments.min(axis=1))), slice(None))
-    for i in np.flatnonzero(~good).tolist():
+    for i in np.flatnonzero(~good & np.isfinite(measured[:, 4])).tolist():
         good[i] = are_within(i, i)
     return good
 

@@ -366,12 +366,13 @@ class Bodies(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Rows of the attitude's matrix and rates of bodies in lanes, and how many of their steps failed."""
+    """Rows of the attitude's matrix and rates of bodies in lanes, the step that failed (0: none), and its defect."""
 
     g: Any
     a: Any
     w: Any
     failed: Any
+    defect: Any
 
 
 @trace
@@ -391,12 +392,12 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
     `like` is a `Bodies` and a `Motion` of floats, whose numbers are in `columns` (., n) and `motions` (., n). Samples of every
     `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,), rad/s. `turns` (samples or
     1, 2, n) are cosines and sines of the angles of spins that are left out. A body whose step cannot be projected counts as
-    failed from then on.
+    failed from then on; its samples after that step have no meaning.
     """
     n, samples = columns.shape[1], 1 + (n_steps + every - 1) // every
     for at in range(0, n, REGISTER):
         bodies = load_rows(columns.reshape(-1), at, n, like[0], REGISTER)
-        g, a, w, failed = load_rows(motions.reshape(-1), at, n, like[1], REGISTER)
+        g, a, w, failed, defect = load_rows(motions.reshape(-1), at, n, like[1], REGISTER)
         body, K, _ = begin(bodies)
         step, row = done, done // every
         while step < until:
@@ -407,8 +408,10 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
                 (g, a, w), _, _ = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
                 g, a, w, left, needed = correct(bodies.field, body, BETWEEN, g, a, w)
                 g, a, w, _, left = project(bodies.field, body, BETWEEN, g, a, w, left, needed & (failed < 0.5))
-                failed = choose(left < LEFT, failed, failed + 1.0)
                 step += 1
+                failing = ~(left < LEFT) & (failed < 0.5)
+                if some(failing):
+                    failed, defect = choose(failing, (1.0 * step, left), (failed, defect))
             if step == sampled:
                 turn = load_rows(turns.reshape(-1), 2 * n * min(row, len(turns) - 1) + at, n, 2, REGISTER)
                 needed = (left > ENOUGH) & (failed < 0.5)
@@ -416,4 +419,4 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
                 sample = find_sample(bodies, turn, g1, a1, w1)
                 save_columns(R_WB, 9 * (at * samples + row), 9 * samples, sample[:9])
                 save_columns(w_WB_B, 3 * (at * samples + row), 3 * samples, sample[9:])
-        save_rows(motions.reshape(-1), at, n, (g, a, w, failed))
+        save_rows(motions.reshape(-1), at, n, (g, a, w, (failed, defect)))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..attitude import Array
+from ..errors import IntegrationFailed
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,12 +20,16 @@ class Block:
     R_WB, w_WB_B
         Attitudes (n, s, 3, 3), body to world, and angular velocities (n, s, 3), rad/s, body axes.
     finished
-        Booleans (n,). Bodies that are not finished are integrated again one by one, and their samples are replaced.
+        Booleans (n,). Bodies that are not finished are integrated again one by one, and their samples are replaced, unless
+        `failures` has the reason.
+    failures
+        Failures by the index of the body, the same as of each body alone. Their samples after the failure are nan.
     """
 
     R_WB: Array
     w_WB_B: Array
     finished: Any
+    failures: Mapping[int, IntegrationFailed] = field(default_factory=dict)
 
 
 RunMany = Callable[[], Block]

@@ -15,7 +15,7 @@ from ..batch import Batch
 from ..card import Card, Cost, Structure
 from ..check import describe, positive_number, set_fields
 from ..deferred_imports import kernels
-from ..errors import BadInput
+from ..errors import BadInput, IntegrationFailed, NotConverged
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, momentum_W
 from ..method import Method, Role, Run
@@ -258,7 +258,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         R_BP=R_BP,
         units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
     )
-    motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n))
+    motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
     width, like = kernels("lanes").REGISTER, (zeros_like(start), zeros_like(motion))
     columns, motions = (fill_columns(np.column_stack(list(flatten(each, n))), width) for each in (start, motion))
     m = columns.shape[1]
@@ -274,7 +274,12 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
             grid.n_steps, cost, lambda done, last: kernel.enter_many(*given, done, last, grid.n_steps, grid.every, *samples)
         )
         R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
-        return Block(R_WB[:n], w_WB_B[:n], ends[-1, :n] == 0)
+        failures: dict[int, IntegrationFailed] = {}
+        for i in np.flatnonzero(ends[-2, :n]).tolist():
+            done = int(ends[-2, i]) - 1
+            failures[i] = NotConverged(done + 1, done * grid.dt, float(ends[-1, i]), kernel.FAILURE)
+            R_WB[i, grid.count_samples(done) :], w_WB_B[i, grid.count_samples(done) :] = np.nan, np.nan
+        return Block(R_WB[:n], w_WB_B[:n], ends[-2, :n] == 0, failures)
 
     return run
 

@@ -10,6 +10,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import from_quaternion
 from conservative.batch import Batch
+from conservative.integration import blocks
 from conservative.kernels import COMPILED
 from conservative.methods import columns
 from conservative.methods.many import Block
@@ -203,6 +204,26 @@ def test_bodies_without_a_step_are_not_finished() -> None:
     far = varied("gravity")
     far.w_WB_B0[[1, 6]] *= ((20.0,), (1e90,))  # one is far from its invariants, one is not finite
     assert run(cv.Taylor(6), far, cv.Grid(0.2, 20)).finished.tolist() == [True, False, True, True, True, True, False]
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_body_that_fails_in_lanes_fails_as_it_does_alone(field: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Residuals differ by up to 5e-14 of their size."""
+    method, bodies, grid = cv.Taylor(6), varied(field), cv.Grid(0.45, 40, 3)
+    failed = {i: each for i in range(len(bodies)) if not (each := method.solve(bodies.take(i), grid)).ok}
+    monkeypatch.setattr(blocks, "run_alone", None)
+    block = blocks.run_block(method, bodies, grid)
+    assert block.failures.keys() == failed.keys()
+    assert failed
+    for i, alone in failed.items():
+        own, failure = block.failures[i], alone.failure
+        assert isinstance(own, cv.NotConverged)
+        assert isinstance(failure, cv.NotConverged)
+        assert (own.step, own.time, own.reason) == (failure.step, failure.time, failure.reason)
+        assert own.residual == pytest.approx(failure.residual, rel=1e-12)
+        np.testing.assert_allclose(block.R_WB[i, : len(alone)], alone.R_WB, rtol=0, atol=1e-13)  # measured 4e-14
+        assert np.isnan(block.R_WB[i, len(alone) :]).all()
+        assert np.isnan(block.w_WB_B[i, len(alone) :]).all()
 
 
 def test_lame_leaves_bodies_without_symmetry() -> None:
