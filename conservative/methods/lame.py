@@ -24,9 +24,9 @@ gravity need no special case.
 The constants belong to one energy and one momentum. Round-off would let both drift, linearly, or exponentially near a steady
 precession. Each step therefore ends with the smallest change of the state that restores them.
 
-Alternatives on tops are slower or less accurate. `Gauss` needs about thirty times the work. A Taylor series of (axis, momentum)
-evaluates six products to order 20, compared with one division here. Compositions of free rotations and kicks have a truncation
-error and only bound the energy error.
+Alternatives on tops are slower or less accurate. `Gauss` iterates, and a Taylor series of (axis, momentum) evaluates six
+products to a high order, compared with one division here. Compositions of free rotations and kicks have a truncation error and
+only bound the energy error.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Potentials: energy of a body as a function of its attitude, and the finite derivative that conserves it.
 
 The base vectors q_j are the columns of `R_WB`, so a potential is a function of a matrix, and its gradient has the same
-shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j), world axes (the paper's (7) and (21)).
+shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j), world axes, because of the
+paper's (20): d/dt sum_j q_j x p_j has no other term (DERIVATION.md, 4).
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ because programs round digits or cut them off, or by at most `tolerance`. A know
 """
 
 import csv
+import re
+from collections import Counter
 from decimal import Decimal
 from functools import lru_cache
 from types import SimpleNamespace
@@ -252,6 +254,10 @@ def test_the_comparison_of_a_half_with_printed_numbers(relation, printed, tolera
 
 def test_every_figure_is_on_the_page():
     lines = (ROOT / "benchmarks" / "published.md").read_text(encoding="utf-8").replace("\\", "").splitlines()
+    found = Counter(figure.expected for figure in FIGURES)
+    counts = [len(FIGURES), found["agrees"], found["differs"], found["not measured"]]
+    assert [int(number) for number in re.findall(r"\d+", " ".join(lines[2:4]))] == counts
     for figure in FIGURES:
-        assert any(figure.name in line and figure.printed.split()[0] in line for line in lines), figure.name
+        parts = figure.name, figure.printed.split()[0], figure.expected
+        assert any(all(part in line for part in parts) for line in lines), figure.name
         assert figure.expected == "agrees" or figure.note, figure.name
