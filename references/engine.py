@@ -27,7 +27,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from .samples import States, to_body_axes
+from .samples import MATRIX, States, to_body_axes
 
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
@@ -135,6 +135,10 @@ class EngineRun:
 
     own_loop: Callable[[], Any]
     convert: Callable[[Any], Trajectory]
+
+    def __post_init__(self) -> None:
+        # So that the first call does not compile the conversion.
+        to_body_axes(np.empty(0), States(MATRIX, np.empty((0, 0, 12))), np.empty((0, 3, 3)))
 
     def __call__(self) -> Trajectory:
         return self.convert(self.own_loop())

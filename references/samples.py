@@ -58,12 +58,12 @@ def to_body_axes(t: Array, states: States, R_BF: Array) -> tuple[Array, Array, A
 
     `t` are the times (s,) or more, s; `R_BF` the rotations (n, 3, 3) from F to body axes.
     """
-    values = np.ascontiguousarray(states.values, dtype=float)
-    n, s, _ = values.shape
+    n, s, _ = states.values.shape
     R_WB, w_WB_B, finite = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty(n, np.int64)
     R_WD = np.broadcast_to(np.eye(3), (n, 3, 3)) if states.R_WD is None else states.R_WD
     constants = np.zeros((n, 4)) if states.constants is None else states.constants
-    arrays = [np.ascontiguousarray(each, dtype=float) for each in (t, values, R_BF, constants, R_WD)]
+    # Copies, because numba compiles a function again for arrays that are read-only.
+    arrays = [np.array(each, float, order="C") for each in (t, states.values, R_BF, constants, R_WD)]
     _convert(states.kind, states.rates_in_world, *arrays, R_WB, w_WB_B, finite)
     return R_WB, w_WB_B, finite
 
