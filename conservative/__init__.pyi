@@ -34,6 +34,10 @@ from .methods.moser_veselov import MoserVeselov as MoserVeselov
 from .methods.projected import Projected as Projected
 from .methods.reduced import Reduced as Reduced
 from .methods.substepped import Substepped as Substepped
+from .methods.symplectic import LieVariational as LieVariational
+from .methods.symplectic import NoSquish as NoSquish
+from .methods.symplectic import Rattle as Rattle
+from .methods.symplectic import Splitting as Splitting
 from .methods.taylor import Taylor as Taylor
 from .outcome import Outcome as Outcome
 from .outcome import OutcomeKind as OutcomeKind

@@ -28,6 +28,9 @@ AXIS = "momentum along the field's axis"
         (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
         (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
         (cv.Projected(), "projected", 8, {"energy", JACOBI_INTEGRAL, "vertical momentum", AXIS}),
+        (cv.Splitting(), "splitting", 6, {"momentum", "vertical momentum", AXIS, "axial momentum"}),
+        (cv.NoSquish(4), "no_squish:order=4", 4, {"momentum", "vertical momentum", AXIS}),
+        (cv.LieVariational(), "lie_variational", 2, {"momentum", "vertical momentum", AXIS, "axial momentum"}),
         (
             *(cv.Taylor(9), "taylor:order=9", 9),
             {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", AXIS, "axial momentum"},
@@ -56,6 +59,10 @@ def test_order_and_invariants(method, name, order, conserves):
         (lambda: cv.Reduced(4, "one_step"), "composition"),
         (lambda: cv.Reduced(4, "kahan_li_9"), "composition"),
         (lambda: cv.Reduced(frame="own"), "frame"),
+        (lambda: cv.Splitting(5), "order"),
+        (lambda: cv.Splitting(6, "blanes_moan_6"), "composition"),
+        (lambda: cv.NoSquish(6, "blanes_moan_14"), "composition"),
+        (lambda: cv.Splitting(8, "blanes_moan_14"), "composition"),
         (lambda: cv.MoserVeselov(True), "order"),
         (lambda: cv.MoserVeselov(12), "order"),
         (lambda: cv.MoserVeselov("best"), "order"),
@@ -101,6 +108,7 @@ def test_methods_give_the_reason_for_unsupported_scenes():
     assert said[1:] == ["needs uniform gravity", "body and field symmetric about one axis"]
     assert cv.MoserVeselov().unsupported(GRAVITY) == "it is for free bodies"
     assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
+    assert cv.Splitting().unsupported(FREE).startswith("it is for bodies in a field")
     assert cv.Reduced(frame="non_spinning").unsupported(FREE).startswith("frame non_spinning needs")
     assert cv.Substepped("gauss").unsupported(SPRUNG) == said[0]
     assert "recurrence" in cv.Taylor().unsupported(in_field("function"))

@@ -46,6 +46,7 @@ LONG_RUNS = (
     ("brick_flip", "moser_veselov"),
     ("sprung_body", "projected"),
     ("sprung_body", "taylor"),
+    ("sprung_body", "splitting"),
     ("lagrange_top", "substepped"),
     ("brick_flip", "convected"),
 )

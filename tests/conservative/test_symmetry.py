@@ -149,6 +149,8 @@ def test_symmetries_hold(method, kind, data):
     case = data.draw(cases(kind))
     plain = run(method, case.scene)
     for symmetry in SYMMETRIES:
+        if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
+            continue  # equal moments have no axes of their own, and its error depends on the axes
         R, w = symmetry(method, case, plain)
         assert angle_between(plain.R_WB, R).max() < ROUND_OFF, symmetry.__name__
         assert np.abs(plain.w_WB_B - w).max() < ROUND_OFF, symmetry.__name__
