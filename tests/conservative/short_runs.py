@@ -86,8 +86,8 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
         for method in METHODS:
             if method.unsupported(scene):
                 continue
-            long = () if isinstance(method, cv.Splitting) else ((200, 2),)  # kicks over many radians amplify round-off to 1e-5
-            for factor, n in ((1, 8), (40, 3), *long):
+            # Kicks over 50 radians amplify round-off to 4e-3.
+            for factor, n in ((1, 8), (4, 3)) if isinstance(method, cv.Splitting) else ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
             for factor, n in ((1, 33 if scene.free else 8), (40, 3)):
@@ -118,7 +118,7 @@ def numbers(found: cv.Trajectory | Block | None) -> np.ndarray:
         R_WB, w_WB_B, ends = found.R_WB[found.finished], found.w_WB_B[found.finished], found.finished
     else:
         R_WB, w_WB_B, ends = found.R_WB, found.w_WB_B, [found.counters.steps]
-    size = np.linalg.norm(w_WB_B, axis=-1).max(initial=0.0) or 1.0
+    size = max(np.linalg.norm(w_WB_B, axis=-1).max(initial=0.0), 1e-3)  # a body at rest may have rates of 1e-17 rad/s
     return np.concatenate([R_WB.ravel(), w_WB_B.ravel() / size, ends])
 
 
