@@ -88,6 +88,10 @@ if COMPILED:
                 self._places[id(register)] = place, register
             return self._places[id(register)][0]
 
+        def locate(self, place):
+            """Return the address of a place as a number."""
+            return Symbol(self.builder, [self.builder.ptrtoint(self._address(self.count_bytes(place)), INTEGER)])
+
         def _address(self, byte):
             return self.builder.bitcast(self.builder.gep(self._start, [byte]), self.register.as_pointer())
 
@@ -151,6 +155,28 @@ class Vectors:
         """Return the histories of r and s of vector k."""
         return self._parts[2 * k], self._parts[2 * k + 1]
 
+    def locate(self):
+        """Return what `recall` needs: for one body, the address of the first r of order 1 and the bytes of an order."""
+        memory, places = self._series.memory, self._parts[0].places
+        if not self._series.one_body:
+            return self if memory is None else 0
+        return memory.locate(*places[1]), 8 * FOUR * (places[2][0] - places[1][0])
+
+
+def recall(terms, n):
+    """Return the coefficients n = 1, 2, ... of g, a and w of one body, three times three numbers, from `Vectors.locate`."""
+    if isinstance(terms, Vectors):
+        return tuple((z, x, y) for x, y, z in (terms[n, part] for part in (0, 2, 4)))
+    builder, (start, step, number) = n.builder, (x.registers[0] for x in (*terms, n))
+    at = builder.add(start, builder.mul(builder.sub(number, ir.Constant(INTEGER, 1)), step))
+
+    def read(place):
+        pointer = builder.inttoptr(builder.add(at, ir.Constant(INTEGER, 8 * place)), DOUBLE.as_pointer())
+        return Symbol(builder, [builder.load(pointer)])
+
+    # r and s of a vector are (x2, x3, x1, x2) and (x3, x1, x2, x3), each in a register
+    return tuple(tuple(read(2 * FOUR * k + place) for place in (2, 0, 1)) for k in range(3))
+
 
 class Series:
     """Vectors, memory and sums of products for one body or several. The kind follows from one number of the state."""
@@ -158,7 +184,7 @@ class Series:
     def __init__(self, number):
         traced = isinstance(number, Traced)
         self.one_body = traced and not number.width
-        self._memory = Memory(number) if traced else None
+        self.memory = Memory(number) if traced else None
 
     def vector(self, x, y, z):
         """Return a vector."""
@@ -182,7 +208,7 @@ class Series:
 
     def history(self):
         """Return an empty history."""
-        return History(self._memory)
+        return History(self.memory)
 
     def convolve(self, n, first, last, *sums, start=None):
         """Return sums over i = first ... last of x[i] y[n-i], each minus the sum over a second pair (x, y) if there is one.
@@ -193,7 +219,7 @@ class Series:
         totals[0][0] = start
         # From the middle, and large i first.
         orders = sorted(range(first, last + 1), key=lambda i: (abs(2 * i - n), -i))
-        if self._memory is not None and not self.one_body and n >= LOOPS_FROM:
+        if self.memory is not None and not self.one_body and n >= LOOPS_FROM:
             totals, orders = self._loop(n, sums, totals), [i for i in (n, 0) if first <= i <= last]
         for i in orders:
             loaded = {}
@@ -216,7 +242,7 @@ class Series:
 
     def _loop(self, n, sums, totals):
         """Return the totals with the products of i and n - i for i = 1 ... n-1, added by a loop of machine code."""
-        memory, builder = self._memory, self._memory.builder
+        memory, builder = self.memory, self.memory.builder
         widths = [max(len(history.places[1]) for history in pairs[0]) for pairs in sums]
         zero = Symbol(builder, [ir.Constant(memory.register, [0.0] * memory.register.count)])
         starts = [(zero,) * width if total is None else total for (total,), width in zip(totals, widths, strict=True)]
@@ -291,12 +317,11 @@ def find_next(series, c, n, h, K, accelerate):
     return *rows, fuse(f2 * K, c[n, 4], rates) if n else rates
 
 
-def sum_orders(series, h, start, K, accelerate, turn):
+def sum_orders(series, c, h, start, K, accelerate, turn):
     """Yield, for each order up to the highest, three times (g, a, w): the sum of a step, its last term, and the one before.
 
-    `turn` is the rate of the axes of g and a, None if they are fixed.
+    The coefficients are added to c. `turn` is the rate of the axes of g and a, None if they are fixed.
     """
-    c = Vectors(series, len(start))
     c.push(start)
     total = before = None
     for n in range(HIGHEST):
@@ -306,14 +331,14 @@ def sum_orders(series, h, start, K, accelerate, turn):
             g, a = fuse(c.newest[1], by, g), fuse(-c.newest[0], by, a)
         term = g, a, w
         total = term if total is None else tuple(s + x for s, x in zip(total, term, strict=True))
-        yield total, term, before
         c.push(term)
+        yield total, term, before
         before = term
 
 
-def sum_to_order(series, order, h, start, K, accelerate, turn):
+def sum_to_order(series, c, order, h, start, K, accelerate, turn):
     """Return the change of (g, a, w) in a step of an order and a length h, its last term, and the one before."""
-    sums = enumerate(sum_orders(series, series.spread(h), start, K, accelerate, turn), 1)
+    sums = enumerate(sum_orders(series, c, series.spread(h), start, K, accelerate, turn), 1)
     if not isinstance(order, Traced):
         return next(found for n, found in sums if n == order)
     builder, exits = order.builder, []

@@ -1,4 +1,4 @@
-"""Steps of a Taylor series, each projected back onto the invariants, in any field that has an axis and a recurrence.
+"""Equal steps of a Taylor series, each projected back onto the invariants, in any field that has an axis and a recurrence.
 
 The third of the axes D is the field's axis; for a free body it is the direction of the momentum. The state consists of g and
 a, the third and the first row of the attitude's matrix relative to D, and the rates w, all in principal axes:
@@ -19,16 +19,14 @@ Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from ..arithmetic import root
 from ..potentials.turning import Turned
 from . import entry, kernel, small
 from .lanes import REGISTER, load_rows, save_columns, save_rows
 from .protocol import Result, Workspace, find_ends, loosen, record
-from .series import Series, sum_to_order
+from .series import Series, Vectors, sum_to_order
 from .signals import call_handlers, end_of_block
 from .traced import trace
 from .vector import add, choose, cross, dot, product, scale, some, subtract, times
@@ -47,8 +45,6 @@ ROUND_OFF = 2.0**-50
 """Relative defect up to which nothing is corrected."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect of a step before and after projection."""
-SAFETY, SHORTEST = 0.8, 2.0**-30
-"""Factor between a part of a step and the longest that the tolerance allows, and the shortest part, relative to the step."""
 DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
 """Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
 
@@ -75,11 +71,10 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Order of the series, step size, s, and tolerance for the last two terms; 0: steps are not divided into parts."""
+    """Order of the series, and step size, s."""
 
     order: int
     h: float
-    tolerance: float
 
 
 class Free(NamedTuple):
@@ -131,30 +126,21 @@ def begin(model):
     return (constants, (J, J_inverse, model.loose), kept, scales), K, w
 
 
-@trace
-def take_step(field, constants, order, h, K, g, a, w):
-    """Return the state after one step, not projected, and the last two terms of the series."""
+def expand(field, constants, order, h, K, g, a, w):
+    """Return the state after one step, not projected, the last two terms of the series, and its coefficients (`Vectors`)."""
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
     turn = series.spread(field.rate) if isinstance(field, Turned) else None
-    accelerate = field.series(constants, g, series)
-    change, last, before = sum_to_order(series, order, h, start, series.vector(*K), accelerate, turn)
+    accelerate, terms = field.series(constants, g, series), Vectors(series, len(start))
+    change, last, before = sum_to_order(series, terms, order, h, start, series.vector(*K), accelerate, turn)
     end = tuple(v + d for v, d in zip(start, change, strict=True))
-    return tuple(tuple(map(series.split, each)) for each in (end, last, before))
+    return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
 
 
 @trace
-def sizes(scales, last, before):
-    """Return the sizes of two terms; rates are in units of the rate of the slowest axis at the same energy."""
-    over = 0.5 * scales[1] * scales[2]
-    return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (last, before))
-
-
-@small
-def stretch(tolerance, order, large):
-    """Return the factor by which the step may grow, from the sizes of its last two terms."""
-    last, before = large[0] + TINY, large[1] + TINY
-    return min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
+def take_step(field, constants, order, h, K, g, a, w):
+    """Return the state after one step, not projected."""
+    return expand(field, constants, order, h, K, g, a, w)[0]
 
 
 def significant(x, scale):
@@ -288,38 +274,22 @@ def quaternion(g, a):
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step that cannot be projected fails; the size is the relative defect that remains."""
     field, left, g, a = model.field, model.left, model.g, model.a
-    order, h, tolerance = coefficients
+    order, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     body, K, w = begin(model)
-    constants, _, _, scales = body
+    constants, _, _, _ = body
     record(0, model.q, model.L, q_out, L_out)
-    row, corrections, until_sample, defect = 0, 0, every, 0.0
-    done, parts, computed, part = 0, 0, 0, h
+    row, corrections, until_sample, done, defect = 0, 0, every, 0, 0.0
     while done < n_steps and defect < LEFT:
         last = end_of_block(done, n_steps, pause)
         while done < last:
-            left_over, taken = h, 0
-            while left_over > 0.0 and defect < LEFT:
-                (g1, a1, w1), last_term, before = take_step(field, constants, order, part, K, g, a, w)
-                computed += 1
-                if tolerance > 0.0:
-                    factor = stretch(tolerance, order, sizes(scales, last_term, before))
-                    if not factor >= 1.0 and part > SHORTEST * h:
-                        part = part * (SAFETY * factor if factor > 0.1 else 0.1)
-                        continue
-                    longest = SAFETY * factor * part
-                left_over -= part
-                taken += 1
-                g, a, w, defect, needed = correct(field, body, BETWEEN, g1, a1, w1)
-                g, a, w, more, defect = project(field, body, BETWEEN, g, a, w, defect, needed)
-                corrections += 1 + more
-                if tolerance > 0.0:
-                    rest = left_over if left_over > 0.0 else h
-                    part = rest / math.ceil(rest / longest) if longest < rest else rest
+            g1, a1, w1 = take_step(field, constants, order, h, K, g, a, w)
+            g, a, w, defect, needed = correct(field, body, BETWEEN, g1, a1, w1)
+            g, a, w, more, defect = project(field, body, BETWEEN, g, a, w, defect, needed)
+            corrections += 1 + more
             if not defect < LEFT:
                 break
             done += 1
-            parts += taken
             until_sample -= 1
             if until_sample == 0 or done == n_steps:
                 until_sample = every
@@ -330,7 +300,8 @@ def march(model, coefficients, workspace):
                 record(row, product(left, quaternion(g1, a1)), times(model.J, w1), q_out, L_out)
         if done < n_steps:
             call_handlers()
-    return Result(done, parts * order, corrections, computed * order, defect, False)
+    taken = done + (not defect < LEFT)
+    return Result(done, done * order, corrections, taken * order, defect, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
@@ -405,7 +376,7 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
             sampled = min(n_steps, row * every)
             end = min(until, sampled)
             while step < end:
-                (g, a, w), _, _ = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
+                g, a, w = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
                 g, a, w, left, needed = correct(bodies.field, body, BETWEEN, g, a, w)
                 g, a, w, _, left = project(bodies.field, body, BETWEEN, g, a, w, left, needed & (failed < 0.5))
                 step += 1

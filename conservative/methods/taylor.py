@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial, wraps
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion, triple
 from ..batch import Batch
 from ..card import Card, Cost, Structure
-from ..check import describe, positive_number, set_fields
+from ..check import build_unchecked, describe, positive_number, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, IntegrationFailed, NotConverged
 from ..grid import Grid
@@ -23,12 +23,12 @@ from ..potentials.field import FieldPotential, into_axes
 from ..potentials.turning import Orbit, Turning, static_part
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
-from ..trajectory import Bounds, Trajectory
+from ..trajectory import Bounds, Counters, Trajectory
 from .bounds import bounds_of
 from .columns import fill_columns, take_pieces
 from .many import Block, RunMany
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, spin_rate
-from .run_kernel import prepare_run
+from .run_kernel import in_main_thread, prepare_run
 from .units import COARSE, SHORTEST, in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
@@ -38,7 +38,7 @@ RIGHT_ANGLE = 1e-15
 NEARLY_EQUAL = 4e-12
 """Relative difference of two moments below which a body may be symmetric: no less than `Scene.symmetry_axis_B` allows."""
 PARTS = 100
-"""Parts of a step that bounds allow for where a tolerance divides it."""
+"""Steps between two samples that bounds allow for with a tolerance."""
 
 
 @dataclass(frozen=True, init=False)
@@ -54,11 +54,14 @@ class Taylor(Method):
     For random bodies in gravity, the fastest orders are 8 to 10 for errors of 1e-2 to 1e-4 rad, 12 to 14 for 1e-5 to 1e-9, and
     14 to 16 below. In the other fields they are about two lower.
 
-    Use a tolerance for motions that are fast for a short time, such as a close passage of an attracting point. For a passage at
-    a fortieth of the largest distance, tolerance 1e-12 takes 135 substeps for an error of 3e-13 rad, while 4,000 equal steps
-    leave 1e-8 rad. For other motions equal steps are as good. Substeps are chosen as in Jorba & Zou, A software package for the
-    numerical integration of ODEs by means of high-order Taylor methods (2005). The order is 6 plus two thirds of the digits of
-    the tolerance, the best choice for random bodies near an attracting point.
+    With a tolerance, steps have any length, and dt is only the distance of samples. Samples are values of the steps'
+    polynomials, each projected onto the invariants, and as accurate as the steps. Use a tolerance for many samples: if every
+    sample of the flipping brick at 100 Hz is stored, it takes 0.3 to 0.45 of the time of equal steps. Use it also for motions
+    that are fast for a short time, such as a close passage of an attracting point. For a passage at a fortieth of the largest
+    distance, tolerance 1e-12 takes 135 steps for an error of 3e-13 rad, while 4,000 equal steps leave 1e-8 rad. Steps are
+    chosen as in Jorba & Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods
+    (2005). The order is 6 plus two thirds of the digits of the tolerance, the best choice for random bodies near an attracting
+    point.
 
     `integrate_many` integrates several bodies at once, one per lane of a vector register, with equal steps. The results differ
     from those of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
@@ -72,9 +75,8 @@ class Taylor(Method):
     order
         Order of the series, 4 to 18; default 14. None with a tolerance, which determines it.
     tolerance
-        None for the steps of the grid. Otherwise each step is divided into substeps in which the last two terms of the series
-        are at most this large, relative to 1 for the attitude matrix and to the largest possible rate of the axis of largest
-        inertia.
+        None for the steps of the grid. Otherwise steps are as long as the last two terms of the series are at most this large,
+        relative to 1 for the attitude matrix and to the largest possible rate of the axis of largest inertia.
 
     Raises
     ------
@@ -138,13 +140,40 @@ class Taylor(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(self.terms, grid.dt, self.tolerance or 0.0)
-        run = prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        label, start, model = scene.derive(convert, self)
+        if self.tolerance is None:
+            kernel = kernels("taylor")
+            run = prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.terms, grid.dt))
+        else:
+            run = prepare_dense(scene, grid, self, start, model)
         return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         return prepare_bodies(bodies, grid, self.terms) if self.tolerance is None else None
+
+
+def prepare_dense(scene: Scene, grid: Grid, method: Taylor, start: PrincipalStart, model: Any) -> Run:
+    """Return the run of a method with a tolerance: the kernel fills attitudes and rates itself."""
+    kernel, n, t = kernels("dense"), grid.n_samples, grid.t
+    R_BP = () if start.R_BP is None else tuple(map(triple, start.R_BP))
+    units = (1.0, 1.0, start.spin[1] / start.J_inverse[2] if start.spin else 1.0)
+    frame = kernel.Frame(tuple(map(triple, axes_of(scene))), R_BP, units, start.spin[:1] if start.spin else ())
+    numbers = *model, method.terms, grid.dt, method.tolerance, *frame, grid.n_steps, grid.every
+    R_WB0, lanes, label = from_quaternion(to_quaternion(scene.R_WB0)), np.arange(kernel.REGISTER, dtype=float), method.label
+
+    def run() -> Trajectory:
+        R_WB, w_WB_B = np.empty((n + kernel.REGISTER, 3, 3)), np.empty((n + kernel.REGISTER, 3))
+        R_WB[0], w_WB_B[0] = R_WB0, scene.w_WB_B0
+        pause = kernel.PAUSE if in_main_thread() else 0
+        done, *counts, size, _ = kernel.enter(*numbers, pause, lanes, R_WB.reshape(-1), w_WB_B.reshape(-1))
+        failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, size, kernel.FAILURE)
+        good, counters = grid.count_samples(done), Counters(done, *counts)
+        samples = {"t": t[:good].copy(), "R_WB": R_WB[:good], "w_WB_B": w_WB_B[:good]}
+        return build_unchecked(Trajectory, scene=scene, **samples, label=label, counters=counters, failure=failure, choice=None)
+
+    room = np.empty(9 * (n + kernel.REGISTER)), np.empty(3 * (n + kernel.REGISTER))
+    run.__dict__["own_loop"] = partial(kernel.enter, *numbers, 0, lanes, *room)
+    return run
 
 
 def turn_samples(run: Run, orbit: Orbit) -> Run:
