@@ -243,7 +243,7 @@ class Ratios:
         return sum(not (each.won or each.lost) for each in self.both)
 
     @property
-    def mean(self) -> float:
+    def ratio(self) -> float:
         """Geometric mean; NaN without a ratio."""
         return math.exp(math.fsum(math.log(each.ratio) for each in self.both) / len(self.both)) if self.both else math.nan
 

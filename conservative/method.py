@@ -108,6 +108,10 @@ class Method(ABC):
         """Return the reason why the scene is not supported, or None."""
         return None
 
+    def program(self, scene: Scene) -> object:
+        """Return a key of the program that a run executes, apart from a tolerance. Studies time equal programs once."""
+        return self.name
+
     def longest_step(self, scene: Scene) -> float:
         """Return the longest step size for the scene, s; inf without a limit."""
         return math.inf

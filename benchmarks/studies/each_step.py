@@ -47,8 +47,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for scene in study.scenes:
             truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
             chosen: list[Case] = []
-            for method in study.lines:
+            for method, same in study.programs(scene):
                 tell(f"{scene.name}: errors of {method.name}")
+                if same:
+                    yield Case(study.name, scene, method, grid_for(scene, scene.dt)).row(Value(Measure.TIME, math.nan), same)
+                    continue
                 chosen += yield from choose_setting(study, scene, method, truth)
             tell(f"{scene.name}: timing {len(chosen)} methods")
             yield from time_chosen(study, scene, chosen, processes)

@@ -151,8 +151,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 continue
             yield about.row(Value(Measure.AGREEMENT, truth.agreement_rad), detail=truth.names[1])
             lines: list[Line] = []
-            for method in study.lines:
+            for method, same in study.programs(scene):
                 tell(f"{scene.name}: errors of {method.name}")
+                if same:
+                    yield replace(about, method=method).row(Value(Measure.ATTITUDE_MAX, math.nan), same)
+                    continue
                 cases = list_cases(Case(study.name, scene, method, coarsest, drawn), study.quick)
                 lines.append((yield from find_errors(study, cases, truth.trajectory)))
             chosen = worth_timing(lines)

@@ -11,7 +11,7 @@ from conservative.check import positive_integer, positive_number
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role
-from conservative.outcome import Outcome
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 
@@ -104,6 +104,15 @@ class Study:
     def lines(self) -> tuple[Method, ...]:
         """One of the competitors for each line of a chart. Variants that differ only in their tolerance are one line."""
         return tuple({series(method): method for method in self.competitors}.values())
+
+    def programs(self, scene: Scene) -> list[tuple[Method, Outcome | None]]:
+        """Return the lines, each with the reason not to measure it if an earlier one runs the same program on the scene."""
+        first: dict[object, str] = {}
+        pairs = [(method, first.setdefault(method.program(scene), series(method))) for method in self.lines]
+        return [
+            (method, None if name == series(method) else Outcome(OutcomeKind.SKIPPED, f"the same program as {name}"))
+            for method, name in pairs
+        ]
 
     def attempt(self, case: Case) -> Success | Outcome:
         """Return the result of a case within the time limit of a run; see `attempt_within`."""

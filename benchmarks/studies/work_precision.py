@@ -19,6 +19,7 @@ from .speed import keep_end, time_cases
 from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
+TIME = Value(Measure.TIME, math.nan)
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -27,8 +28,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     with Processes(study.processes) as processes:
         for scene in study.scenes:
             good: list[Case] = []
-            for method in study.lines:
+            for method, same in study.programs(scene):
                 tell(f"{scene.name}: errors of {method.name}")
+                if same:
+                    yield Case(study.name, scene, method, step_ladder.samples(scene, method)).row(TIME, same)
+                    continue
                 truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
                 # More steps of a method of first order are slow and still inaccurate.
                 for point in measure_line(study, list_cases(study, scene, method, step_ladder.LENGTH), truth, ERRORS):
@@ -36,7 +40,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                     if point.outcome.ok:
                         good.append(point.case)
                     else:
-                        yield point.case.row(Value(Measure.TIME, math.nan), point.outcome)
+                        yield point.case.row(TIME, point.outcome)
             tell(f"{scene.name}: timing {len(good)} points")
             yield from time_cases(study, good, {Measure.TIME: keep_end}, processes)
 

@@ -135,6 +135,12 @@ class Heyoka(Method):
             return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"
         return None
 
+    def program(self, scene: Scene) -> object:
+        if self.unsupported(scene):
+            return self.name
+        problem = getattr(formulations, self.frame)(scene)  # the lean frame is often one of the others
+        return self.family, problem.form, problem.fast_math, self.numbers
+
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)

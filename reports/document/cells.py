@@ -65,12 +65,19 @@ def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED
     return Cell(f"{symbol} {text or number(value)}", graded, value=value)
 
 
-def grade_ratio(ratio: float, note: str = "", digits: int = 3) -> Cell:
-    """Return an engine's time divided by ours, good from 1 on."""
+def grade_ratio(ratio: float, note: str = "", digits: int = 3, interval: tuple[float, float] = (math.nan, math.nan)) -> Cell:
+    """Return an engine's time divided by ours with its interval: good from 1 on, fair if 1 is within the interval."""
     if math.isnan(ratio):
         return Cell(DASH, Grade.NONE, note, value=ratio)
-    good = ratio >= 1
-    return Cell(f"{'✓' if good else '✗'} {factor(ratio, digits)}", Grade.GOOD if good else Grade.BAD, note, value=ratio)
+    low, high = (ratio if math.isnan(end) else end for end in interval)
+    symbol, graded = ("✓", Grade.GOOD) if low >= 1 else ("✗", Grade.BAD) if high < 1 else ("≈", Grade.FAIR)
+    return Cell(f"{symbol} {ratio_text(ratio, interval, digits)}", graded, note, value=ratio)
+
+
+def ratio_text(ratio: float, interval: tuple[float, float], digits: int = 3) -> str:
+    """Return a ratio with its interval if it has one, such as `2.92 (2.84 to 3.01)`."""
+    ends = "" if math.isnan(interval[0]) else f" ({factor(interval[0], digits)} to {factor(interval[1], digits)})"
+    return factor(ratio, digits) + ends
 
 
 def outcome_text(outcome: Outcome) -> str:

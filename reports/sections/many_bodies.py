@@ -120,7 +120,8 @@ def as_table(compared: Iterable[tuple[MethodClass, str, str, int, Contest]]) -> 
         names = [each.name if each else "no time" for each in sides]
         error, count = numeric(contest.error, tolerance(contest.error)), numeric(size, f"{size:,}")
         kind = contest.scene.replace("_", " ")
-        rows.append([kind, group.value, engine, error, statistic, count, grade_ratio(contest.ratio), *times, *names])
+        ratio = grade_ratio(contest.ratio, interval=contest.interval)
+        rows.append([kind, group.value, engine, error, statistic, count, ratio, *times, *names])
     return Table([*header, "ours is", "engine is"], rows, "Many bodies: an engine's time divided by ours", Style.FILTERED)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
-from ..document.cells import DASH, factor, grade_ratio, numeric, tolerance
+from ..document.cells import DASH, factor, grade_ratio, numeric, ratio_text, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, without_outcome
 from ..rows.points import joined, points
@@ -26,14 +27,17 @@ ANY = "fastest engine"
 """Stands for all engines: on each body, the fastest of them."""
 MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Errors, rad, of the table of engines."""
+ROUGH = "All times are of one process, so ratios are rough: two identical programs differ by several percent."
 TERMS = (
-    "Each body is drawn from a seed: asymmetric, with a condition number of 1.1 to 100, in a rotated frame, with no "
-    "point and no rate on an axis, in uniform gravity, on a spring, attracted to a point, or in a gravity gradient, in a "
-    "field about as strong as the motion. The ratio is the fastest engine's time divided by that of our fastest general "
-    "integrator, each in its fastest form and setting, for whole calls, final state only; above 1 ours is faster. The "
-    "error is the largest of twelve instants. The error of a setting is the largest of its own and of all finer "
-    "settings, so isolated good results are ignored. A body on which a side does not reach the error is counted and has "
-    "no ratio."
+    "Each body is drawn from a seed: asymmetric, from long and thin to flat, in a rotated frame, with no point and no rate on "
+    "an axis, from slow pendulums to fast tops, in uniform gravity, on a spring, attracted to a point, or in a gravity "
+    "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by that of our fastest "
+    "general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, final "
+    "state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
+    "processes, of a mean over bodies and processes. A body is won or lost if 1 is outside of its interval, or if a side is "
+    "alone in reaching the error; otherwise it is open. The error is the largest of twelve instants. The error of a setting "
+    "is the largest of its own and of all finer settings, so isolated good results are ignored. An engine is compared on "
+    "bodies whose field its adapter supports, and on bodies with two reference solutions that agree."
 )
 """Explanation of the tables."""
 
@@ -63,12 +67,11 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
     results = []
     for rival, members in ({ANY: engines} | {engine: [engine] for engine in engines} if engines else {}).items():
         side = theirs[theirs["family"].isin(members)]
-        for field, bodies in rows.groupby("field", sort=False):
-            if taken[taken["field"] == field]["family"].isin(members).any():
-                indices = {str(scene): int(index) for scene, index in zip(bodies["scene"], bodies["body"], strict=True)}
-                results += [
-                    RandomRatios(contests(ours, side, indices, [error]), str(field), rival, error, indices) for error in DECADES
-                ]
+        for field, bodies in taken[taken["family"].isin(members)].groupby("field", sort=False):
+            indices = {str(scene): int(index) for scene, index in zip(bodies["scene"], bodies["body"], strict=True)}
+            results += [
+                RandomRatios(contests(ours, side, indices, [error]), str(field), rival, error, indices) for error in DECADES
+            ]
     return tuple(results)
 
 
@@ -94,13 +97,17 @@ def section(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:
     """Return the ratios against the fastest engine, a row for each field and error."""
-    header = ["field", "error, rad", "bodies", "mean", "worst", "best", "worst body", "ours, most often", "engine, most often"]
+    header = ["field", "error, rad", "bodies", "won", "open", "lost", "mean", "worst", "best", "worst body"]
+    header += ["ours, most often", "engine, most often"]
     rows: list[Row] = [
         [
             each.field,
             numeric(each.error, tolerance(each.error)),
             count_text(each),
-            *map(grade_ratio, (each.mean, each.worst, each.best)),
+            *(numeric(count, str(count)) for count in (each.won, each.open, each.lost)),
+            grade_ratio(each.ratio, interval=each.interval),
+            *(grade_ratio(body.ratio, interval=body.interval) for body in (*each.both[:1], *each.both[-1:])),
+            *([] if each.both else [DASH, DASH]),
             str(each.indices[each.both[0].scene]) if each.both else DASH,
             _most_often(contest.ours for contest in each.both),
             _most_often(contest.theirs for contest in each.both),
@@ -121,22 +128,19 @@ def _most_often(lines: Iterable[Cheapest | None]) -> str:
 
 
 def by_engine(ratios: Iterable[RandomRatios]) -> Table:
-    """Return mean, worst and best ratio at `MILESTONES`, a row for each field and engine that supports it."""
+    """Return the mean ratio with its interval at `MILESTONES`, a row for each field and engine that supports it."""
     chosen = {(each.field, each.engine, each.error): each for each in ratios if each.engine != ANY}
     places = dict.fromkeys(key[:2] for key in chosen)
-    rows: list[Row] = [[*place, *(_spread(chosen[*place, error]) for error in MILESTONES)] for place in places]
-    caption = "Random bodies: each engine's time divided by ours, mean (worst to best)"
+    rows: list[Row] = [[*place, *(_mean(chosen[*place, error]) for error in MILESTONES)] for place in places]
+    caption = "Random bodies: each engine's time divided by ours, geometric mean (interval of 95 %)"
     return Table(["field", "engine", *(tolerance(error) for error in MILESTONES)], rows, caption, Style.FILTERED)
 
 
-def _spread(ratios: RandomRatios) -> Cell:
-    """Return the mean with the worst and the best, and on how many bodies if that is not all."""
+def _mean(ratios: RandomRatios) -> Cell:
+    """Return the mean with its interval, and on how many bodies both sides reach the error if that is not all."""
     both, bodies = len(ratios.both), len(ratios.contests)
-    counts = "" if both == bodies else f"{both} of {bodies}"
-    if not both:
-        return numeric(ratios.mean, f"{DASH} ({counts})")
-    mean, *ends = (factor(ratio, 3) for ratio in (ratios.mean, ratios.worst, ratios.best))
-    return numeric(ratios.mean, f"{mean} ({' to '.join(ends)}{'; ' * bool(counts)}{counts})")
+    counts = "" if both == bodies else f", {both} of {bodies} bodies"
+    return numeric(ratios.ratio, ratio_text(ratios.ratio, ratios.interval) + counts)
 
 
 def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
@@ -150,7 +154,10 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
             "both": len(each.both),
             "only_ours": each.only_ours,
             "only_engine": each.only_theirs,
-            "mean": each.mean,
+            "won": each.won,
+            "open": each.open,
+            "lost": each.lost,
+            "mean": each.ratio,
             "worst": each.worst,
             "best": each.best,
             "mean_interval": each.interval,
@@ -162,7 +169,7 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
 
 def chart_points(ratios: Iterable[RandomRatios]) -> pd.DataFrame:
     """Return field, error, mean, worst and best against the fastest engine, where both sides reach the error."""
-    rows = [(each.field, each.error, each.mean, each.worst, each.best) for each in ratios if each.engine == ANY and each.both]
+    rows = [(each.field, each.error, each.ratio, each.worst, each.best) for each in ratios if each.engine == ANY and each.both]
     return pd.DataFrame(rows, columns=["field", "error", "mean", "worst", "best"])
 
 
@@ -208,14 +215,18 @@ def sentence(ratios: Iterable[RandomRatios]) -> str:
     goal = f"{tolerance(MIDDLE)} rad"
     if not every.both:
         return f"On no random body do our integrators and an engine both reach {goal}."
-    sides = ["our fastest general integrator", "the fastest engine"][:: 1 if every.mean >= 1 else -1]
-    parts = ["geometric mean"]
-    if slower := [1 / contest.ratio for contest in every.both if contest.ratio < 1]:
+    sides = ["our fastest general integrator", "the fastest engine"][:: 1 if every.ratio >= 1 else -1]
+    low, high = every.interval
+    ends = sorted((low, high) if every.ratio >= 1 else (1 / low, 1 / high)) if not math.isnan(low) else []
+    parts = ["geometric mean", *([f"interval {' to '.join(map(factor, ends))}"] if ends else [])]
+    if slower := [1 / contest.ratio for contest in every.both if contest.lost]:
         parts.append(f"an engine is faster on {len(slower)}, by up to {factor(max(slower))} times")
     else:
         parts.append(f"single bodies: {factor(every.worst)} to {factor(every.best)}")
+    if every.open:
+        parts.append(f"{every.open} are open")
     if missed := len(every.contests) - len(every.both):
         parts.append(f"{missed} more are not reached by both")
     bodies = "one random body" if len(every.both) == 1 else f"{len(every.both)} random bodies"
-    times = f"{factor(max(every.mean, 1 / every.mean))} times as fast as {sides[1]} ({'; '.join(parts)})."
+    times = f"{factor(max(every.ratio, 1 / every.ratio))} times as fast as {sides[1]} ({'; '.join(parts)})."
     return f"On {bodies} in fields, {sides[0]} reaches {goal} {times}"

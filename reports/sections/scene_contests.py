@@ -11,7 +11,7 @@ from conservative.benchmarks.contest import Cheapest, Contest, cheapest, contest
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.each_step import ERROR
 
-from ..document.cells import DASH, factor, numeric, tolerance
+from ..document.cells import DASH, factor, numeric, ratio_text, tolerance
 from ..document.model import Cell, Row, Table
 from ..rows.names import OF_ENGINES, MethodClass, of_classes
 from ..rows.points import DECADES, points
@@ -103,7 +103,7 @@ def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> 
         return [line.name, *(numeric(time, factor(time, 3)) for time in (line.time * 1e6, line.time * interval * 1e6))]
 
     def ratio(contest: Contest | None) -> str | Cell:
-        return numeric(contest.ratio, factor(contest.ratio, 3)) if contest else DASH
+        return numeric(contest.ratio, ratio_text(contest.ratio, contest.interval)) if contest else DASH
 
     for error in errors:
         ours, solved = general.get(error), solutions.get(error)

@@ -21,10 +21,11 @@ from .summary import Summary
 
 _RATIOS = (
     "The time of the fastest engine divided by that of our fastest method, at each decade of the largest attitude error. "
-    "✓: ours is faster. ✗: an engine is faster. Random bodies have the geometric mean, and in parentheses the number of "
-    "bodies on which an engine is faster, or alone in reaching the error. Times between two measured points are interpolated "
-    "log-log and not extrapolated. The error of a point is the largest of its own and of all finer points, so isolated good "
-    "results are ignored."
+    "✓: ours is faster. ✗: an engine is faster. ≈: open, 1 is within the interval. In parentheses is the interval of 95 % "
+    "over processes, if several measured the times. Random bodies have the geometric mean, its interval over bodies and "
+    "processes, and the number of bodies on which an engine is faster beyond the body's interval, or alone in reaching the "
+    "error. Times between two measured points are interpolated log-log and not extrapolated. The error of a point is the "
+    "largest of its own and of all finer points, so isolated good results are ignored."
 )
 
 
@@ -39,15 +40,16 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     together = (
         "within one study of this report, which was interrupted and resumed"
         if measured.source.resumed
-        else "within this report: they were measured in interleaved rounds of one process"
+        else "within this report: they were measured in interleaved rounds"
     )
+    rough = "" if any(s.processes > 1 for s in measured.plan.studies) else f" {random_bodies.ROUGH}"
     quick = " This is a quick run: fewer steps, fewer rounds of timing." if measured.plan.quick else ""
     blocks = filled(
         Paragraph(summary.sentence, Emphasis.LEAD),
         families_figure(summary, "first", about),
         replace(summary.classes, caption=f"{about}: µs of computing per simulated second, by class of methods"),
         Paragraph(f"{summaries.TERMS} {summaries.SAMPLE_TERMS}", Emphasis.NOTE),
-        Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{quick}", Emphasis.NOTE),
+        Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{rough}{quick}", Emphasis.NOTE),
         Section("Where an engine is faster", [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]),
     )
     return Section(f"Verdict: {about}", blocks, "verdict", "Verdict")
@@ -83,11 +85,12 @@ def ratio_table(measured: Measured) -> Table:
 def contest_cell(contest: Contest) -> Cell:
     """Return the ratio, or the side that is alone in reaching the error."""
     if contest.ours and contest.theirs:
-        return grade_ratio(contest.ratio, digits=2)
+        return grade_ratio(contest.ratio, digits=2, interval=contest.interval)
     return Cell("✗ engine only", Grade.BAD) if contest.theirs else Cell("✓ ours only", Grade.GOOD)
 
 
 def _random_cell(ratios: RandomRatios) -> Cell:
-    lost = sum(contest.lost for contest in ratios.contests)
-    note = f"{lost} of {len(ratios.contests)}" if lost else ""
-    return Cell("✗ engine only", Grade.BAD, note) if lost and not ratios.both else grade_ratio(ratios.mean, note, digits=2)
+    note = f"{ratios.lost} of {len(ratios.contests)}" if ratios.lost else ""
+    if ratios.lost and not ratios.both:
+        return Cell("✗ engine only", Grade.BAD, note)
+    return grade_ratio(ratios.ratio, note, digits=2, interval=ratios.interval)

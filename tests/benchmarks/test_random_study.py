@@ -15,6 +15,7 @@ from conservative.benchmarks.measures.processes import Processes
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import NOT_DRAWN, Case
 from conservative.benchmarks.studies.random import DECADES, SAMPLES, TimedSetting
+from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
@@ -91,6 +92,23 @@ def test_all_settings_are_read_at_the_same_instants():
 def test_ours_with_a_tolerance_are_among_the_settings():
     assert [each.tolerance for each in random.settings(cv.Taylor())] == [None, None, None, 1e-9]
     assert not random.settings(cv.MoserVeselov())
+
+
+def test_a_program_with_two_names_is_measured_once():
+    """For a body without symmetry in a field, heyoka's lean frame is that of base vectors."""
+    names = ("heyoka:frame=base_vectors", "heyoka:frame=lean", "heyoka")
+    study = Study("random", (BODY, cv.scenes.brick_flip()), tuple(map(method, names)))
+    assert [same and same.reason for _, same in study.programs(BODY)] == [
+        None,
+        "the same program as heyoka:frame=base_vectors",
+        None,
+    ]
+    assert [same for _, same in study.programs(study.scenes[1])] == [None] * 3
+    lean = replace(
+        random.random_study(METHODS, 1, 3, quick=True), methods=study.methods[:2], scenes=(BODY,), drawn=(NOT_DRAWN,)
+    )
+    measured = [row for row in studies.findings(lean) if row.series == "heyoka:frame=lean"]
+    assert [row.outcome.kind for row in measured] == [OutcomeKind.SKIPPED]
 
 
 def test_tolerances_of_ours_are_credited_and_interpolated_as_one_line():

@@ -1,6 +1,8 @@
 """Ratios on random bodies and their section of the report, on made-up measurements with known results."""
 
 import math
+import re
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -60,37 +62,37 @@ NEITHER = [line(4, "gauss", "ours", flat(1.0, least=1e-4)), line(4, "heyoka", "e
 
 def test_the_mean_is_geometric_and_the_worst_body_is_named():
     contest = against(found(*TWICE, *SLOWER))
-    assert (contest.mean, contest.worst, contest.best) == (pytest.approx(1.0), 0.5, 2.0)
+    assert (contest.ratio, contest.worst, contest.best) == (pytest.approx(1.0), 0.5, 2.0)
     assert contest.both[0].scene == name_of(FIELD, 7, 1)
 
 
 def test_a_body_that_a_side_misses_is_counted_and_not_dropped():
     contest = against(found(*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE, *NEITHER))
     assert (len(contest.contests), len(contest.both), contest.only_ours, contest.only_theirs) == (5, 2, 1, 1)
-    assert contest.mean == pytest.approx(1.0)
+    assert contest.ratio == pytest.approx(1.0)
     assert random_bodies.count_text(contest) == "2 of 5 (only ours 1, only engine 1, neither 1)"
     assert random_bodies.count_text(against(found(*TWICE))) == "1 of 1"
 
 
 def test_a_decade_that_no_pair_reaches_has_no_ratio():
     contest = against(found(*NEITHER))
-    assert all(math.isnan(value) for value in (contest.mean, contest.worst, contest.best))
+    assert all(math.isnan(value) for value in (contest.ratio, contest.worst, contest.best))
     assert "neither" in random_bodies.count_text(contest)
 
 
 def test_ours_is_the_cheapest_of_all_lines_and_so_is_the_engine():
     lean = line(0, "heyoka:frame=lean", "engine", flat(1.5))
     contest = against(found(*TWICE, line(0, "projected", "ours", flat(0.5)), lean, line(0, "scipy", "engine", flat(9.0))))
-    assert contest.mean == pytest.approx(3.0)
+    assert contest.ratio == pytest.approx(3.0)
     assert (contest.contests[0].ours.name, contest.contests[0].theirs.name) == ("projected", "heyoka frame=lean")
-    assert against(found(*TWICE, line(0, "scipy", "engine", flat(9.0))), "scipy").mean == pytest.approx(9.0)
+    assert against(found(*TWICE, line(0, "scipy", "engine", flat(9.0))), "scipy").ratio == pytest.approx(9.0)
 
 
 def test_a_lucky_setting_of_ours_does_not_decide():
     lucky = line(0, "gauss", "ours", [(1e-9, 0.1), (1e-5, 0.9), (1e-13, 1.0)])
     contest = against(found(lucky, line(0, "heyoka", "engine", flat(2.0))), error=1e-6)
     between = 0.9 * (1.0 / 0.9) ** (1 / 8)
-    assert contest.mean == pytest.approx(2.0 / between)  # and not 20
+    assert contest.ratio == pytest.approx(2.0 / between)  # and not 20
 
 
 def test_a_setting_that_was_not_timed_or_failed_is_no_way_there():
@@ -128,22 +130,53 @@ def test_the_sentence_has_the_mean_and_the_bodies_that_are_lost():
         "2.0 times as fast as the fastest engine (geometric mean; single bodies: 2.0 to 2.0)."
     )
     lost = random_bodies.sentence(found(*TWICE, *SLOWER, *NEITHER))
-    assert "(geometric mean; an engine is faster on 1, by up to 2.0 times; 1 more are not reached by both)" in lost
+    assert (
+        "(geometric mean; interval 0.50 to 2.0; an engine is faster on 1, by up to 2.0 times; 1 more are not reached by both)"
+        in lost
+    )
 
 
 def test_the_table_grades_a_ratio_below_one():
     first, *_ = texts(random_bodies.as_table(found(*SLOWER)))
-    assert first[3:] == ["✗ 0.500", "✗ 0.500", "✗ 0.500", "1", "gauss", "heyoka"]
-    assert str(random_bodies.as_table(found(*TWICE)).rows[0][3]) == "✓ 2.00"
+    assert first[3:] == ["0", "0", "1", "✗ 0.500", "✗ 0.500", "✗ 0.500", "1", "gauss", "heyoka"]
+    assert str(random_bodies.as_table(found(*TWICE)).rows[0][6]) == "✓ 2.00"
+
+
+def in_processes(*pairs):
+    """Rows of a body with the times of both sides in each process."""
+    names = zip(("gauss", "heyoka"), ("ours", "engine"), zip(*pairs, strict=True), strict=True)
+    rows = []
+    for name, role, times in names:
+        error, time = line(0, name, role, flat(1.0))
+        rows += [[error, *(replace(time, value=value, process=n) for n, value in enumerate(times))]]
+    return rows
+
+
+def test_a_ratio_has_an_interval_over_processes_and_is_open_around_1():
+    contest = against(found(*in_processes((1.0, 2.0), (1.1, 2.2), (1.0, 2.1), (2.0, 3.8), (1.0, 2.0))))
+    assert contest.ratio == pytest.approx((2 * 2 * 2.1 * 1.9 * 2) ** 0.2)
+    assert 1.9 <= contest.interval[0] < contest.ratio < contest.interval[1] <= 2.1
+    even = found(*in_processes((1.0, 0.9), (1.0, 1.1), (1.0, 1.2), (1.0, 0.95), (1.0, 1.05)))
+    assert (against(even).won, against(even).open, against(even).lost) == (0, 1, 0)
+    shown = texts(random_bodies.as_table(even))[0]
+    assert shown[3:6] == ["0", "1", "0"]
+    assert re.fullmatch(r"≈ 1\.03 \(0\.9\d+ to 1\.\d+\)", shown[6])
+    assert "1 are open" in random_bodies.sentence(even)
 
 
 def test_each_engine_has_a_row():
     table = random_bodies.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
     assert table.header == ["field", "engine", "1e-3", "1e-6", "1e-9", "1e-12"]
-    assert [row[:5] for row in texts(table)] == [
-        [FIELD, "heyoka", *["1.00 (0.500 to 2.00)"] * 3],
-        [FIELD, "scipy", *["30.0 (30.0 to 30.0; 1 of 2)"] * 2, "– (0 of 2)"],
+    assert [[each[1], each[2].split(" ")[0], each[5]] for each in texts(table)] == [
+        ["heyoka", "1.00", "1.00 (0.500 to 2.00)"],
+        ["scipy", "30.0", "–, 0 of 1 bodies"],
     ]
+
+
+def test_an_engine_is_compared_on_bodies_that_its_adapter_supports():
+    refused = line(1, "scipy", "engine", [(math.nan, math.nan)], outcome="unsupported")
+    contest = against(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(9.0)), refused), "scipy")
+    assert len(contest.contests) == 1
 
 
 def test_numbers_of_json_are_those_of_the_table():
