@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.attitude import Array, from_quaternion
 from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
@@ -16,31 +17,30 @@ from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.units import in_own_units
 from conservative.potentials.potential import torque_W
-from conservative.potentials.turning import Turning, static_part
+from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import EngineAxes, limit_reason, load, orbit_turn, principal_axes, version
-from ..heyoka_equations.accelerations import READERS, express_field
-from ..heyoka_equations.forms import kinematics_in_world
+from ..engine import limit_reason, load, principal_axes, version
+from ..environments.plain_numbers import FIELDS, describe_field
 from ..samples import QUATERNION, States
+from .shared import compile_derivative, pack_field
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
 
-Derivative = Callable[[float, Array], list[float]]
-Acceleration = Callable[[float, float, float, float, float], Sequence[float]]
-"""Maps time and quaternion to the angular acceleration by the field, rad/s^2, axes F."""
+Derivative = Callable[[float, Array], Array]
 
 
 @dataclass(frozen=True)
 class SciPy(Method):
     """`scipy.integrate.solve_ivp` with its own step control; dt is only the distance of samples.
 
-    The state is the quaternion, scalar first, of principal axes F in world axes whose third is the field's, and the rates in F.
-    Samples come from the integrator's interpolant, whose error is that of the steps. This package's fields are written out;
-    any other potential works as well, through its gradient.
+    The state is the quaternion, scalar first, of principal axes F in the world, and the rates in F. Samples come from the
+    integrator's interpolant, whose error is that of the steps. numba compiles the right-hand side for the fields of this
+    package. Any other potential works as well, through its gradient. What remains is SciPy's own loop in Python; `cyrk` has the
+    same integrator in compiled code.
 
     Parameters
     ----------
@@ -85,9 +85,8 @@ class SciPy(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
-        axes, R_WD, acceleration, turn_D = _express(scene)
-        derivative = _derivative(axes, acceleration, turn_D)
-        start = np.concatenate([to_quaternion(R_WD.T @ axes.R_WF0), axes.w0])
+        axes, derivative = principal_axes(scene), _derivative(scene)
+        start = np.concatenate([axes.q0, axes.w0])
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         atol = self.rtol * np.repeat([1.0, rate_scale], [4, 3])
         span = (0.0, float(grid.t[-1]))
@@ -107,8 +106,7 @@ class SciPy(Method):
             return finish(y.T, Counters(solver.steps, evaluations=int(solution.nfev)), solution.message)
 
         def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
-            turn = None if turn_D is None else orbit_turn(scene)
-            return axes.trajectory(grid, self.label, States(QUATERNION, y[None], R_WD[None], turn), work, *reason)
+            return axes.trajectory(grid, self.label, States(QUATERNION, y[None]), work, *reason)
 
         return run
 
@@ -128,83 +126,21 @@ def _count_steps(solver: Any) -> Any:
     return counting
 
 
-def _express(scene: Scene) -> tuple[EngineAxes, Array, Acceleration | None, Array | None]:
-    """Return principal axes F, axes D (3, 3) with the field's as the third, the field as a function of F in D, rates of D.
+def _derivative(scene: Scene) -> Derivative:
+    """Return the derivative of the state; numba compiles it unless the potential is one of Python functions."""
+    axes, potential, compiled = principal_axes(scene), scene.potential, compile_derivative()
+    field, static = SimpleNamespace(**describe_field(axes)), static_part(potential)
+    moment = static.moment_B @ axes.R_BF if isinstance(static, UniformGravity) else 0.0
+    body = np.concatenate([pack_field(field, moment), axes.J])  # type: ignore[no-untyped-call]
 
-    The last, (3,), rad/s, in D, is None where D does not turn.
-    """
-    axes, potential = principal_axes(scene), scene.potential
-    if potential is None:
-        return axes, np.eye(3), None, None
-    if isinstance(potential, UniformGravity):
-        return axes, np.eye(3), _uniform(axes), None
-    if type(static_part(potential)) in READERS:
-        field = express_field(scene)
-        parameters = tuple(field.parameters)
-        turn_D = field.turn_D if isinstance(potential, Turning) else None
-        return field.axes, field.R_WD, lambda _, *q: field.acceleration(parameters, _unit_row(*q)), turn_D
-
-    def through_gradient(t: float, *q: float) -> list[float]:
-        R_WF = from_quaternion(q)
-        return (torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J).tolist()
-
-    return axes, np.eye(3), through_gradient, None
-
-
-def _derivative(axes: EngineAxes, acceleration: Acceleration | None, turn_D: Array | None = None) -> Derivative:
-    """Return Euler's equations and q' = (q w - turn q) / 2 in plain floats: arrays of three cost more than their arithmetic."""
-    J1, J2, J3 = axes.J.tolist()
-    a1, a2, a3 = (J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3
-
-    def free(_: float, y: Array) -> list[float]:
-        # Written out: a call of `kinematics_in_body` takes a quarter of the time of this function.
-        q0, q1, q2, q3, w1, w2, w3 = y.tolist()
-        return [
-            -0.5 * (q1 * w1 + q2 * w2 + q3 * w3),
-            0.5 * (q0 * w1 + q2 * w3 - q3 * w2),
-            0.5 * (q0 * w2 + q3 * w1 - q1 * w3),
-            0.5 * (q0 * w3 + q1 * w2 - q2 * w1),
-            a1 * w2 * w3,
-            a2 * w3 * w1,
-            a3 * w1 * w2,
-        ]
-
-    def in_field(t: float, y: Array) -> list[float]:
-        out = free(t, y)
-        b1, b2, b3 = acceleration(t, *y[:4].tolist())  # type: ignore[misc]
-        out[4] += b1
-        out[5] += b2
-        out[6] += b3
+    def derivative(t: float, y: Array) -> Array:
+        out = np.empty(7)
+        compiled(out, t, y, body)
         return out
 
-    def in_turning_field(t: float, y: Array) -> list[float]:
-        out = in_field(t, y)
-        transport = kinematics_in_world(y[:4].tolist(), turn)
-        return [*(x - each for x, each in zip(out[:4], transport, strict=True)), *out[4:]]
+    def through_gradient(t: float, y: Array) -> Array:
+        out, R_WF = derivative(t, y), from_quaternion(y[:4])
+        out[4:] += torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J  # type: ignore[arg-type]
+        return out
 
-    if turn_D is None:
-        return free if acceleration is None else in_field
-    turn = turn_D.tolist()
-    return in_turning_field
-
-
-def _uniform(axes: EngineAxes) -> Acceleration:
-    (m1, m2, m3), (J1, J2, J3) = axes.moment.tolist(), axes.J.tolist()
-
-    def acceleration(_: float, *q: float) -> tuple[float, float, float]:
-        g1, g2, g3 = _third_row(*q)
-        return (g2 * m3 - g3 * m2) / J1, (g3 * m1 - g1 * m3) / J2, (g1 * m2 - g2 * m1) / J3
-
-    return acceleration
-
-
-def _third_row(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float, float]:
-    """Return the last row of the rotation matrix."""
-    return 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
-
-
-def _unit_row(*q: float) -> tuple[float, float, float]:
-    """Return the row with length 1: fields take roots of it, and loose tolerances let the quaternion drift."""
-    g1, g2, g3 = _third_row(*q)
-    square = sum(x * x for x in q)
-    return g1 / square, g2 / square, g3 / square
+    return derivative if potential is None or type(static) in FIELDS else through_gradient

@@ -22,13 +22,19 @@ def sample(given, step, read):
     return {name: np.array([each[name] for each in samples]) for name in samples[0]}
 
 
-def pack_field(given):
-    """Return the numbers of a field (22,) for `field_torque`; all are 0 if there is none but uniform gravity."""
+def pack_field(given, moment=0.0):
+    """Return the numbers of a field (22,) for `field_torque`; all are 0 if there is none.
+
+    Uniform gravity is not included, unless its moment (3,), weight times centre of mass, N m, axes F, is given.
+    """
+    # A field has an anchor or a direction; the other one is 0.
+    vector, point, stiffness = given.anchor + given.direction, given.point, given.stiffness
+    if np.any(moment):
+        vector, point, stiffness = np.array([0.0, 0.0, 1.0]), moment, -1.0
     rate = np.linalg.norm(given.turn)
     normal = given.turn / rate if rate else given.turn
-    law = given.stiffness, given.stiffness * given.rest_length, given.strength
-    # A field has an anchor or a direction; the other one is 0.
-    return np.concatenate([given.anchor + given.direction, normal, [rate], given.point, law, given.gradient.ravel()])
+    law = stiffness, given.stiffness * given.rest_length, given.strength
+    return np.concatenate([vector, normal, [rate], point, law, given.gradient.ravel()])
 
 
 def field_torque(field, R, t):
@@ -69,7 +75,40 @@ def compile_torque():
         from numba import njit
     except ImportError:
         return field_torque
-    return njit(field_torque)
+    return njit(error_model="numpy")(field_torque)
+
+
+@lru_cache(maxsize=1)
+def compile_derivative():
+    """Return a function derivative(out, t, y, body) for ODE solvers, compiled by numba.
+
+    y is a quaternion (4), scalar first, and rates (3), axes F; body is the field (22) of `pack_field` and the moments (3).
+    """
+    from numba import njit
+
+    torque = compile_torque()
+
+    @njit(error_model="numpy")
+    def derivative(out, t, y, body):
+        q0, q1, q2, q3, w1, w2, w3 = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
+        # Of length 1: fields take roots, and the quaternion drifts with loose tolerances.
+        s = 2.0 / (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+        R = (
+            1.0 - s * (q2 * q2 + q3 * q3), s * (q1 * q2 - q0 * q3), s * (q1 * q3 + q0 * q2),
+            s * (q1 * q2 + q0 * q3), 1.0 - s * (q1 * q1 + q3 * q3), s * (q2 * q3 - q0 * q1),
+            s * (q1 * q3 - q0 * q2), s * (q2 * q3 + q0 * q1), 1.0 - s * (q1 * q1 + q2 * q2),
+        )  # fmt: skip
+        T1, T2, T3 = torque(body, R, t)
+        J1, J2, J3 = body[22], body[23], body[24]
+        out[0] = -0.5 * (q1 * w1 + q2 * w2 + q3 * w3)
+        out[1] = 0.5 * (q0 * w1 + q2 * w3 - q3 * w2)
+        out[2] = 0.5 * (q0 * w2 + q3 * w1 - q1 * w3)
+        out[3] = 0.5 * (q0 * w3 + q1 * w2 - q2 * w1)
+        out[4] = ((J2 - J3) * w2 * w3 + T1) / J1
+        out[5] = ((J3 - J1) * w3 * w1 + T2) / J2
+        out[6] = ((J1 - J2) * w1 * w2 + T3) / J3
+
+    return derivative
 
 
 def write_mjcf(given, option="", shape=""):

@@ -37,7 +37,7 @@ FIELDS: dict[type, tuple[str, ...]] = {
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
 
 
-def _describe_field(axes: EngineAxes) -> dict[str, Any]:
+def describe_field(axes: EngineAxes) -> dict[str, Any]:
     """Return the numbers of all fields; those of a field that the scene does not have are 0."""
     potential: Any = axes.scene.potential
     numbers: dict[str, Any] = {name: np.zeros(3) for name in ("point", "anchor", "direction", "turn")}
@@ -63,7 +63,7 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
         "mass": mass.mass,
         "com": mass.com,
         "gravity": mass.gravity,
-        **_describe_field(axes),
+        **describe_field(axes),
         "moments_com": mass.body.moments,
         "q_com": to_quaternion(mass.body.R_BP),
         "inertia_com": mass.body.inertia,

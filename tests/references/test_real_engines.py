@@ -14,7 +14,7 @@ from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.references.environments.install import install
 from conservative.references.environments.lock import Source
 
-from .test_fields_of_any_kind import IN_ENGINES, check_order
+from .test_fields_of_any_kind import IN_ENGINES, check_order, scene_in
 
 ENERGY_GROWS = (2.98, 0.22, 0.11, None)
 """Semi-implicit Euler: attitude error, rad, relative changes of energy and momentum at dt = 0.01, and order."""
@@ -272,3 +272,15 @@ def test_engines_converge_to_the_truth_in_every_field(engine, setting, name):
     install(engine)
     # Drake's angles as coordinates: the largest errors cancel at these steps. Measured up to 1.01 above.
     check_order(registry.method(f"{engine}:{setting}"), name, above=1.1)
+
+
+@pytest.mark.parametrize("name", IN_ENGINES)
+@pytest.mark.parametrize(("engine", "setting"), [of("cyrk", each) for each in ("DOP853", "Vern8", "Tsit5")])
+def test_errors_of_a_generic_solver_follow_its_tolerance_in_every_field(engine, setting, name):
+    install(engine)
+    scene = scene_in(IN_ENGINES[name])
+    truth = cv.integrate(scene, 0.1, method=registry.method("precise:128")).R_WB
+    runs = [cv.integrate(scene, 0.1, method=registry.method(f"{engine}:{setting},{tol}")) for tol in (1e-4, 1e-8, 1e-13)]
+    loose, middle, tight = (angle_between(run.R_WB, truth).max() for run in runs)
+    assert 5e-3 > loose > 300 * middle > 3e5 * tight  # measured 6e-6 to 2e-3, at least 660, and at least 2e4 apart
+    assert tight < 2e-12  # measured at most 7.6e-13
