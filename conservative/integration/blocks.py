@@ -84,8 +84,9 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     else:
         block = run()
         measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
-        alone = np.flatnonzero(~(block.finished & are_accepted(method, bodies, grid, measured)))
-        alone = np.setdiff1d(alone, list(block.failures))
+        settled = block.finished & are_accepted(method, bodies, grid, measured)
+        settled[list(block.failures)] = True
+        alone = np.flatnonzero(~settled)
     failures = dict(block.failures)
     for i in alone.tolist():
         pause()

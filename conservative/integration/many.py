@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -156,8 +157,11 @@ def _check_options(threads: object, progress: object, path: object, resume: obje
 def _require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
     """Raise `BadInput` if the step is too long for one of the bodies that may rotate fastest.
 
-    Other bodies for which it is too long become `NotRun` when they are integrated.
+    Other bodies for which it is too long become `NotRun` when they are integrated. Methods with a kernel refuse a step only if
+    they have a longest one. For others of them nothing is prepared, which would take as long as runs of hundreds of bodies.
     """
+    if method.card.kernel and method.longest_step(bodies.first) == math.inf:
+        return
     for i in pick_hardest(bodies):
         scene = bodies.take(i)
         try:

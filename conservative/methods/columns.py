@@ -8,7 +8,7 @@ results in SI units, bit for bit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,8 +38,18 @@ def find_units_of_moments(moments: Array) -> Array:
 
 def fill_columns(rows: Array, width: int) -> Array:
     """Return the rows (n, 3) of n bodies as columns (3, m). m is the next multiple of `width`; the last body is repeated."""
-    missing = -len(rows) % width
-    return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
+    return stack_columns([rows], width)
+
+
+def stack_columns(parts: Sequence[Array], width: int) -> Array:
+    """Return the rows of the parts (n, .), one part under the other, as `fill_columns` does."""
+    n = len(parts[0])
+    columns, row = np.empty((sum(part.shape[1] for part in parts), -(-n // width) * width)), 0
+    for part in parts:
+        columns[row : row + part.shape[1], :n] = part.T
+        row += part.shape[1]
+    columns[:, n:] = columns[:, n - 1 : n]
+    return columns
 
 
 def make_room(n: int, m: int) -> Array:

@@ -25,7 +25,7 @@ from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
 from .bounds import bounds_of
-from .columns import fill_columns, take_pieces
+from .columns import stack_columns, take_pieces
 from .many import Block, RunMany
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, spin_rate
 from .run_kernel import in_main_thread, prepare_run
@@ -269,7 +269,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         field = field.in_units(energy_unit)
         if isinstance(field, UniformField):  # of symmetric bodies the moment is along the axis but for round-off
             field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
-    R_WD = directions(axis_W)
+    R_WD = np.broadcast_to(directions(axis_W if axis_W.strides[0] else axis_W[:1]), (n, 3, 3))
     R_DP = R_WD.swapaxes(1, 2) @ bodies.R_WB0 @ R_BP
     energy, one = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
     J_in_units = J / mass[:, None]
@@ -289,7 +289,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
     )
     motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
     width, like = kernels("lanes").REGISTER, (zeros_like(start), zeros_like(motion))
-    columns, motions = (fill_columns(np.column_stack(list(flatten(each, n))), width) for each in (start, motion))
+    columns, motions = (stack_columns(list(flatten(each, n)), width) for each in (start, motion))
     m = columns.shape[1]
     spin = np.where(symmetric, spin_rate(moments[:, 0], moments[:, 2], w[:, 2] * moments[:, 2]), 0.0)
     angles = np.outer(grid.t, np.pad(spin, (0, m - n))) if symmetric.any() else np.zeros((1, m))
