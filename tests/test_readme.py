@@ -1,13 +1,19 @@
 """README.md is generated from measurements and is current."""
 
+import csv
 import importlib.util
+import re
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from conservative.benchmarks.measures import measurement
+
 from .pages import ROOT
+from .reports.rows import row
 
 FOLDER = ROOT / ".ci" / "readme"
 
@@ -66,14 +72,45 @@ def test_the_fastest_setting_at_an_error_is_found_between_its_points():
     assert load("measure").fastest(pd.DataFrame(rows), 1e-10) == (float("inf"), "")
 
 
-def test_ratios_on_random_bodies_are_geometric_means_over_bodies_with_both_times():
+def study(bodies, processes=5):
+    """Return the rows of a study on a spring; each body is a pair of times of both sides, s, or None for a side that misses."""
     rows = []
-    for index, (ours, heyoka) in enumerate([(1e-6, 2e-6), (1e-6, 8e-6), (None, 1e-6)]):
-        scene = f"random_body:field=spring,seed=1,index={index}"
-        for role, time in (("ours", ours), ("engine", heyoka)):
-            names = {"scene": scene, "field": "spring", "role": role}
-            rows += [row | names for row in timed(role, 1e-13 if time else 1.0, time or 1.0)]
-    found = {(row["scene"], row["quantity"]): row["value"] for row in load("measure")._random(pd.DataFrame(rows))}
-    assert found["spring 1e-06 rad", "heyoka's time over ours"] == pytest.approx(4)
-    assert found["all fields", "cases"] == 12
-    assert found["all fields", "cases where heyoka is faster"] == 4
+    for index, pair in enumerate(bodies):
+        for name, role, time in zip(("gauss", "heyoka"), ("ours", "engine"), pair, strict=True):
+            common = {"scene": f"random_body:field=spring,seed=1,index={index}", "field": "spring", "seed": 1, "body": index}
+            common |= {"role": role}
+            rows.append(row("random", name, "attitude error max", 1e-13 if time else 1.0, **common))
+            for process in range(processes):
+                spent = (time or 1.0) * (1 + 0.02 * (process if role == "ours" else 0))
+                rows.append(row("random", name, "time per simulated second", spent, **common, process=process))
+    return measurement.frame(rows)
+
+
+def test_random_bodies_have_ratios_intervals_and_counts_at_all_errors():
+    table = study([(1e-6, 2e-6), (1e-6, 8e-6), (1e-6, 1.04e-6), (3e-6, 1e-6), (None, 1e-6)])
+    found = {(row["scene"], row["quantity"]): row["value"] for row in load("measure")._random(table)}
+    ratios = {scene: value for (scene, quantity), value in found.items() if quantity == "heyoka's time over ours"}
+    assert len(ratios) == 11
+    slower = np.prod([1 + 0.02 * process for process in range(5)]) ** 0.2
+    assert ratios["spring 1e-06 rad"] == pytest.approx((2 * 8 * 1.04 / 3) ** 0.25 / slower)
+    low, high = (found["spring 1e-06 rad", f"heyoka's time over ours, {end}"] for end in ("low", "high"))
+    assert low < ratios["spring 1e-06 rad"] < high
+    counts = [found["all fields", f"cases{which}"] for which in ("", " won", " open", " lost")]
+    assert counts == [55, 22, 11, 22]  # of the five bodies two are won, one is open, one is slower and one alone reached
+
+
+def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
+    program, measure = load("__main__"), load("measure")
+    texts = dict.fromkeys(measure.COLUMNS, "")
+    with program.ROWS.open(encoding="utf-8", newline="") as file:
+        rows = [each for each in csv.DictReader(file) if each["name"] != "random bodies"]
+    rows += [texts | each for each in measure._random(study([(1e-6, 2e-6), (1e-6, 1.04e-6)]))]
+    with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, measure.COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
+    text = " ".join(program.render().split())
+    assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
+    assert "2 random bodies in each of 1 fields (spring), at 11 attitude errors" in text
+    assert "in none of these 22 cases, and 11 are open" in text

@@ -23,6 +23,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 README, PICTURE = ROOT / "README.md", ROOT / "reports" / "pictures" / "time_against_error.svg"
 ROWS = HERE / "measured.csv"
+RATIO = "heyoka's time over ours"
 
 
 def render() -> str:
@@ -35,7 +36,9 @@ def render() -> str:
     return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
         value=lambda *key: values[key],
         times=lambda scene, fast, slow: two_digits(values[scene, slow, "time"] / values[scene, fast, "time"]),
-        ratios=[value for (*_, quantity), value in values.items() if quantity == "heyoka's time over ours"],
+        ratios=sorted((value, place) for (place, _, quantity), value in values.items() if quantity == RATIO),
+        interval=lambda place: [values.get((place, "random bodies", f"{RATIO}, {end}"), math.nan) for end in ("low", "high")],
+        count=lambda quantity: int(values["all fields", "random bodies", quantity]),
         version={row["name"]: row["version"] for row in rows},
         date=max(row["date"] for row in rows),
     )

@@ -10,7 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.contest import cost
+from conservative.benchmarks.contest import Ratios, cost
+from conservative.reports.rows.names import with_names
+from conservative.reports.sections.random_bodies import ANY, ratios
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
 CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
@@ -19,7 +21,6 @@ GENERAL = "taylor:order=12"
 ENGINES = {"heyoka": "heyoka", "SciPy": "scipy", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
-RANDOM_ERRORS = (1e-3, 1e-6, 1e-9, 1e-12)
 RANDOM = "conservative study random --bodies 20 --seed 1002 --methods gauss,projected,taylor,heyoka"
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
 
@@ -62,25 +63,20 @@ def _error(run: pd.DataFrame) -> float:
 
 
 def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Yield heyoka's time over ours per field and error, and in how many cases heyoka is faster.
+    """Yield heyoka's time over ours with its interval per field and error, and the cases that are won, open and lost.
 
     A case is a body at an error. The ratio is the geometric mean over the bodies on which both sides reach the error.
     """
     common = {"name": "random bodies", "unit": "1", "method": "", "version": ""}
-    lost = cases = 0
-    for field, bodies in table.groupby("field", sort=False):
-        for error in RANDOM_ERRORS:
-            pairs = [
-                tuple(fastest(body[body["role"] == role], error)[0] for role in ("ours", "engine"))
-                for _, body in bodies.groupby("scene")
-            ]
-            cases += len(pairs)
-            lost += sum(theirs < ours for ours, theirs in pairs)  # a side that does not reach the error takes forever
-            logs = [math.log(theirs / ours) for ours, theirs in pairs if math.isfinite(ours + theirs)]
-            mean = math.exp(math.fsum(logs) / len(logs))
-            yield common | {"scene": f"{field} {error:g} rad", "quantity": "heyoka's time over ours", "value": mean}
-    yield common | {"scene": "all fields", "quantity": "cases", "value": cases}
-    yield common | {"scene": "all fields", "quantity": "cases where heyoka is faster", "value": lost}
+    found = [each for each in ratios(with_names(table)) if each.engine == ANY]
+    for each in found:
+        place = common | {"scene": f"{each.field} {each.error:g} rad"}
+        for quantity, value in zip(("", ", low", ", high"), (each.ratio, *each.interval), strict=True):
+            yield place | {"quantity": f"heyoka's time over ours{quantity}", "value": value}
+    every = Ratios(tuple(contest for each in found for contest in each.contests))
+    counts = {"cases": len(every.contests), "cases won": every.won, "cases open": every.open, "cases lost": every.lost}
+    for quantity, count in ({"bodies in each field": len(found[0].contests)} | counts).items():
+        yield common | {"scene": "all fields", "quantity": quantity, "value": count}
 
 
 def fastest(rows: pd.DataFrame, error: float) -> tuple[float, str]:
