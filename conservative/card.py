@@ -58,22 +58,14 @@ class Cost:
 
 
 class Structure(NamedTuple):
-    """Geometric properties of a step in a field that does not depend on time. `test_structure.py` measures the first two.
-
-    Attributes
-    ----------
-    symmetric
-        True if a step of -dt from the end of a step returns to its start.
-    symplectic
-        True if the map of (Q, L) is symplectic on T*SO(3). Its reduction to L, or to L and the field's axis, is then Poisson.
-    imposed
-        True if a projection after each step restores the invariants in `Method.conserves`; False if the equations of the step
-        conserve them.
-    """
+    """Geometric properties of a step in a field that does not depend on time. `test_structure.py` measures the first two."""
 
     symmetric: bool
+    """True if a step of -dt from the end of a step returns to its start."""
     symplectic: bool
+    """True if the map of (Q, L) is symplectic on T*SO(3). Its reduction to L, or to L and the field's axis, is then Poisson."""
     imposed: bool = False
+    """True if a projection after each step restores the invariants in `Method.conserves`; False if its equations do."""
 
 
 @dataclass(frozen=True)
