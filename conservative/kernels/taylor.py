@@ -380,7 +380,7 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
                 g, a, w, left, needed = correct(bodies.field, body, BETWEEN, g, a, w)
                 g, a, w, _, left = project(bodies.field, body, BETWEEN, g, a, w, left, needed & (failed < 0.5))
                 step += 1
-                failing = ~(left < LEFT) & (failed < 0.5)
+                failing = choose(left < LEFT, 1.0, failed) < 0.5
                 if some(failing):
                     failed, defect = choose(failing, (1.0 * step, left), (failed, defect))
             if step == sampled:
