@@ -56,7 +56,7 @@ class Splitting(Method):
     card: ClassVar[Card] = Card(
         variants=tuple(f"order={order}" for order in (2, 4, 6, 8, 10)),
         report=("",),
-        suite=("",),
+        suite=(),
         cost=lambda method: Cost(step=105.0 * method.stages),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
