@@ -29,10 +29,7 @@ ENGINE = {
     "orders": dict.fromkeys(("DOP853", "Vern8", "Vern7", "Tsit5", "RK45", "RK23")),
     "tolerance": "rtol",
     "fields": FIELDS,
-    "card": {
-        "variants": ("", "Vern8", "Vern7", "Tsit5"),
-        "suite": ("", "rtol=1e-9"),
-    },
+    "card": {"variants": ("", "Vern8", "Vern7", "Tsit5"), "suite": ("", "rtol=1e-9")},
 }
 
 
@@ -65,8 +62,7 @@ def _compile():
 
     @njit
     def solve(address, start, method, times, body, tolerance):
-        end = times[-1]
-        found = nbsolve2_ivp(address, (0.0, end), start, method, times, False, body, tolerance, tolerance)
+        found = nbsolve2_ivp(address, (0.0, times[-1]), start, method, times, False, body, tolerance, tolerance)
         y, steps, status = found.y.T.copy(), found.steps_taken, found.status
         found.free()
         return y, steps, status

@@ -146,17 +146,16 @@ def _find_callback(mj, model, data):
     if not model.nnumeric:
         return None
     data.time = FIELD
-    time = np.float64(FIELD).view(np.int64)
-    places = [(model, model.numeric_data), (data, data.xmat), (data, data.qfrc_passive)]
-    found = [_find_word(owner, array.ctypes.data) for owner, array in places], _find_word(data, time)
+    arrays = [(model, model.numeric_data), (data, data.xmat), (data, data.qfrc_passive)]
+    words = [_find_word(owner, array.ctypes.data) for owner, array in arrays]
+    words.append(_find_word(data, np.float64(FIELD).view(np.int64)))
     mj.mj_resetData(model, data)
-    return _compile_callback(*found[0], found[1])
+    return _compile_callback(*words).ctypes
 
 
 def _find_word(owner, value):
     """Return the place of an integer of 64 bits in one of MuJoCo's structures, whose layout changes with the version."""
-    address = owner._address
-    return next(word for word in range(1 << 17) if ctypes.c_int64.from_address(address + 8 * word).value == value)
+    return next(word for word in range(1 << 17) if ctypes.c_int64.from_address(owner._address + 8 * word).value == value)
 
 
 @lru_cache(maxsize=1)
@@ -172,9 +171,8 @@ def _compile_callback(numeric, attitude, force, time):
 
     @intrinsic
     def read(typing, address):
-        return doubles(types.int64), lambda context, builder, signature, args: builder.inttoptr(
-            args[0], context.get_value_type(doubles)
-        )
+        to_pointer = lambda context, builder, _, args: builder.inttoptr(args[0], context.get_value_type(doubles))  # noqa: E731
+        return doubles(types.int64), to_pointer
 
     @cfunc(types.void(words, words))
     def passive(model, data):
@@ -186,7 +184,7 @@ def _compile_callback(numeric, attitude, force, time):
         out[1] += t2
         out[2] += t3
 
-    return passive.ctypes
+    return passive
 
 
 def _integrator(mj, name):

@@ -175,11 +175,10 @@ class AdapterMethod(Method):
             if not isinstance(only, str):
                 only = only.get(next(iter(self.settings.values())), "")
             kinds = list(dict.fromkeys([type(potential), type(static_part(potential))]))
+            supported = [kind for kind in FIELDS if kind.__name__ in self.data.fields]
             if only:
                 reason = only
-            elif kinds == [Turning, UniformGravity] or any(
-                kind not in FIELDS or kind.__name__ not in self.data.fields for kind in kinds
-            ):
+            elif kinds == [Turning, UniformGravity] or not {*kinds} <= {*supported}:
                 reason = f"not supported by our adapter: {' of '.join(kind.__name__ for kind in kinds)}"
         if reason is None and self.settings.get("as_installed"):
             return rate_limit_reason(scene, self.data.rate_limit)
