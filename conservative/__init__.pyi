@@ -39,6 +39,7 @@ from .methods.symplectic import NoSquish as NoSquish
 from .methods.symplectic import Rattle as Rattle
 from .methods.symplectic import Splitting as Splitting
 from .methods.taylor import Taylor as Taylor
+from .methods.textbook import Textbook as Textbook
 from .outcome import Outcome as Outcome
 from .outcome import OutcomeKind as OutcomeKind
 from .potentials.gravity_gradient import GravityGradient as GravityGradient

@@ -27,6 +27,8 @@ class Role(StrEnum):
 
     OURS = "ours"
     """Compared with the engines in verdicts; its time is gated."""
+    BASELINE = "baseline"
+    """A textbook method: in tables and pictures, in no contest and never chosen automatically."""
     ENGINE = "engine"
     """Other people's code."""
     TRUTH = "truth"

@@ -68,7 +68,7 @@ class Method(ABC):
     @property
     def label(self) -> str:
         """Maker and setting, such as `mujoco==4.0.0/RK4`. For our methods, maker and name."""
-        setting = "" if self.role == Role.OURS else self.setting()
+        setting = "" if self.role in (Role.OURS, Role.BASELINE) else self.setting()
         return f"{self.maker}/{setting or self.name}"
 
     @property

@@ -102,10 +102,11 @@ def random_study(
 def settings(method: Method) -> tuple[Method, ...]:
     """Return the settings of a family, of order `ORDER` or more.
 
-    For our methods these are the candidates of the automatic choice and those with a tolerance, for engines all settings.
+    For our methods these are the candidates of the automatic choice and those with a tolerance, for engines all settings, and
+    for baselines none.
     """
     variants = method.settings_for("variants")
-    if method.role == Role.OURS:
+    if method.role in (Role.OURS, Role.BASELINE):
         approximate = method.card.rank is not None and not method.card.exact
         variants = (*method.settings_for("candidates"), *filter(tolerance_setting, variants)) if approximate else ()
     return tuple(each for each in variants if (each.order or ORDER) >= ORDER)

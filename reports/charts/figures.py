@@ -29,6 +29,7 @@ SINGLE = "single"
 _CLASSES: Mapping[str, tuple[str, list[int]]] = {
     MethodClass.GENERAL.value: ("circle", [1, 0]),
     MethodClass.SOLUTION.value: ("diamond", [1, 0]),
+    MethodClass.BASELINE.value: ("cross", [2, 2]),
     MethodClass.SOLVER.value: ("square", [6, 3]),
     MethodClass.ENGINE.value: ("triangle-up", [2, 2]),
 }

@@ -59,6 +59,7 @@ class MethodClass(StrEnum):
 
     GENERAL = "our general integrators"
     SOLUTION = "our solutions of integrable motions"
+    BASELINE = "textbook baselines"
     SOLVER = "ODE solvers"
     ENGINE = "physics engines"
 
@@ -76,6 +77,8 @@ def class_of(role: str, method: str) -> MethodClass:
     loaded = _load(method)
     if role == Role.OURS:
         return MethodClass.SOLUTION if loaded and loaded.unsupported(_body()) else MethodClass.GENERAL
+    if role == Role.BASELINE:
+        return MethodClass.BASELINE
     return MethodClass.SOLVER if loaded and tolerance_setting(loaded) else MethodClass.ENGINE
 
 

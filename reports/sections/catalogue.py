@@ -14,7 +14,13 @@ from ..document.model import Document, Table
 
 SCENE_HEADER = ("name", "t_end, s", "dt, s", "conserved by the motion", "source")
 METHOD_HEADER = ("name", "order", "conserves", "version, or why it cannot run")
-TITLES = {Role.OURS: "ours", Role.ENGINE: "engines", Role.TRUTH: "reference solutions", "": "not available"}
+TITLES = {
+    Role.OURS: "ours",
+    Role.BASELINE: "textbook baselines",
+    Role.ENGINE: "engines",
+    Role.TRUTH: "reference solutions",
+    "": "not available",
+}
 
 
 def build() -> Document:

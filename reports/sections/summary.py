@@ -124,6 +124,8 @@ def classes_table(
     for kind in MethodClass:
         families = of_classes(points, kind)["family"].unique()
         sample = [samples[kind]] if samples else []
+        if not len(families) and kind == MethodClass.BASELINE:
+            continue  # only a full report measures them
         if not len(families):
             missing = "does not support these motions, or was not measured"
             rows.append([kind.value, *[DASH] * (2 + len(ERRORS)), *sample, missing])

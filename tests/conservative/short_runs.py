@@ -77,6 +77,7 @@ METHODS: tuple[Method, ...] = (
     cv.Taylor(),
     cv.Taylor(5),
     cv.Taylor(tolerance=1e-12),
+    *cv.Textbook().settings_for("variants"),
 )
 
 
@@ -86,8 +87,9 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
         for method in METHODS:
             if method.unsupported(scene):
                 continue
-            # Kicks over 50 radians amplify round-off to 4e-3.
-            for factor, n in ((1, 8), (4, 3)) if isinstance(method, cv.Splitting) else ((1, 8), (40, 3), (200, 2)):
+            # Kicks over 50 radians amplify round-off to 4e-3. Explicit steps that are too long overflow, an error in Python.
+            factors = ((1, 8),) if isinstance(method, cv.Textbook) else ((1, 8), (40, 3), (200, 2))
+            for factor, n in ((1, 8), (4, 3)) if isinstance(method, cv.Splitting) else factors:
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
             for factor, n in ((1, 33 if scene.free else 8), (40, 3)):

@@ -14,7 +14,11 @@ from .one_body import free, in_field, top
 
 SCENES = [free((1, 1.4, 2), (0.3, -2.0, 1.0)), in_field("gravity"), in_field("spring"), top((1, 1, 0.6), (0.3, -1.2, 2.0), 2.0)]
 STEPS = 0.4, 0.8, 1.2  # s; 0.9 to 2.7 rad, so that a defect of a method of order 16 is above round-off
-VISIBLE = {"convected": ("tol=1e-13",), "taylor": ("order=8", "order=16", "tolerance=1e-3")}  # settings that show their defects
+VISIBLE = {  # settings that show their defects
+    "convected": ("tol=1e-13",),
+    "taylor": ("order=8", "order=16", "tolerance=1e-3"),
+    "textbook": (*cv.Textbook.card.variants, "scheme=generalized_alpha,rho=1.0"),
+}
 PART = {"no_squish": 0.5, "rattle": 0.25, "lie_variational": 0.25}  # of STEPS: differences of longer steps have larger errors
 ROUND_OFF, DEFECT = 4e-12, 1e-10  # measured: at most 6e-13, no_squish:order=10 2e-12, and at least 3e-10
 

@@ -107,3 +107,19 @@ DORMAND_PRINCE_8 = ExplicitTableau(
     ),
 )
 """Twelve stages of order 8 with small error constants; made for steps of adaptive length, used here with constant ones."""
+
+RUNGE_KUTTA_4 = ExplicitTableau(
+    source="Kutta 1901", order=4, A=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), b=(1 / 6, 1 / 3, 1 / 3, 1 / 6)
+)
+CROUCH_GROSSMAN_4 = ExplicitTableau(
+    source="Jackiewicz, Marthinsen & Owren, Adv. Comput. Math. 13 (2000) 405; Hairer, Lubich & Wanner, IV.8.1",
+    order=4,
+    A=(
+        (),
+        (0.8177227988124852,),
+        (0.3199876375476427, 0.0659864263556022),
+        (0.9214417194464946, 0.4997857776773573, -1.0969984448371582),
+        (0.3552358559023322, 0.2390958372307326, 1.3918565724203246, -1.1092979392113465),
+    ),
+    b=(0.1370831520630755, -0.0183698531564020, 0.7397813985370780, -0.1907142565505889, 0.3322195591068374),
+)

@@ -1,0 +1,112 @@
+"""Methods from textbooks and game engines, as baselines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..card import Card, Structure
+from ..check import choice, describe, finite_number
+from ..deferred_imports import kernels
+from ..errors import BadInput
+from ..grid import Grid
+from ..method import Method, Role, Run
+from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
+from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4
+from .principal_axes import principal_start
+from .run_kernel import prepare_run
+from .units import in_own_units
+
+Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic", "implicit_gyroscopic"]
+
+
+_RADIUS = "a spectral radius from 0 to 1"
+SCHEMES = {
+    "rkmk": ("RKMK 4", 4),
+    "crouch_grossman": ("Crouch-Grossman 4", 4),
+    "generalized_alpha": ("generalised-alpha", 2),
+    "buss": ("Buss 3", 3),
+    "gyroscopic": ("explicit gyroscopic step", 1),
+    "implicit_gyroscopic": ("implicit gyroscopic step", 1),
+}
+"""Titles in tables, and orders. In the order of the numbers in `conservative.kernels.textbook`."""
+
+
+@dataclass(frozen=True)
+class Textbook(Method):
+    """A textbook method, compiled like ours, as a baseline: shown in tables, in no contest, never chosen automatically.
+
+    All of them support every field, also time-dependent ones. None conserves energy. "buss" integrates the momentum in world
+    axes and conserves it, or its component along the field's axis. The others integrate it in body axes and conserve only the
+    axial momentum of a symmetric body.
+
+    Parameters
+    ----------
+    scheme
+        "rkmk": Munthe-Kaas with the classical tableau, order 4 (Hairer, Lubich & Wanner, *Geometric Numerical Integration*,
+        IV.8.2). "crouch_grossman": order 4 with five stages (IV.8.1; Jackiewicz, Marthinsen & Owren 2000).
+        "generalized_alpha": order 2, implicit (Brüls & Cardona 2010). "buss": order 3, one rotation a step (Buss 2000, for a
+        free body; the torque is integrated by Radau's rule of order 3). "gyroscopic": order 1, the explicit gyroscopic torque
+        and semi-implicit Euler step of Bullet and ODE. "implicit_gyroscopic": the same with one Newton iteration for the
+        gyroscopic torque (Catto, Game Developers Conference 2015).
+    rho
+        Spectral radius of generalised-alpha at infinite frequency, 0 to 1: 1 has no numerical damping.
+
+    Raises
+    ------
+    BadInput
+        There is no such scheme, or rho is outside its range.
+    """
+
+    scheme: Scheme = "rkmk"
+    rho: float = 0.9
+
+    family: ClassVar[str] = "textbook"
+    role: ClassVar[Role] = Role.BASELINE
+    card: ClassVar[Card] = Card(
+        variants=tuple(f"scheme={scheme}" for scheme in SCHEMES),
+        report=(),
+        suite=(),
+        kernel="textbook",
+        structure=lambda method: Structure(method.scheme == "generalized_alpha" and method.rho == 1, symplectic=False),
+        time_dependent=True,
+    )
+
+    def __post_init__(self) -> None:
+        choice("scheme", self.scheme, tuple(SCHEMES))
+        if not 0 <= finite_number("rho", self.rho, _RADIUS) <= 1:
+            raise BadInput("rho", describe(self.rho), _RADIUS)
+
+    @property
+    def order(self) -> int:
+        return SCHEMES[self.scheme][1]
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        if self.scheme == "buss":
+            return frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
+        return frozenset({"axial momentum"})
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        rho = {"rho": f"rho={self.rho}"} if self.scheme == "generalized_alpha" else {}
+        return {"scheme": SCHEMES[self.scheme][0], **rho}
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
+
+    @in_own_units
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        kernel, start = kernels("textbook"), principal_start(scene)
+        model = kernel.Model(start.J, start.J_inverse, start.field, start.q, start.L)
+        tableau = CROUCH_GROSSMAN_4 if self.scheme == "crouch_grossman" else RUNGE_KUTTA_4
+        weights = np.array([[*row, *[0.0] * (len(tableau.b) - len(row))] for row in (*tableau.A, tableau.b)])
+        alpha_m, alpha_f = (2 * self.rho - 1) / (self.rho + 1), self.rho / (self.rho + 1)
+        gamma = 0.5 + alpha_f - alpha_m
+        alpha = alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4, gamma
+        coefficients = kernel.Coefficients(list(SCHEMES).index(self.scheme), weights, np.array(tableau.c), alpha, grid.dt)
+        return prepare_run(scene, grid, self.label, start, kernel, model, coefficients)
