@@ -11,15 +11,16 @@ from typing import Any
 import pandas as pd
 
 from conservative.benchmarks.contest import LINE, Cheapest, Ratios, contests, costs
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
 from conservative.benchmarks.studies.studies import RANDOM
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
-from ..document.cells import DASH, factor, grade_ratio, numeric, ratio_text, tolerance
+from ..document.cells import DASH, factor, grade_ratio, number, numeric, ratio_text, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
-from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, without_outcome
+from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, with_outcome, without_outcome
 from ..rows.points import joined, points
 from .summary import MIDDLE, MOST, Summary, cheapest_of_each, classes_table, geometric_mean
 
@@ -75,8 +76,21 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
     return tuple(results)
 
 
-def section(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
-    """Return the section of a report from the ratios; `bodies` is their number in each field, `seed` their seed."""
+def truths(table: pd.DataFrame) -> str:
+    """Return in words how well the two reference solutions agree, and on how many bodies they do not."""
+    rows = table[(table["study"] == RANDOM) & (table["measure"] == Measure.AGREEMENT.text)]
+    good = with_outcome(rows, OutcomeKind.OK)
+    if not len(good):
+        return "No body has two reference solutions that agree."
+    dropped = f" They differ by more on {len(rows) - len(good)}, which are not compared." if len(rows) > len(good) else ""
+    return f"Two reference solutions agree within {number(good['value'].max(), 1)} rad on {len(good)} bodies.{dropped}"
+
+
+def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str = "") -> Section:
+    """Return the section of a report from the ratios; `bodies` is their number in each field, `seed` their seed.
+
+    `about` is the sentence of `truths`.
+    """
     example = f"`conservative run random_body:field=spring,seed={seed},index=0` runs the first on a spring."
     drawn = f"Our closed forms do not solve these motions. Bodies in each field: {bodies}, from seed {seed}; {example}"
     points, figure = chart_points(ratios), None
@@ -90,9 +104,8 @@ def section(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
         panels = vega_embed.embed(picture, (), 220)
         figure = Figure("random_bodies", title, words, picture, panels, layout=Layout.PAIRS)
     terms = Paragraph(TERMS, Emphasis.NOTE)
-    return Section(
-        "Random bodies", filled(Paragraph(drawn), figure, as_table(ratios), by_engine(ratios), terms), "random", "Random bodies"
-    )
+    blocks = filled(Paragraph(f"{drawn} {about}"), figure, as_table(ratios), by_engine(ratios), terms)
+    return Section("Random bodies", blocks, "random", "Random bodies")
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:

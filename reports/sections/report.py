@@ -24,7 +24,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     rows = measured.scene_rows
     blocks: list[Block] = [verdict.section(measured, summaries)]
     if RANDOM in plan.names:
-        blocks.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed))
+        blocks.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
     blocks += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
     if plan.engines:
         blocks.append(engines.section(measured))

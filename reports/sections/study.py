@@ -36,7 +36,7 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     shown: list[Block]
     if name == RANDOM:
         ratios = random_bodies.ratios(named)
-        sentence = Paragraph(random_bodies.sentence(ratios))
+        sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
         shown, terms = filled(random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence), random_bodies.TERMS
         data["ratios"] = random_bodies.records(ratios)
     elif name == THROUGHPUT:

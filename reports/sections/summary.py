@@ -115,14 +115,15 @@ def classes_table(
     samples
         Cost of a sample in each class, for a column of its own.
     """
-    bodies = points["scene"].nunique()
     engines = of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES)
     budget = engines.groupby("scene")["time"].min()
     header = ["class", "conserves", "error at equal cost", *(f"µs at {tolerance(error)} rad" for error in ERRORS)]
     header += ["µs a sample, every step stored"] * bool(samples) + ["where it fails"]
     rows: list[Row] = []
     for kind in MethodClass:
-        families = of_classes(points, kind)["family"].unique()
+        members = of_classes(points, kind)
+        # A class is judged on the bodies whose field one of its adapters supports.
+        families, bodies = members["family"].unique(), members["scene"].nunique()
         sample = [samples[kind]] if samples else []
         if not len(families) and kind == MethodClass.BASELINE:
             continue  # only a full report measures them

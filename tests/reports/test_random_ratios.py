@@ -115,8 +115,12 @@ def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
 
 def test_a_body_without_a_confirmed_truth_is_in_no_count():
     dropped = {"scene": name_of(FIELD, 7, 9), "field": FIELD, "seed": 7, "body": 9, "role": "truth", "outcome": "skipped"}
-    contest = against(found(*TWICE, [row("random", "precise:bits=96", Measure.AGREEMENT, 1e-12, **dropped)]))
-    assert len(contest.contests) == 1
+    rows = [row("random", "precise:bits=96", Measure.AGREEMENT, 1e-12, **dropped)]
+    assert len(against(found(*TWICE, rows)).contests) == 1
+    confirmed = row("random", "precise:bits=96", Measure.AGREEMENT, 2e-15, **{**dropped, "body": 0, "outcome": "ok"})
+    assert random_bodies.truths(frame([*rows, confirmed])) == (
+        "Two reference solutions agree within 2e-15 rad on 1 bodies. They differ by more on 1, which are not compared."
+    )
 
 
 def test_without_an_engine_there_are_no_ratios():
