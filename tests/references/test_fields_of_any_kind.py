@@ -1,8 +1,8 @@
-"""heyoka, SciPy and multi-precision in every kind of field, also in fields that turn.
+"""heyoka, SciPy, multi-precision and engines in every kind of field, also in fields that turn.
 
 Axes are turned, inertias are not diagonal and sizes are not 1, so that a wrong convention shows. The programs write the
-equations of fields that turn in different ways: `Precise` has the field as a function of time in the world's axes, heyoka and
-SciPy have it in axes that turn, and `Projected` has it at the times of its stages (compared with the textbook in
+equations of fields that turn in different ways: `Precise`, SciPy and engines have the field as a function of time in the
+world's axes, heyoka has it in axes that turn, and `Projected` has it at the times of its stages (compared with the textbook in
 `test_turning.py`).
 """
 
