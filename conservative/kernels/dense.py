@@ -13,29 +13,19 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from ..arithmetic import cosine, root, sine
-from . import entry, kernel, small
+from . import entry, kernel
 from .lanes import REGISTER, load, save_columns
 from .protocol import Result, find_ends, loosen
 from .series import recall
 from .signals import call_handlers, end_of_block
-from .taylor import BETWEEN, ENOUGH, LEFT, TINY, Model, begin, correct, expand, project
+from .taylor import BETWEEN, ENOUGH, LEFT, TINY, Model, begin, correct, expand, find_sample, project
 from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
 from .traced import trace
-from .vector import accumulate, add, apply, cross, dot, every, fill_like, fuse, scale, times
+from .vector import accumulate, dot, every, fill_like, fuse
 
 SAFETY, SHORTEST = 0.8, 2.0**-30
 """Factor between a step and the longest that the tolerance allows, and the shortest step, in distances of the grid's times."""
-MOST_STEPS = 2**62
-"""More steps than can be taken."""
-
-
-class Coefficients(NamedTuple):
-    """Order of the series, distance of the grid's times, s, and tolerance for the last two terms."""
-
-    order: int
-    h: float
-    tolerance: float
 
 
 class Frame(NamedTuple):
@@ -63,13 +53,6 @@ def take_step(field, constants, order, h, K, g, a, w, scales):
     return end, sizes, coefficients.locate()
 
 
-@small
-def stretch(tolerance, order, large):
-    """Return the factor by which the step may grow, from the sizes of its last two terms."""
-    last, before = large[0] + TINY, large[1] + TINY
-    return min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
-
-
 recall = trace(recall)
 
 
@@ -91,45 +74,36 @@ def evaluate(terms, order, s, state):
 
 
 @trace
-def find_turn(spin, t):
-    """Return cosine and sine of the angle of the spin at a time, s; () without a spin."""
-    return (cosine(spin[0] * t), sine(spin[0] * t)) if spin else ()
-
-
-@trace
-def find_sample(frame, turn, further, g, a, w):
-    """Return R_WB by rows and w_WB_B; the spin's angle is the sum of those of `turn` and `further` (`find_turn`)."""
-    b = cross(g, a)
-    rows = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in frame.axes] + [times(frame.units, w)]
-    if turn:
-        (c, s), (c1, s1) = turn, further
-        cos, sin = c * c1 - s * s1, s * c1 + c * s1
-        rows = [(cos * x + sin * y, cos * y - sin * x, z) for x, y, z in rows]
-    return tuple(x for row in rows for x in (apply(frame.R_BP, row) if frame.R_BP else row))
+def find_turn(spin, t, further):
+    """Return cosine and sine of the spin's angle at a time, s, plus a further angle, which can be (); () without a spin."""
+    if not spin:
+        return ()
+    cos, sin = cosine(spin[0] * t), sine(spin[0] * t)
+    return (cos * further[0] - sin * further[1], sin * further[0] + cos * further[1]) if further else (cos, sin)
 
 
 @partial(kernel, forceinline=True, ahead=True)
-def march(model, coefficients, frame, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
+def march(model, frame, order, h, tolerance, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
     """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
 
-    `lanes` are the numbers 0, 1, ... of the lanes. A step that cannot be projected fails; the size is the relative defect that
-    remains at its end.
+    The series has an order and a tolerance for its last two terms; the grid's times are h, s, apart. `lanes` are the numbers 0,
+    1, ... of the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
     """
     field, g, a = model.field, model.g, model.a
-    order, h, tolerance = coefficients
     body, K, w = begin(model)
     constants, _, _, scales = body
     ahead = load(lanes, 0, REGISTER) * float(sampled)
-    further = find_turn(frame.spin, ahead * h)
+    further = find_turn(frame.spin, ahead * h, ())
     row, done, following, corrections, steps, computed, defect, good = 1, 0, min(sampled, n_steps), 0, 0, 0, 0.0, True
     # Times are in units of h: the step begins at whole + rest and has a length; its next sample is at `following`.
     whole, rest, carry, length = 0, 0.0, 0.0, 1.0
     while done < n_steps and good:
-        pausing = end_of_block(computed, MOST_STEPS, pause)
+        pausing = end_of_block(computed, 2**62, pause)
         while done < n_steps and good and computed < pausing:
             (g1, a1, w1), sizes, terms = take_step(field, constants, order, length * h, K, g, a, w, scales)
             computed += 1
-            factor = stretch(tolerance, order, sizes)
+            last, before = sizes[0] + TINY, sizes[1] + TINY
+            factor = min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
             if not factor >= 1.0 and length > SHORTEST:
                 length *= SAFETY * factor if factor > 0.1 else 0.1
                 continue
@@ -144,7 +118,7 @@ def march(model, coefficients, frame, n_steps, sampled, pause, lanes, R_WB, w_WB
                 g2, a2, w2, left, needs = correct(field, body, ENOUGH, g2, a2, w2)
                 g2, a2, w2, _, left = project(field, body, ENOUGH, g2, a2, w2, left, needs)
                 good = every(left < LEFT)
-                sample = find_sample(frame, find_turn(frame.spin, following * h), further, g2, a2, w2)
+                sample = find_sample(frame, find_turn(frame.spin, following * h, further), g2, a2, w2)
                 save_columns(R_WB, 9 * row, 9, sample[:9])
                 save_columns(w_WB_B, 3 * row, 3, sample[9:])
                 for i in range(REGISTER):
@@ -163,12 +137,10 @@ def march(model, coefficients, frame, n_steps, sampled, pause, lanes, R_WB, w_WB
     return Result(done, steps * order, corrections, computed * order, defect, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
-FRAME_END = COEFFICIENTS_END + len(Frame._fields)
+MODEL_END, FRAME_END = find_ends(Model, Frame)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Frame(*loose[COEFFICIENTS_END:FRAME_END]), *loose[FRAME_END:]))
+    return loosen(march(Model(*loose[:MODEL_END]), Frame(*loose[MODEL_END:FRAME_END]), *loose[FRAME_END:]))

@@ -289,15 +289,18 @@ def add(c, a, b):
     return b * a if isinstance(b, Axes) else a * b
 
 
-def find_next(series, c, n, h, K, accelerate):
+def find_next(series, c, n, h, K, accelerate, ratio):
     """Return the coefficients n + 1 of g, a and w for fixed axes."""
     f = h * (1.0 / (n + 1))
     (g_r, g_s), (a_r, a_s), (w_r, w_s) = (c.turned(k) for k in range(3))
-    products = ((g_r, w_s), (g_s, w_r)), ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
+    products = ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
+    if ratio is None:
+        products = *products, ((g_r, w_s), (g_s, w_r))
     if not series.one_body:
-        gw, aw, ww = series.convolve(n, 0, n, *products)
-        return gw * f, aw * f, add(accelerate(c, n), K, ww) * f
-    gw, aw, ww = series.convolve(n, 1, n - 1, *products)
+        aw, ww, *gw = series.convolve(n, 0, n, *products)
+        w = add(accelerate(c, n), K, ww) * f
+        return gw[0] * f if gw else w * ratio, aw * f, w
+    aw, ww, *gw = series.convolve(n, 1, n - 1, *products)
     f1, f2 = f * c[0, 4], f * c[0, 5]
 
     def find_row(k, old):
@@ -308,24 +311,25 @@ def find_next(series, c, n, h, K, accelerate):
         r, s = f * c[0, k], f * c[0, k + 1]
         return new + fuse(-s, c[n, 4], r * c[n, 5])
 
-    rows = find_row(0, gw), find_row(2, aw)
     torque = accelerate(c, n)
     old = None if torque is None else f * torque
     if ww is not None:
         old = f * K * ww if old is None else old + f * K * ww
-    rates = add(old, f1 * K, c[n, 5])
-    return *rows, fuse(f2 * K, c[n, 4], rates) if n else rates
+    w = add(old, f1 * K, c[n, 5])
+    w = fuse(f2 * K, c[n, 4], w) if n else w
+    return find_row(0, gw[0]) if gw else w * ratio, find_row(2, aw), w
 
 
-def sum_orders(series, c, h, start, K, accelerate, turn):
+def sum_orders(series, c, h, start, K, accelerate, turn, ratio):
     """Yield, for each order up to the highest, three times (g, a, w): the sum of a step, its last term, and the one before.
 
-    The coefficients are added to c. `turn` is the rate of the axes of g and a, None if they are fixed.
+    The coefficients are added to c. `turn` is the rate of the axes of g and a, None if they are fixed. `ratio` is g/w, by
+    components, of a free body, which saves a product; otherwise None.
     """
     c.push(start)
     total = before = None
     for n in range(HIGHEST):
-        g, a, w = find_next(series, c, n, h, K, accelerate)
+        g, a, w = find_next(series, c, n, h, K, accelerate, ratio)
         if turn is not None:
             by = h * (1.0 / (n + 1)) * turn
             g, a = fuse(c.newest[1], by, g), fuse(-c.newest[0], by, a)
@@ -336,9 +340,9 @@ def sum_orders(series, c, h, start, K, accelerate, turn):
         before = term
 
 
-def sum_to_order(series, c, order, h, start, K, accelerate, turn):
+def sum_to_order(series, c, order, h, start, K, accelerate, turn, ratio):
     """Return the change of (g, a, w) in a step of an order and a length h, its last term, and the one before."""
-    sums = enumerate(sum_orders(series, c, series.spread(h), start, K, accelerate, turn), 1)
+    sums = enumerate(sum_orders(series, c, series.spread(h), start, K, accelerate, turn, ratio), 1)
     if not isinstance(order, Traced):
         return next(found for n, found in sums if n == order)
     builder, exits = order.builder, []

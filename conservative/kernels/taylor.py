@@ -29,7 +29,7 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .series import Series, Vectors, sum_to_order
 from .signals import call_handlers, end_of_block
 from .traced import trace
-from .vector import add, choose, cross, dot, product, scale, some, subtract, times
+from .vector import add, apply, choose, cross, dot, product, scale, some, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -83,8 +83,8 @@ class Free(NamedTuple):
     momentum: Any
 
     def find_constants(self, J_inverse):
-        """Return nothing."""
-        return ()
+        """Return J/l, by which g follows from the rates."""
+        return tuple(1.0 / (self.momentum * x + TINY) for x in J_inverse)
 
     def slope(self, constants, g):
         """Return V and dV/dg, 0."""
@@ -131,8 +131,9 @@ def expand(field, constants, order, h, K, g, a, w):
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
     turn = series.spread(field.rate) if isinstance(field, Turned) else None
+    ratio = series.vector(*constants) if isinstance(field, Free) else None
     accelerate, terms = field.series(constants, g, series), Vectors(series, len(start))
-    change, last, before = sum_to_order(series, terms, order, h, start, series.vector(*K), accelerate, turn)
+    change, last, before = sum_to_order(series, terms, order, h, start, series.vector(*K), accelerate, turn, ratio)
     end = tuple(v + d for v, d in zip(start, change, strict=True))
     return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
 
@@ -348,12 +349,13 @@ class Motion(NamedTuple):
 
 @trace
 def find_sample(bodies, turn, g, a, w):
-    """Return R_WB by rows and w_WB_B; `turn` is cosine and sine of the angle of the frame's spin."""
-    b, (cos, sin), (x, y, z) = cross(g, a), turn, times(bodies.units, w)
-    w = cos * x + sin * y, cos * y - sin * x, z
-    R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in bodies.axes]
-    R_WP = [(cos * x + sin * y, cos * y - sin * x, z) for x, y, z in R_WP]
-    return tuple(dot(row, axis) for row in (*R_WP, w) for axis in bodies.R_BP)
+    """Return R_WB by rows and w_WB_B; `turn` is cosine and sine of the angle of the frame's spin, () without one."""
+    b = cross(g, a)
+    rows = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in bodies.axes] + [times(bodies.units, w)]
+    if turn:
+        cos, sin = turn
+        rows = [(cos * x + sin * y, cos * y - sin * x, z) for x, y, z in rows]
+    return tuple(x for row in rows for x in (apply(bodies.R_BP, row) if bodies.R_BP else row))
 
 
 @entry

@@ -158,7 +158,7 @@ def prepare_dense(scene: Scene, grid: Grid, method: Taylor, start: PrincipalStar
     R_BP = () if start.R_BP is None else tuple(map(triple, start.R_BP))
     units = (1.0, 1.0, start.spin[1] / start.J_inverse[2] if start.spin else 1.0)
     frame = kernel.Frame(tuple(map(triple, axes_of(scene))), R_BP, units, start.spin[:1] if start.spin else ())
-    numbers = *model, method.terms, grid.dt, method.tolerance, *frame, grid.n_steps, grid.every
+    numbers = *model, *frame, method.terms, grid.dt, method.tolerance, grid.n_steps, grid.every
     R_WB0, lanes, label = from_quaternion(to_quaternion(scene.R_WB0)), np.arange(kernel.REGISTER, dtype=float), method.label
 
     def run() -> Trajectory:
