@@ -17,6 +17,7 @@ from conservative.reports.report import render
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import BODIES, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
+from conservative.reports.run.single_study import plan_study
 from conservative.reports.run.terms import terms
 from conservative.reports.sections import random_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
@@ -257,6 +258,14 @@ def test_how_many_bodies_a_report_has():
     first = plan_report(["brick_flip"], METHODS, bodies=1).studies[0]
     assert (first.name, len(first.scenes)) == ("random", len(FIELDS))
     assert plan_report([], METHODS, bodies=0).studies[0].name != "random"
+
+
+def test_a_full_report_and_single_studies_of_times_have_several_processes():
+    full, usual = (plan_report([], METHODS, full=whole, bodies=1).studies for whole in (True, False))
+    assert {each.name for each in full if each.processes == 5} >= {"random", "work_precision", "each_step"}
+    assert {each.processes for each in usual} == {1}
+    assert [plan_study("random", methods=METHODS, quick=quick).processes for quick in (False, True)] == [5, 3]
+    assert plan_study("paper", methods=METHODS).processes == 1
 
 
 def test_methods_that_are_no_candidates_make_no_study():

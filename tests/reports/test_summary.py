@@ -13,7 +13,7 @@ from conservative.reports.rows.points import points
 from conservative.reports.sections import random_bodies, summary
 
 from .rows import frame, point, row
-from .test_random_ratios import ENGINE_ALONE, TWICE
+from .test_random_ratios import ENGINE_ALONE, TWICE, line
 
 SOLUTION = point("lame", "ours", 1e-12, 1e-7)
 OURS = [*point("gauss", "ours", 1e-3, 2e-6), *point("gauss", "ours", 1e-7, 4e-6, 0.01)]
@@ -170,3 +170,10 @@ def test_hidden_lines_are_named():
     one, other = (pd.DataFrame({"x": [1.0, 2.0], "y": [y, 4.0]}) for y in (1e-16, 1.1e-16))
     lines = [("a", one), ("b", one), ("c", other), ("d", one)]  # drawn in this order, the last on top
     assert list(families.under(lines, "x", "y")) == ["Exactly under d: a, b."]
+
+
+def test_a_class_misses_no_body_that_its_adapters_do_not_support():
+    refused = line(3, "scipy", "engine", [(math.nan, math.nan)], outcome="unsupported")
+    found = random(*TWICE, line(0, "scipy", "engine", [(1e-13, 9.0)]), line(3, "gauss", "ours", [(1e-13, 1.0)]), refused)
+    assert cells(found, MethodClass.SOLVER)["where it fails"] == "nowhere here"
+    assert cells(found, MethodClass.SOLVER)["µs at 1e-6 rad"] == "2,000,000 (heyoka)"
