@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..card import Card, Cost, Structure
+from ..card import Card, Structure
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..method import Method, Role, Run
@@ -56,7 +56,6 @@ class Splitting(Method):
         variants=tuple(f"order={order}" for order in (2, 4, 6, 8, 10)),
         report=("",),
         suite=(),
-        cost=lambda method: Cost(step=105.0 * method.stages),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
         time_dependent=True,
@@ -70,11 +69,6 @@ class Splitting(Method):
     def lengths(self) -> Lengths:
         """Rotations and kicks relative to the step."""
         return lengths_of(self.order, self.composition, self.kind == "EXACT")
-
-    @property
-    def stages(self) -> int:
-        """Number of rotations in a step."""
-        return sum(part != 0 for part in self.lengths[0])
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -106,7 +100,6 @@ class NoSquish(Splitting):
     order: int = 2
 
     family: ClassVar[str] = "no_squish"
-    card: ClassVar[Card] = replace(Splitting.card, cost=lambda method: Cost(step=110.0 * method.stages))
     kind: ClassVar[str] = "AXES"
 
 
@@ -128,9 +121,6 @@ class Rattle(Splitting):
     order: int = 2
 
     family: ClassVar[str] = "rattle"
-    card: ClassVar[Card] = replace(
-        Splitting.card, cost=lambda method: Cost(10.0, correction=40.0, corrections=3 * method.stages)
-    )
     kind: ClassVar[str] = "ENDS"
 
 
@@ -149,9 +139,6 @@ class LieVariational(Rattle):
     """
 
     family: ClassVar[str] = "lie_variational"
-    card: ClassVar[Card] = replace(
-        Splitting.card, cost=lambda method: Cost(10.0, correction=50.0, corrections=8 * method.stages)
-    )
     kind: ClassVar[str] = "MIDDLE"
 
 
