@@ -22,6 +22,7 @@ from . import (
     long_runs,
     paper,
     paper_figures,
+    price,
     random,
     selection,
     speed,
@@ -34,7 +35,7 @@ from .study import Finding, Maker, Progress, Study, remember_truths
 
 _IN_ORDER = (
     *(paper, convergence, speed, work_precision, each_step, long_runs, sphere_curves, paper_figures),
-    *(engines_at_one_step, engines_over_steps, stability, hard_cases, random, throughput),
+    *(engines_at_one_step, engines_over_steps, stability, hard_cases, random, price, throughput),
 )
 MAKERS: Mapping[str, Maker] = {study.__name__.rpartition(".")[2]: study.findings for study in _IN_ORDER}
 """Function of each study, by the name of its file."""
@@ -46,6 +47,8 @@ RANDOM = "random"
 """Study of random bodies."""
 THROUGHPUT = "throughput"
 """Study of many random bodies."""
+PRICE = "price"
+"""Study of new processes."""
 MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
 """Studies of the selected scenes and methods in every report."""
 IN_TURN = ("random", "work_precision", "each_step", "throughput")

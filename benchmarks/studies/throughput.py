@@ -211,6 +211,8 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
         done = attempt_many(replace(way, method=case.method), kind.few, case.grid, study.hang_limit, study.skip_missing)
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
+            if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
+                break  # at any tolerance
             continue
         errors = read_errors(done, kind.truth)
         line.append(BatchSetting(way, case, errors, done.spent / n, done.prepare / n))

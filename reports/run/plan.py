@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from conservative.benchmarks.measures.processes import PROCESSES
-from conservative.benchmarks.studies import engine_selection, many_runs, random, selection, studies, throughput
+from conservative.benchmarks.studies import engine_selection, many_runs, price, random, selection, studies, throughput
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
@@ -125,6 +125,8 @@ def plan_report(
         made += studies.cross_studies(studies.ENGINES, chosen, named, quick, skip_missing, time_limit)
     if full and not (names or quick):
         made += studies.list_hard_studies(compared, skip_missing, time_limit)
+    if full and bodies and not quick:
+        made += studies.cross_studies((studies.PRICE,), price.scenes(), compared, skip_missing=skip_missing)
     # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
     if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *named), quick=True))):
         more = {"skip_missing": skip_missing, "time_limit": time_limit, "processes": processes}

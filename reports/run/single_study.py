@@ -12,6 +12,7 @@ from conservative.benchmarks.studies import (
     hard_cases,
     many_runs,
     on_cluster,
+    price,
     random,
     selection,
     stability,
@@ -86,7 +87,11 @@ def plan_study(
     if scenes:
         chosen = selection.scenes(scenes)
     else:
-        usual = {"stability": lambda: selection.scenes(stability.SCENES), "hard_cases": hard_cases.scenes}
+        usual = {
+            "stability": lambda: selection.scenes(stability.SCENES),
+            "hard_cases": hard_cases.scenes,
+            "price": price.scenes,
+        }
         chosen = usual.get(name, selection.scenes)()
     return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit, processes=processes)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import PRICE, RANDOM, THROUGHPUT
 
 from ..document.model import Block, Document, Paragraph, filled
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
-from . import closing, engines, failures, hard_cases, many_bodies, paper, provenance, random_bodies, scenes, verdict
+from . import closing, engines, failures, hard_cases, many_bodies, paper, price, provenance, random_bodies, scenes, verdict
 from .measured import Measured, of_scene
 
 SCHEMA = 2
@@ -30,6 +30,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         blocks.append(engines.section(measured))
     if THROUGHPUT in plan.names:
         blocks.append(many_bodies.section(measured.rows))
+    if PRICE in plan.names:
+        blocks.append(price.section(measured.rows))
     blocks += hard_cases.sections(rows)
     blocks += filled(paper.section(rows, measured.samples), failures.section(rows), provenance.section(source))
     tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]
