@@ -45,6 +45,8 @@ class Measure(Enum):
     AGREEMENT = "truth agreement", "rad"
     LONGEST_STEP = "largest |w| dt that works", "rad"
     FAILING_STEP = "first |w| dt that does not", "rad"
+    TURNS = "turns in the run", "1"
+    GROWTH = "growth exponent", "1"
     TURNS_OVER = "turns over", "1"
     TURNS_OVER_TRUE = "turns over of the exact motion", "1"
     PRECISION = "precision of numbers", "bit"

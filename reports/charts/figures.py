@@ -123,6 +123,20 @@ def drift(drifts: pd.DataFrame, scene: str) -> Any:
     return apply_style(alt.vconcat(*panels))
 
 
+def growth(lines: pd.DataFrame) -> Any:
+    """Return the largest error so far over time; rows of panels are quantities, columns scenes. Columns as in `long_time`."""
+    data = lines.assign(shown=lines["value"].clip(lower=FLOOR))
+    channels = look(families_of(data), "strokeDash", title="method", orient="bottom", columns=4, symbolSize=300)
+    x, y = (alt.X(**log_channel("t", "turns", data["t"])), alt.Y(**log_channel("shown", "largest so far", data["shown"])))
+    panels = [
+        alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=f"{scene}: {quantity}")
+        .mark_line(strokeWidth=1.8, clip=True)
+        .encode(x=x, y=y, **channels)
+        for (scene, quantity), part in data.groupby(["scene", "quantity"], sort=False)
+    ]
+    return apply_style(alt.concat(*panels, columns=3))
+
+
 def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any:
     """Return error against step, from `lines.errors` of a scene and `lines.fit_ends`; the fits are the bold stretches."""
     x = alt.X(**log_channel("dt", "step, s", errors["dt"]))

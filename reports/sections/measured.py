@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.step_ladder import SAMPLES
-from conservative.benchmarks.studies.studies import ENGINES, PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import ENGINES, LONG_TIME, PRICE, RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
 from ..rows import points
@@ -42,7 +42,7 @@ class Measured:
     @cached_property
     def scene_rows(self) -> pd.DataFrame:
         """The rows of the studies that compare methods on scenes."""
-        return self.rows[~self.rows["study"].isin((*ENGINES, RANDOM, THROUGHPUT, PRICE))].reset_index(drop=True)
+        return self.rows[~self.rows["study"].isin((*ENGINES, RANDOM, THROUGHPUT, PRICE, LONG_TIME))].reset_index(drop=True)
 
     @cached_property
     def points(self) -> pd.DataFrame:

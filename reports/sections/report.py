@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
 
 from ..document.model import Block, Document, Paragraph, filled
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
-from . import closing, engines, failures, hard_cases, many_bodies, paper, price, provenance, random_bodies, scenes, verdict
+from . import (
+    closing,
+    engines,
+    failures,
+    hard_cases,
+    long_time,
+    many_bodies,
+    paper,
+    price,
+    provenance,
+    random_bodies,
+    scenes,
+    verdict,
+)
 from .measured import Measured, of_scene
 
 SCHEMA = 2
@@ -30,6 +43,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         blocks.append(engines.section(measured))
     if THROUGHPUT in plan.names:
         blocks.append(many_bodies.section(measured.rows))
+    if LONG_TIME in plan.names:
+        blocks.append(long_time.section(measured.rows, measured.samples))
     if PRICE in plan.names:
         blocks.append(price.section(measured.rows))
     blocks += hard_cases.sections(rows)

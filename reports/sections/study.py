@@ -8,14 +8,14 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
 from ..document.model import Block, Document, Facts, Paragraph, Row, Section, Table, filled
 from ..rows.names import with_names
 from ..run.measure import Measurements
-from . import many_bodies, price, random_bodies
+from . import long_time, many_bodies, price, random_bodies
 from .report import records
 
 
@@ -42,6 +42,8 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     elif name == THROUGHPUT:
         shown = [block for block in many_bodies.section(named).blocks if isinstance(block, Table | Section)]
         terms = many_bodies.TERMS
+    elif name == LONG_TIME:
+        shown, terms = [long_time.as_table(named)], long_time.TERMS
     elif name == PRICE:
         shown, terms = [price.as_table(named)], price.TERMS
     else:

@@ -155,7 +155,7 @@ def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
 
 
 def test_every_study_is_timed_or_is_not():
-    timed = {"speed", "work_precision", "each_step", *studies.ENGINES, "random", "throughput", "price"}
+    timed = {"speed", "work_precision", "each_step", *studies.ENGINES, "random", "throughput", "price", "long_time"}
     assert set(on_cluster.UNTIMED) | timed == set(studies.MAKERS)
     assert not set(on_cluster.UNTIMED) & timed
 

@@ -1,0 +1,134 @@
+"""The study of growth: how energy, momentum and attitude error grow over up to a million turns.
+
+The first setting of each family runs at the scene's step over `TURNS` turns, each run a hundred times as long as the one
+before. A run takes at most `LONGEST` s, and less if the study would take more than `TOTAL` s; the last one is then shorter, so
+compiled methods reach a million turns and others fewer.
+
+An error is the largest so far: of the relative drift of an invariant, or of the attitude in rad if the motion has a closed
+form, which is accurate at any time. The growth p of an error ~ t^p is a fit over the last two decades of time before it is
+`LOST`: half is a random walk of round-off, 1 linear, 2 quadratic. Times of the lines are in turns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from conservative.attitude import Array, angle_between
+from conservative.grid import Grid
+from conservative.invariants import sizes
+from conservative.method import Method
+from conservative.outcome import Outcome
+from conservative.references.exact.method import Exact
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..measures.measure import Measure, Value
+from .case import Case
+from .study import Finding, Progress, Study
+
+TURNS = (1e2, 1e4, 1e6)
+"""Lengths of the runs, turns at the initial rate."""
+SAMPLES = 200
+"""Samples of a run; `PER_DECADE` of them in each decade of time are in the lines."""
+PER_DECADE = 8
+LONGEST, TOTAL = 30.0, 200.0
+"""Time budgets, s, of a run and of the study."""
+LOST = 0.5
+"""Attitude error, rad, from which it grows no further."""
+ATTITUDE = "attitude"
+"""Quantity of the attitude error, in addition to the invariants."""
+KINDS = {0.25: "bounded", 0.75: "random walk", 1.5: "linear", math.inf: "quadratic or faster"}
+"""Name of a growth, by the largest exponent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """Largest errors so far (n,) at times (n,), s, in the order of time, and the exponent of their growth; NaN if unknown."""
+
+    t: Array
+    error: Array
+
+    @property
+    def exponent(self) -> float:
+        """Slope of log(error) over log(t) over the last two decades before the error is `LOST`."""
+        t, error = (values[(self.error > 0) & (self.error < LOST)] for values in (self.t, self.error))
+        if len(t) < PER_DECADE:
+            return math.nan
+        last = t >= t[-1] / 100
+        return float(np.polyfit(np.log(t[last]), np.log(error[last]), 1)[0])
+
+
+def families(study: Study) -> tuple[Method, ...]:
+    """Return the first setting of each family."""
+    return tuple({method.family: method for method in reversed(study.competitors)}.values())[::-1]
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Finding]:
+    """Yield final errors and growth of every family on each scene, the turns that it reached, and lines over time."""
+    methods = families(study)
+    tell = study.count(progress, len(methods))
+    total = TOTAL / 10 if study.quick else TOTAL
+    budget = study.time_limit or min(LONGEST, total / len(methods) / len(study.scenes))
+    for scene in study.scenes:
+        for method in methods:
+            tell(f"{scene.name}: {method.name}")
+            yield from measure_growth(study, scene, method, budget)
+
+
+def measure_growth(study: Study, scene: Scene, method: Method, budget: float) -> Iterator[Finding]:
+    """Yield the rows and lines of a method on a scene, whose runs take at most `budget` s."""
+    turn = 2 * math.pi / float(np.linalg.norm(scene.w_WB_B0))
+    case = Case(study.name, scene, method, Grid(scene.dt, 8))
+    study.attempt(case)  # may compile
+    trajectories: list[Trajectory] = []
+    affordable = TURNS[-1]
+    for turns in TURNS:
+        case = replace(case, grid=grid_of(scene, turn * min(turns, affordable)))
+        done = study.attempt(case)
+        if isinstance(done, Outcome):
+            yield case.row(Value(Measure.TURNS, math.nan), done)
+            break
+        trajectories.append(done.trajectory)
+        # Rounded to half decades, so that methods share exact solutions.
+        affordable = 10 ** (math.floor(2 * math.log10(turns * budget / max(done.cost.first_call, 1e-9))) / 2)
+        if affordable <= turns:
+            break
+    if not trajectories:
+        return
+    yield case.row(Value(Measure.TURNS, float(trajectories[-1].t[-1]) / turn))
+    for quantity, growth in errors(study, trajectories).items():
+        kind = next((name for limit, name in KINDS.items() if growth.exponent <= limit), "")
+        measure = Measure.ATTITUDE_MAX if quantity == ATTITUDE else Measure.DRIFT_MAX
+        yield case.row(Value(measure, float(growth.error[-1]), quantity * (quantity != ATTITUDE)))
+        yield case.row(Value(Measure.GROWTH, growth.exponent, quantity), detail=kind)
+        yield case.samples(quantity, growth.t / turn, growth.error)
+
+
+def errors(study: Study, trajectories: list[Trajectory]) -> dict[str, Growth]:
+    """Return the growth of each error from runs of the same motion, short to long, at times with equal ratios."""
+    scene, found = trajectories[0].scene, dict[str, tuple[list[Array], list[Array]]]()
+    for number, trajectory in enumerate(trajectories):
+        values = {invariant.name: sizes(trajectory.drift(invariant)) for invariant in scene.invariants}
+        if Exact().unsupported(scene) is None:
+            grid = grid_of(scene, float(trajectory.t[-1]))
+            values[ATTITUDE] = angle_between(study.truth(scene, grid).trajectory.R_WB, trajectory.R_WB)
+        after = float(trajectories[number - 1].t[-1]) if number else 0.0
+        apart = np.floor(np.log10(trajectory.t[1:]) * PER_DECADE)
+        chosen = 1 + np.flatnonzero(np.diff(apart, append=np.inf))  # the last sample of each part of a decade
+        chosen = chosen[trajectory.t[chosen] > after]
+        for quantity, value in values.items():
+            t, error = found.setdefault(quantity, ([], []))
+            t.append(trajectory.t[chosen])
+            error.append(np.maximum.accumulate(value)[chosen])
+    joined = {quantity: [np.concatenate(part) for part in parts] for quantity, parts in found.items()}
+    return {quantity: Growth(t, np.maximum.accumulate(error)) for quantity, (t, error) in joined.items()}
+
+
+def grid_of(scene: Scene, duration: float) -> Grid:
+    """Return the grid of a run at the scene's step of about this duration, s."""
+    every = max(1, round(duration / scene.dt / SAMPLES))
+    return Grid(scene.dt, every * SAMPLES, every)
