@@ -1,6 +1,6 @@
 """The study of growth: how energy, momentum and attitude error grow over up to a million turns.
 
-The first setting of each family runs at the scene's step over `TURNS` turns, each run a hundred times as long as the one
+The default setting of each family runs at the scene's step over `TURNS` turns, each run a hundred times as long as the one
 before. A run takes at most `LONGEST` s, and less if the study would take more than `TOTAL` s; the last one is then shorter, so
 compiled methods reach a million turns and others fewer.
 
@@ -63,8 +63,9 @@ class Growth:
 
 
 def families(study: Study) -> tuple[Method, ...]:
-    """Return the first setting of each family."""
-    return tuple({method.family: method for method in reversed(study.competitors)}.values())[::-1]
+    """Return the default setting of each family, or the first one if the study does not have the default."""
+    ordered = sorted(study.competitors, key=lambda method: method.name != method.family)
+    return tuple({method.family: method for method in reversed(ordered)}.values())[::-1]
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:

@@ -31,7 +31,7 @@ def test_the_exponent_of_a_power(power, kind):
 
 @pytest.fixture(scope="module")
 def findings():
-    methods = (cv.MoserVeselov(2), cv.MoserVeselov(), cv.Convected())
+    methods = (cv.MoserVeselov(2), cv.MoserVeselov(4), cv.Convected(tol=1e-6), cv.Convected())
     return list(studies.findings(Study("long_time", (BRICK,), methods, quick=True, time_limit=0.2)))
 
 
