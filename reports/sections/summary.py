@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from conservative.benchmarks.contest import cheapest, costs
+from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH, factor, number, tolerance
+from ..document.cells import DASH, factor, number, ratio_text, tolerance
 from ..document.model import Cell, Row, Style, Table
 from ..rows.names import OF_ENGINES, MethodClass, of_classes, without_outcome
 from ..rows.points import first_names, picture
@@ -174,19 +174,25 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
     if ours and engine:
         first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
         sides = ["our fastest general integrator", "the fastest engine"][:: 1 if first is ours else -1]
-        times = f"{factor(second.time / first.time)} times as fast as {sides[1]}, {second.name}."
+        times = f"{_speedup(first, second)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
     elif there := ours or engine:
         parts.append(f"Only {there.name} reaches {goal}.")
     else:
         parts.append(f"No measured method reaches {goal}.")
     if solution and engine:
-        ratio, only = engine.time / solution.time, ", which solves integrable motions only"
-        if ratio >= 1:
-            parts.append(f"{solution.name}{only}, is {factor(ratio)} times as fast as {engine.name}.")
+        only = ", which solves integrable motions only"
+        if engine.time >= solution.time:
+            parts.append(f"{solution.name}{only}, is {_speedup(solution, engine)} times as fast as {engine.name}.")
         else:
-            parts.append(f"{engine.name} is {factor(1 / ratio)} times as fast as {solution.name}{only}.")
+            parts.append(f"{engine.name} is {_speedup(engine, solution)} times as fast as {solution.name}{only}.")
     return " ".join(parts)
+
+
+def _speedup(fast: Cheapest, slow: Cheapest) -> str:
+    """Return the ratio of two times, with its interval over processes if there is one."""
+    contest = Contest("", MIDDLE, fast, slow)
+    return ratio_text(contest.ratio, contest.interval, 2)
 
 
 def microseconds(time: float) -> str:

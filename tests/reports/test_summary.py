@@ -1,6 +1,7 @@
 """Summaries of a scene and of random bodies: sentence, classes of methods, picture of families."""
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -177,3 +178,12 @@ def test_a_class_misses_no_body_that_its_adapters_do_not_support():
     found = random(*TWICE, line(0, "scipy", "engine", [(1e-13, 9.0)]), line(3, "gauss", "ours", [(1e-13, 1.0)]), refused)
     assert cells(found, MethodClass.SOLVER)["where it fails"] == "nowhere here"
     assert cells(found, MethodClass.SOLVER)["µs at 1e-6 rad"] == "2,000,000 (heyoka)"
+
+
+def test_the_sentence_has_the_interval_over_processes():
+    def times(name, role, *values):
+        error, time = point(name, role, 1e-7, values[0])
+        return [error, *(replace(time, value=value, process=n) for n, value in enumerate(values))]
+
+    sentence = told(times("gauss", "ours", 1.0, 1.1, 1.0), times("scipy", "engine", 2.0, 2.2, 2.2)).sentence
+    assert "reaches 1e-6 rad 2.1 (2.0 to 2.2) times as fast as the fastest engine, scipy." in sentence
