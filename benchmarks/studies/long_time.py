@@ -94,6 +94,8 @@ def measure_growth(study: Study, scene: Scene, method: Method, budget: float) ->
             yield case.row(Value(Measure.TURNS, math.nan), done)
             break
         trajectories.append(done.trajectory)
+        if affordable < turns:
+            break
         # Rounded to half decades, so that methods share exact solutions.
         affordable = 10 ** (math.floor(2 * math.log10(turns * budget / max(done.cost.first_call, 1e-9))) / 2)
         if affordable <= turns:

@@ -9,7 +9,9 @@ import conservative as cv
 from conservative.attitude import angle_between
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, frame, samples_frame
+from conservative.benchmarks.measures.timing import Preparation
 from conservative.benchmarks.studies import long_time, studies
+from conservative.benchmarks.studies.case import Success
 from conservative.benchmarks.studies.long_time import Growth, grid_of
 from conservative.benchmarks.studies.study import Study
 from conservative.reports.rows.names import with_names
@@ -47,6 +49,20 @@ def test_attitude_grows_linearly_and_energy_does_not(findings):
     assert rows["convected", "attitude"].value == pytest.approx(1, abs=0.1)  # measured 1.02
     assert rows["convected", "attitude"].detail == "linear"
     assert rows["moser_veselov:order=2", "energy"].detail in ("bounded", "random walk")
+
+
+def test_the_run_after_a_shortened_one_is_not_made(monkeypatch):
+    lengths = []
+
+    def attempt(study, case):
+        lengths.append(case.grid.n_steps * case.grid.dt / (2 * math.pi / np.linalg.norm(BRICK.w_WB_B0)))
+        return Success(
+            None, cv.MoserVeselov().solve(BRICK, case.grid), Preparation(0.0, 0.02)
+        )  # not proportional to its length
+
+    monkeypatch.setattr(Study, "attempt", attempt)
+    list(long_time.measure_growth(Study("long_time", (BRICK,), (cv.Reduced(),)), BRICK, cv.Reduced(), 0.1))
+    assert lengths[1:] == pytest.approx([100, 316], rel=0.1)  # and the first, which may compile
 
 
 def test_errors_are_the_largest_until_each_time():
