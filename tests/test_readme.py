@@ -72,6 +72,11 @@ def test_the_fastest_setting_at_an_error_is_found_between_its_points():
     assert load("measure").fastest(pd.DataFrame(rows), 1e-10) == (float("inf"), "")
 
 
+def test_the_time_of_several_processes_is_their_geometric_mean():
+    rows = timed("a", 1e-7, 1e-6) + timed("a", 1e-7, 4e-6)[1:]
+    assert load("measure").fastest(pd.DataFrame(rows), 1e-6) == (pytest.approx(2e-6), "a")
+
+
 def study(bodies, processes=5):
     """Return the rows of a study on a spring; each body is a pair of times of both sides, s, or None for a side that misses."""
     rows = []
