@@ -26,7 +26,8 @@ TERMS = (
 
 def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
     """Return the section of a report from named rows and samples of the study (see `names.with_names`)."""
-    lines, figure = samples[samples["study"] == LONG_TIME], None
+    lines = samples.loc[samples["study"] == LONG_TIME, ["scene", "quantity", "family", "name", "t", "value"]]
+    figure = None
     if len(lines):
         title, picture = "Growth of errors over a million turns", figures.growth(lines)
         panels = vega_embed.embed(picture, ("name",), 220)
