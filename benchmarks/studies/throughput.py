@@ -1,7 +1,8 @@
 """The study of throughput: the time per body in batches, for our methods and for engines with batches.
 
-`conservative.benchmarks.studies.ensembles` draws the bodies, which all differ. Each method runs with several step sizes or
-tolerances and in every way it has: many bodies at once, on one thread and on two, and for our methods also one body at a time.
+`conservative.benchmarks.studies.ensembles` draws the bodies: tops and free bodies that all differ, and many starts of one top.
+Each method runs with several step sizes or tolerances and in every way it has: many bodies at once, on one thread and on two,
+and for our methods also one body at a time.
 
 * The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Rows contain the median and the 95th
   percentile over the first `bodies` of a kind. Each body has a reference solution that an independent one confirms

@@ -1,9 +1,10 @@
 """Series steps as long as a tolerance allows, with samples between their ends: the series itself, projected (`taylor`).
 
-The coefficients belong to a guessed length, that of the step before. The last two terms then determine the length of the step
-(A. Jorba and M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005), so
-no step is repeated. Samples and the end of the step are values of the same polynomials, by Horner's scheme, each projected onto
-the invariants, several at once in the lanes of a register. Samples are therefore as accurate as steps, and no step ends at one.
+The coefficients belong to a guessed length. Their last two terms determine the guess for the next step (A. Jorba and M. Zou, A
+software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005). A step whose terms exceed
+the tolerance is computed again, shorter: the first one, and few others. Samples and the end of the step are values of the same
+polynomials, by Horner's scheme, each projected onto the invariants, several samples at once in the lanes of a register. Samples
+are therefore as accurate as steps, and no step ends at one.
 """
 
 from __future__ import annotations

@@ -18,8 +18,9 @@ functions over y = s / (1 + C), with u = 1 + alpha y^2:
     W^2 = u^2 - 4 beta y^2      t = int 2 dy / W      phi = int 2 u dy / (W (l u + A3 W))
     f = k3 l t + (g2 L1^2 - g1 L2^2) phi
 
-The integrands are even and have no singularity where |y| is below about 1/nu. Gauss's quadrature with eight nodes, of which
-four are evaluated, is therefore exact to round-off for nu h < 1/2; longer rotations are made in parts.
+The integrands are even and have no singularity where |y| is below about 1/nu, with nu^2 the larger of alpha and beta.
+Gauss's quadrature with eight nodes, of which four are evaluated, is therefore exact to round-off for nu h < 1/2; longer
+rotations are made in parts.
 
 AXES: rotations about the axes 3, 2, 1, 2, 3, as if the body had no other rate.
 

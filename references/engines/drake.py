@@ -2,8 +2,9 @@
 
 A free body is on Drake's quaternion floating joint. A body about a fixed point is on `BallRpyJoint`, Drake's only ball joint,
 whose coordinates are roll, pitch and yaw: errors grow when the first principal axis comes near the vertical, and a run in which
-it reaches the vertical ends there. Switched off: error control (`set_fixed_step_mode`), unless an accuracy is given or the
-integrator is "default".
+it reaches the vertical ends there. A fixed spring with a rest length is a `LinearSpringDamper`. Other fields, except gravity,
+are a `LeafSystem` in Python, which Drake calls in each evaluation. Switched off: error control (`set_fixed_step_mode`), unless
+an accuracy is given or the integrator is "default".
 
 Parameters
 ----------

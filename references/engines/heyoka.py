@@ -50,7 +50,7 @@ class Heyoka(Method):
     Parameters
     ----------
     tol
-        Relative error of a step, 1e-20 to below 1. Values below 2.2e-16 add a term or two and give round-off.
+        Relative error of a step, 1e-20 to below 1. The order is 20 at 1e-16 and 25 at 1e-20; both give round-off.
     frame
         "body": quaternion and body rates in principal axes, the usual formulation. "non_spinning", for a body symmetric about
         an axis, free or in a field along it: quaternion of the frame that turns at l/J1 and world momentum l; the spin has a

@@ -38,9 +38,10 @@ class SciPy(Method):
     """`scipy.integrate.solve_ivp` with its own step control; dt is only the distance of samples.
 
     The state is the quaternion, scalar first, of principal axes F in the world, and the rates in F. Samples come from the
-    integrator's interpolant, whose error is that of the steps. numba compiles the right-hand side for the fields of this
-    package. Any other potential works as well, through its gradient. What remains is SciPy's own loop in Python; `cyrk` has the
-    same integrator in compiled code.
+    integrator's interpolant. DOP853's is of order 7 and adds to the error of the steps: on 2 s of the brick, the error between
+    steps is 1.6 to 2.4 times that at their ends. numba compiles the right-hand side for the fields of this package. Any other
+    potential works as well, through its gradient. What remains is SciPy's own loop in Python; `cyrk` has the same integrator in
+    compiled code.
 
     Parameters
     ----------
