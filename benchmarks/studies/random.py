@@ -9,8 +9,9 @@ same step sizes for every method with a step and the same tolerances for every a
   double precision reaches 1e-12 on many bodies.
 * The time of a setting is that of the same motion, final state only, repeated within each sample. Only the loop is timed (the
   attribute `own_loop` of a run): on our side one compiled call per motion, for heyoka the reset of its state and
-  `propagate_until`. The conversion of the final state, which is our adapter's, would add 2 µs to our 6 to 24 µs and 6 µs to
-  heyoka's 9 to 90 µs. What remains of a call in Python is 1 to 2 µs on our side and 2 to 3 µs on heyoka's.
+  `propagate_until`. The conversion of the final state, which is our adapter's, would add 2 µs on our side and 6 µs on
+  heyoka's. What remains of a call in Python is 1 to 2 µs on our side and 2 to 4 µs on heyoka's: of motions that take 2 to 14 µs
+  and 8 to 40 µs (five bodies, errors of 1e-2 to 1e-12 rad), so at large errors a third to a half of either.
 * Settings that cannot be the fastest are not timed, to save time: see `worth_timing`.
 
 The reference solution of each body is confirmed by an independent one (`references.truth.confirm`). A body on which they differ
