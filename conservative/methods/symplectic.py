@@ -28,7 +28,8 @@ class Splitting(Method):
 
     A kick changes the momentum by the torque at a fixed attitude, L += b dt T. Between kicks the body rotates freely, without
     truncation error (Celledoni, Fassò, Säfström & Zanna, SIAM J. Sci. Comput. 30, 2008). The momentum about the field's axis
-    and the axial momentum of a top are conserved to round-off. The energy is not, but its error is bounded and does not drift.
+    and the axial momentum of a top are conserved to round-off. The energy is not, but at short steps its
+    error is bounded and does not drift.
 
     Use it where the map has to be symplectic: at the same error it takes three to six times as long as `Projected`, because
     each free rotation costs about 110 ns. Fields may depend on time: the torque is that at the time of the kick.

@@ -1,8 +1,8 @@
 """Splittings into free rotations and kicks: sequences of both that form one symmetric step of higher order.
 
 The kinetic energy is quadratic in the momentum, and a kick depends on the attitude only. Many commutators are therefore zero,
-as for Runge-Kutta-Nyström methods, and sequences that use this need fewer stages than compositions of steps of order 2. They
-require exact free rotations.
+as for Runge-Kutta-Nyström methods, and sequences that use this have much smaller errors than compositions of steps of order
+2. They have more stages, and require exact free rotations.
 """
 
 from __future__ import annotations
