@@ -1,4 +1,4 @@
-"""Explicit steps of order 8, projected onto the invariants: the cheapest method for most bodies in a field."""
+"""Explicit steps of order 8, projected onto the invariants: for a body in any field, also one of Python functions."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     "--bodies",
     type=click.IntRange(0),
     metavar="N",
-    help="Random bodies in each of four fields.  [default: 0; with --full 3]",
+    help="Random bodies in each of five fields.  [default: 0; with --full 3]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random bodies.")
 @click.option(

@@ -46,7 +46,7 @@ SAMPLE_TERMS = (
 """Explanation of samples and their cost."""
 CAVEAT = (
     "MuJoCo and Pinocchio are made for trees of many bodies. Most of the time of Pinocchio's RK4 is our loop in Python around "
-    "it; SciPy's right-hand side is in Python as well. The numbers show the cost of a single rotation and do not rank these "
+    "it, and SciPy's own loop is in Python as well. The numbers show the cost of a single rotation and do not rank these "
     "engines."
 )
 """Limits of the comparison."""
