@@ -5,8 +5,8 @@ same step sizes for every method with a step and the same tolerances for every a
 
 * The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, over 12 rad at the
   initial rate (10 to 20 rad of actual rotation for nine in ten of 120 bodies). Asymmetric bodies in a field amplify errors: an
-  initial relative error of the rates by a factor of 10 at the median, of 19 or more on one body in ten, and of 1,400 at most. Over
-  48 rad the factor is 33 at the median and 1,400 or more on one body in twenty.
+  initial relative error of the rates by a factor of 10 at the median, of 19 or more on one body in ten, and of 1,400 at most.
+  Over 48 rad the factor is 33 at the median and 1,400 or more on one body in twenty.
 * The time of a setting is that of the same motion, final state only, repeated within each sample. Only the loop is timed (the
   attribute `own_loop` of a run): on our side one compiled call per motion, for heyoka the reset of its state and
   `propagate_until`. The conversion of the final state, which is our adapter's, would add 2 µs on our side and 6 µs on
