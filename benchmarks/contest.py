@@ -90,18 +90,13 @@ def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = L
     rows = []
     for key, settings in points.groupby(list(line), sort=False):
         measured = settings["error"].tolist()
-        processes = _by_process(settings["times"] if "times" in settings else [(time,) for time in settings["time"]])
+        given = settings["times" if "times" in settings else "time"]  # a setting that was not timed has NaN in both
+        processes = list(zip_longest(*(each if isinstance(each, tuple) else (each,) for each in given), fillvalue=math.nan))
         for error in errors:
             times = tuple(cost(measured, each, error) for each in processes)
             if known := [math.log(time) for time in times if not math.isnan(time)]:
                 rows.append((*key, error, math.exp(math.fsum(known) / len(known)), times))
     return pd.DataFrame(rows, columns=[*line, "error", "time", "times"])
-
-
-def _by_process(times: Iterable[tuple[float, ...] | float]) -> list[tuple[float, ...]]:
-    """Return the times of settings (a tuple for each, NaN if it was not timed) by process."""
-    rows = [each if isinstance(each, tuple) else (each,) for each in times]
-    return list(zip_longest(*rows, fillvalue=math.nan))
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,11 @@ def judge(baseline: Baseline, results: Results) -> Verdict:
     ]
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results)
-    violations += _runaways(baseline, results)
+    for id, row in results.rows.items():  # energy that ran away although the run ended without an error, whatever the baseline
+        if row.status is Status.PASSED and find_runaway(row.values):
+            before = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
+            values = _write_value(before.value if before else None), _write_value(row.values.get(ENERGY_DRIFT))
+            violations.append(Violation(ENERGY_DRIFT, row.scene or id, row.method or id, *values, f"at most {RUNAWAY:g}"))
     notes += _improvements(baseline, results)
     return Verdict(tuple(violations), tuple(notes), len(baseline.rows))
 
@@ -99,15 +103,6 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Vio
                 side = "at least" if name == ORDER else "at most"
                 limit = f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
                 yield violation(name, f"{allowed.value:.6g}", _write_value(row.values.get(name)), limit)
-
-
-def _runaways(baseline: Baseline, results: Results) -> Iterator[Violation]:
-    """Yield the rows whose energy ran away although the run ended without an error, whatever their baseline is."""
-    for id, row in results.rows.items():
-        if row.status is Status.PASSED and find_runaway(row.values):
-            was = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
-            before, now = _write_value(was.value if was else None), _write_value(row.values.get(ENERGY_DRIFT))
-            yield Violation(ENERGY_DRIFT, row.scene or id, row.method or id, before, now, f"at most {RUNAWAY:g}")
 
 
 def passes(measure: str, value: float, allowed: Allowed) -> bool:

@@ -73,7 +73,11 @@ def pytest_configure(config: pytest.Config) -> None:
         if not any(text.startswith(MAX_TIME) for text in config.invocation_params.args):
             config.option.benchmark_max_time, config.option.benchmark_min_rounds = SHORT, FEW
     if config.getoption("conservative_gate"):
-        _gate(config)
+        if getattr(config.option, "dist", "no") != "no" or hasattr(config, "workerinput"):
+            raise pytest.UsageError("--gate: got -n, under which workers disturb each other's times; allowed with -n0")
+        from .pytest_gate import Gate
+
+        config.pluginmanager.register(Gate(config), "conservative_gate")
 
 
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
@@ -96,14 +100,6 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     if collection_path.name != REAL.name or collection_path.is_symlink() or not ROOM.is_symlink():
         return None
     return True if collection_path.resolve() == REAL else None
-
-
-def _gate(config: pytest.Config) -> None:
-    if getattr(config.option, "dist", "no") != "no" or hasattr(config, "workerinput"):
-        raise pytest.UsageError("--gate: got -n, under which workers disturb each other's times; allowed with -n0")
-    from .pytest_gate import Gate
-
-    config.pluginmanager.register(Gate(config), "conservative_gate")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

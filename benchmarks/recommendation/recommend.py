@@ -208,10 +208,18 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
         refinements[line] = _refine_from_start(conditions, method, step)
     progress(0.9, "timing")
     costs = time_settings(conditions, refinements)
-    advice = tuple(
-        _advise(conditions, line, roles[line], each, costs.get(line, math.nan)) for line, each in refinements.items()
-    )
-    return Recommendation(conditions, advice)
+    advice = []
+    for line, refinement in refinements.items():
+        if isinstance(refinement, Outcome):  # the reason why there are no probes
+            advice.append(Advice(line, roles[line], None, False, math.nan, None, (), refinement.reason))
+            continue
+        probe = refinement.best(conditions.target)
+        reached = probe.expected <= conditions.error
+        order = None if probe.method.order is None else observed_order(*refinement.converging())
+        reason = "" if reached else _explain_shortfall(conditions, refinement, probe)
+        probes, cost = refinement.short + refinement.long, costs.get(line, math.nan)
+        advice.append(Advice(line, roles[line], probe, reached, cost, order, probes, reason))
+    return Recommendation(conditions, tuple(advice))
 
 
 @dataclass(frozen=True)
@@ -356,17 +364,6 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Ou
             runs[line], lengths[line] = run.run, grid.dt * grid.n_steps
     timings = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
     return {line: timing.minimum / lengths[line] if timing.outcome.ok else math.inf for line, timing in timings.items()}
-
-
-def _advise(conditions: Conditions, line: str, role: Role, refinement: Refinement | Outcome, cost: float) -> Advice:
-    """Return the advice on one line of settings; an outcome is the reason why there are no probes."""
-    if isinstance(refinement, Outcome):
-        return Advice(line, role, None, False, math.nan, None, (), refinement.reason)
-    probe = refinement.best(conditions.target)
-    reached = probe.expected <= conditions.error
-    order = None if probe.method.order is None else observed_order(*refinement.converging())
-    reason = "" if reached else _explain_shortfall(conditions, refinement, probe)
-    return Advice(line, role, probe, reached, cost, order, refinement.short + refinement.long, reason)
 
 
 def _explain_shortfall(conditions: Conditions, refinement: Refinement, probe: Probe) -> str:

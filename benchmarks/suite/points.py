@@ -15,7 +15,6 @@ from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.potentials.potential import depends_on_time, energy_at
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
 
 from ..measures import errors
 from ..measures.convergence_order import observed_order
@@ -136,26 +135,18 @@ def points() -> Iterator[Point]:
 def measure(point: Point) -> dict[str, GatedValue]:
     """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
     exact = point.truths(point.scene, point.grid).trajectory
-    runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
-    measured = [_measure_run(point.method.solve(scene, point.grid), exact) for scene in runs]
+    scene, measured = point.scene, []
+    last_digit = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
+    for units in (0, *NUDGES):
+        trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)
+        counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
+        found = errors.measure_errors(trajectory, exact)
+        measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
     values = {}
     for name, value in measured[0].items():
         nudged = [each[name] for each in measured]
         values[name] = GatedValue(value, float(max(nudged) - min(nudged)))
     return values | (fit_order(point) if point.scene.name in PAPER else {})
-
-
-def nudge(scene: Scene, units: int) -> Scene:
-    """Return the scene with a start that differs by `units` units in the last place of its largest rate."""
-    pattern = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
-    return replace(scene, w_WB_B0=scene.w_WB_B0 + units * pattern)
-
-
-def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
-    """Return errors and drifts at their largest, and the method's counters."""
-    counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
-    measured = errors.measure_errors(trajectory, exact)
-    return {value.key: value.value for value in measured if value.measure in LARGEST} | counters
 
 
 def fit_order(point: Point) -> dict[str, GatedValue]:

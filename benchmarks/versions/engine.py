@@ -174,18 +174,15 @@ def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
     reached = [{point.dt for point in each.points if point.reached} for each in observations]
     enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
     steps = set.intersection(*enough) if enough else set()
-    return tuple(_with_orders(each, steps) for each in observations)
-
-
-def _with_orders(seen: Observation, steps: set[float]) -> Observation:
-    if not seen.outcome.ok:
-        return seen
-    if not seen.points:
-        return replace(seen, attitude_order=Order(reason=NO_STEP), rates_order=Order(reason=NO_STEP))
-    points = [point for point in seen.points if point.dt in steps]
-    times = [point.dt for point in points]
-    attitude, rates = [point.attitude for point in points], [point.rates for point in points]
-    return replace(seen, attitude_order=observed_order(times, attitude), rates_order=observed_order(times, rates))
+    fitted = []
+    for seen in observations:
+        points = [point for point in seen.points if point.dt in steps]
+        orders = [Order(reason=NO_STEP)] * 2
+        if seen.points:
+            errors = [point.attitude for point in points], [point.rates for point in points]
+            orders = [observed_order([point.dt for point in points], each) for each in errors]
+        fitted.append(replace(seen, attitude_order=orders[0], rates_order=orders[1]) if seen.outcome.ok else seen)
+    return tuple(fitted)
 
 
 StepTimes = tuple[float, ...]

@@ -242,18 +242,15 @@ def judge(comparison: ProjectComparison) -> Verdict:
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
     verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
-    slower = [each for line in comparison.lines for each in _time_violations(line)]
+    slower = []
+    for line in comparison.lines:
+        if (time := line.times) and time.failed:
+            last = time.again or time.first
+            longer = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
+            most = f"at most {1 + SLOWER:g} times as long"
+            slower.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
     notes = (*(note for step in steps for note in _notes(*step)), *_packages(base, head))
     return Verdict((*verdict.violations, *slower), notes, len(comparison.lines))
-
-
-def _time_violations(line: ProjectLine) -> Iterator[Violation]:
-    time = line.times
-    if time is None or not time.failed:
-        return
-    last = time.again or time.first
-    now = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
-    yield Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", now, f"at most {1 + SLOWER:g} times as long")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:

@@ -10,17 +10,7 @@ import pandas as pd
 
 from ..document.cells import tolerance
 from ..rows.names import MethodClass
-from .style import (
-    HEIGHT,
-    PALETTE,
-    SHAPES,
-    WIDTH,
-    apply_style,
-    colours,
-    families_of,
-    look,
-    power_axis,
-)
+from .style import HEIGHT, PALETTE, SHAPES, WIDTH, apply_style, colours, families_of, look, power_axis
 
 FLOOR = 1e-17
 """Replaces an error of zero on a logarithmic axis; below any round-off of a relative error in double precision."""

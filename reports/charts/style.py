@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import altair as alt
@@ -120,15 +120,13 @@ def power_axis(title: str, low: float, high: float) -> alt.Axis:
     first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
-    few, many = (_between(low, high, mantissas) for mantissas in ((1, 2, 5), range(1, 10)))
+    within = range(math.floor(math.log10(low)), last + 1)
+    few, many = (
+        [m * 10.0**k for k in within for m in mantissas if low <= m * 10.0**k <= high]
+        for mantissas in ((1, 2, 5), range(1, 10))
+    )
     values = powers if len(powers) > 2 else few if len(few) > 1 else many
     return alt.Axis(title=title, labelExpr=_POWER, values=values if len(values) > 1 else alt.Undefined)
-
-
-def _between(low: float, high: float, mantissas: Iterable[int]) -> list[float]:
-    """Return the numbers of these mantissas that are not below the one nor above the other, in their order."""
-    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
-    return sorted(m * 10.0**k for k in powers for m in mantissas if low <= m * 10.0**k <= high)
 
 
 def apply_style(chart: Any) -> Any:

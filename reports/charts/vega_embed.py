@@ -132,15 +132,8 @@ def _prepare(unit: Spec, tooltip: Sequence[Shown]) -> None:
     if series := encoding.get("color", {}).get("field"):
         unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum[{json.dumps(series)}]) < 0"}, *unit.get("transform", ())]
         unit["mark"] = unit["mark"] | {"tooltip": True}
-        encoding["tooltip"] = [_channel(*part) for part in tooltip]
-
-
-def _channel(field: str, kind: str, title: str) -> Spec:
-    return {"field": field, "type": "quantitative", "format": ".6g", "title": title} if kind == "Q" else _text(field, title)
-
-
-def _text(field: str, title: str) -> Spec:
-    return {"field": field, "type": "nominal", "title": title}
+        kinds = {"Q": {"type": "quantitative", "format": ".6g"}, "N": {"type": "nominal"}}
+        encoding["tooltip"] = [{"field": field, **kinds[kind], "title": title} for field, kind, title in tooltip]
 
 
 def _fields(spec: Any) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -48,20 +49,15 @@ def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
 
 def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the quantities that can be spread for the scene on the line, with an equals sign."""
-    before, last = _last(incomplete)
-    names = [*SPREADS, *(f"potential.{name}" for name in _parameters(ctx.params.get("scene") or "".join(ctx.args[:1])))]
-    return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]
-
-
-def _parameters(scene: str) -> list[str]:
-    """Return the numbers of a scene's potential that can be spread; none if the scene is invalid."""
     from conservative import registry
     from conservative.integration.spread import list_parameters
 
-    try:
-        return list_parameters(registry.scene(scene))
-    except Exception:  # an error cannot be shown during completion
-        return []
+    before, last = _last(incomplete)
+    names = list(SPREADS)
+    with suppress(Exception):  # the scene is invalid, and an error cannot be shown during completion
+        scene = registry.scene(ctx.params.get("scene") or "".join(ctx.args[:1]))
+        names += [f"potential.{name}" for name in list_parameters(scene)]
+    return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]
 
 
 def _last(incomplete: str) -> tuple[str, str]:

@@ -91,7 +91,18 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
             parameter = next(each for each in context.command.params if each.name == name)
             problem = "cannot be used with --against" if two_versions else "needs --against"
             raise click.UsageError(f"{parameter.get_error_hint(context)} {problem}")
-    show(_compare_and_write(options) if two_versions else _judge(options), as_json, silent=True)
+    if not two_versions:
+        answer = _judge(options)
+    else:
+        # Missing packages and bad paths are reported before any work.
+        require_extra("conservative gate --against", "environments")
+        require_extra("conservative gate --against", "gate", "heyoka")
+        if options["html"]:
+            require_extra("conservative gate --html", "report", "jinja2", "itables")
+        with output_files(None, (), **{name: options[name] for name in FILES}) as write:
+            answer = _compare(options)
+            write(answer)
+    show(answer, as_json, silent=True)
 
 
 def _judge(options: dict[str, Any]) -> Document:
@@ -124,18 +135,6 @@ def _judge(options: dict[str, Any]) -> Document:
     text = f"{path}: {len(new.rows)} rows from {entry['runs']} runs; {changes}"
     data = {"passed": True, "baseline": path, "rows": len(new.rows), "entry": entry}
     return Document("conservative gate", "A new baseline", [Paragraph(text)], data=data)
-
-
-def _compare_and_write(options: dict[str, Any]) -> Document:
-    """Compare two versions and write the requested files. Missing packages and bad paths are reported before any work."""
-    require_extra("conservative gate --against", "environments")
-    require_extra("conservative gate --against", "gate", "heyoka")
-    if options["html"]:
-        require_extra("conservative gate --html", "report", "jinja2", "itables")
-    with output_files(None, (), **{name: options[name] for name in FILES}) as write:
-        answer = _compare(options)
-        write(answer)
-    return answer
 
 
 def _compare(options: dict[str, Any]) -> Document:

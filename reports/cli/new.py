@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
 from functools import reduce
 from typing import Any
 
@@ -24,23 +23,18 @@ from .options import epilog
 def new(as_json: bool) -> None:
     """Print a scene file with every key explained. Commands accept such a file instead of a scene's name."""
     from conservative.scene_files.scene_file import choices, template
+    from conservative.scene_files.toml_reader import key_lines
 
     from ..document import json
 
     text = template()
     if as_json:
-        click.echo(json.render({"keys": list(_keys(text)), "choices": choices(), "text": text}))
+        values, lines, keys = tomllib.loads(text), text.splitlines(), []
+        for key, line in key_lines(text).items():
+            value: Any = reduce(lambda table, name: table[name], key, values)
+            if not isinstance(value, dict):
+                meaning = lines[line - 1].partition("#")[2].strip()  # the comment in its line
+                keys.append({"key": ".".join(key), "value": value, "line": line, "meaning": meaning})
+        click.echo(json.render({"keys": keys, "choices": choices(), "text": text}))
     else:
         click.echo(text, nl=False)
-
-
-def _keys(text: str) -> Iterator[dict[str, Any]]:
-    """Yield every key with a value, in the order of the file; its meaning is the comment in its line."""
-    from conservative.scene_files.toml_reader import key_lines
-
-    values, lines = tomllib.loads(text), text.splitlines()
-    for key, line in key_lines(text).items():
-        value: Any = reduce(lambda table, name: table[name], key, values)
-        if not isinstance(value, dict):
-            meaning = lines[line - 1].partition("#")[2].strip()
-            yield {"key": ".".join(key), "value": value, "line": line, "meaning": meaning}

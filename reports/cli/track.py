@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -22,9 +22,6 @@ from .options import (
     show,
     split_names,
 )
-
-if TYPE_CHECKING:
-    from ..document.model import Document
 
 PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ", "track.json": '{\n  "made": {'}
 """The files of `--out`, and how each is recognized."""
@@ -65,23 +62,6 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
-    scenes, settings = (split_names(name, options.pop(name)) for name in ("scenes", "settings"))
-    with output_files(options["out"], PAGE, junit=options["junit"], markdown=options["markdown"]) as write:
-        answer = _answer(engine, versions, scenes, settings, options)
-        write(answer)
-    show(answer, as_json, silent=True)
-
-
-def _answer(
-    engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]
-) -> Document:
-    """Install the versions that are missing, and compare all of them.
-
-    Raises
-    ------
-    BadInput
-        The engine, a version, a scene, a setting or the build cannot be used, or there are fewer than two versions.
-    """
     from conservative.benchmarks.versions.engine import compare_engine, plan_versions, require_several
     from conservative.benchmarks.versions.version import Version
     from conservative.references.environments.install import install_build, install_releases, newest_releases
@@ -94,16 +74,20 @@ def _answer(
     def tell(what: str) -> None:
         click.echo(what, err=True)
 
-    made = provenance().facts
-    source, against = Source(options["find_links"], options["allow_build"]), options["against"]
-    last = options["last"] or (1 if against is not None and not versions else 0)
-    newest = newest_releases(engine, last, source) if last else ()
-    wanted = [*versions, *(version for version in newest if version not in versions)]
-    require_several([*wanted, *([str(against)] if against is not None else [])])
-    environments = install_releases(engine, wanted, source, tell)
-    if against is not None:
-        tell(f"installing {against}")
-        environments += (install_build(engine, against, source).environment,)
-    sides = plan_versions([Version(each.version, "", each) for each in environments], settings, scenes)
-    with progress() as step:
-        return build(compare_engine(sides, step), against is not None, made)
+    scenes, settings = (split_names(name, options[name]) for name in ("scenes", "settings"))
+    with output_files(options["out"], PAGE, junit=options["junit"], markdown=options["markdown"]) as write:
+        made = provenance().facts
+        source, against = Source(options["find_links"], options["allow_build"]), options["against"]
+        last = options["last"] or (1 if against is not None and not versions else 0)
+        newest = newest_releases(engine, last, source) if last else ()
+        wanted = [*versions, *(version for version in newest if version not in versions)]
+        require_several([*wanted, *([str(against)] if against is not None else [])])
+        environments = install_releases(engine, wanted, source, tell)
+        if against is not None:
+            tell(f"installing {against}")
+            environments += (install_build(engine, against, source).environment,)
+        sides = plan_versions([Version(each.version, "", each) for each in environments], settings, scenes)
+        with progress() as step:
+            answer = build(compare_engine(sides, step), against is not None, made)
+        write(answer)
+    show(answer, as_json, silent=True)

@@ -33,12 +33,11 @@ def contrast(one: str, other: str) -> float:
 
 def _readable(colour: str, paper: str) -> str:
     towards = 255.0 if _luminance(paper) < 0.18 else 0.0
-    mixed = (_mix(colour, towards, share / 50) for share in range(51))
-    return next(each for each in mixed if contrast(each, paper) >= LEAST)
-
-
-def _mix(colour: str, towards: float, share: float) -> str:
-    return "#" + "".join(f"{round(channel + (towards - channel) * share):02X}" for channel in _channels(colour))
+    for share in (k / 50 for k in range(51)):
+        mixed = "#" + "".join(f"{round(channel + (towards - channel) * share):02X}" for channel in _channels(colour))
+        if contrast(mixed, paper) >= LEAST:
+            break
+    return mixed
 
 
 def _channels(colour: str) -> list[int]:

@@ -13,11 +13,11 @@ import math
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from . import contrast
 from .model import Cell, Document, Section, Style, Table, walk
 
 WIDEST = 1.35
@@ -34,7 +34,12 @@ def render(document: Document) -> str:
     linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
     if charts := {figure.name: list(figure.panels) for figure in document.figures if figure.panels}:
-        scripts |= {"charts": pack(json.dumps(_with_colours(charts), separators=(",", ":"))), "vega": _vega()}
+        # With replacements for the colours that have too little contrast on a light or dark page.
+        colours = contrast.colours_in(json.dumps(charts))
+        papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
+        instead = {name: contrast.stand_ins(colours, paper) for name, paper in papers.items()}
+        packed = pack(json.dumps({"figures": charts, "colours": instead}, separators=(",", ":")))
+        scripts |= {"charts": packed, "vega": _vega()}
     if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
         scripts["datatables"] = _datatables()
     template = environment.get_template("page.html.j2")
@@ -58,15 +63,6 @@ def _datatables() -> str:
     import itables.options
 
     return pack(Path(itables.options.dt_bundle).read_text(encoding="utf-8"))
-
-
-def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
-    """Return charts with replacements for the colours that have too little contrast on a light or dark page."""
-    from . import contrast
-
-    colours = contrast.colours_in(json.dumps(charts))
-    papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
-    return {"figures": charts, "colours": {name: contrast.stand_ins(colours, paper) for name, paper in papers.items()}}
 
 
 def _whole(text: str) -> Markup:

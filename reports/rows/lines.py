@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from conservative.attitude import Array
-from conservative.benchmarks.measures.convergence_order import Order, observed_order
+from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import long_runs, sphere_curves
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
@@ -96,8 +95,19 @@ def fits(errors: pd.DataFrame) -> pd.DataFrame:
     error_fine (of the fit at its ends), text (slope and its standard error), reason (why there is no fit); NaN without a fit.
     """
     keys = list(ERROR_COLUMNS[:4])
-    groups = errors.groupby(keys, sort=False)
-    return pd.DataFrame([dict(zip(keys, key, strict=True)) | _fit(line) for key, line in groups], columns=[*keys, *_FIT])
+    rows = []
+    for key, line in errors.groupby(keys, sort=False):
+        steps, values = line["dt"].to_numpy(), line["error"].to_numpy()
+        order = observed_order(steps, values)
+        used, ends = list(order.used), [math.nan] * 4
+        if used:
+            x, y = np.log(steps[used]), np.log(values[used])
+            fitted = y.mean() + order.slope * (x[[0, -1]] - x.mean())
+            ends = np.exp([*x[[0, -1]], *fitted]).tolist()
+        text = "no order" if order.reason else f"{order.slope:.2f} ± {order.stderr:.2f}"
+        rows.append((*key, order.slope, order.stderr, order.floor, len(used), text, order.reason, *ends))
+    columns = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")
+    return pd.DataFrame(rows, columns=[*keys, *columns])
 
 
 def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
@@ -110,21 +120,3 @@ def fit_ends(fits: pd.DataFrame) -> pd.DataFrame:
     """Return the two ends of each fitted line as points: columns name, dt (s), error (rad)."""
     ends = [fits.rename(columns={end: "dt", f"error_{end}": "error"})[["name", "dt", "error"]] for end in ("coarse", "fine")]
     return pd.concat(ends, ignore_index=True).dropna()
-
-
-_FIT = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")
-
-
-def _fit(line: pd.DataFrame) -> dict[str, object]:
-    steps, values = line["dt"].to_numpy(), line["error"].to_numpy()
-    order = observed_order(steps, values)
-    used = list(order.used)
-    ends = _ends(order, np.log(steps[used]), np.log(values[used])) if used else (math.nan,) * 4
-    text = "no order" if order.reason else f"{order.slope:.2f} ± {order.stderr:.2f}"
-    return dict(zip(_FIT, (order.slope, order.stderr, order.floor, len(used), text, order.reason, *ends), strict=True))
-
-
-def _ends(order: Order, x: Array, y: Array) -> tuple[float, float, float, float]:
-    """Return the coarse and the fine step of the fit, and the fitted errors there."""
-    heights = y.mean() + order.slope * (x[[0, -1]] - x.mean())
-    return float(np.exp(x[0])), float(np.exp(x[-1])), float(np.exp(heights[0])), float(np.exp(heights[1]))

@@ -87,11 +87,6 @@ def of_classes(points: pd.DataFrame, *kinds: MethodClass) -> pd.DataFrame:
     return points[points["class"].isin(kinds)]
 
 
-def without_solutions(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points without our closed forms."""
-    return points[points["class"] != MethodClass.SOLUTION]
-
-
 @lru_cache(maxsize=1024)
 def _load(method: str) -> Method | None:
     try:

@@ -51,10 +51,17 @@ def points(
     rows = rows[rows["role"] != Role.TRUTH.value]
     errors, timed = (rows[rows["measure"] == measure.text] for measure in (Measure.ATTITUDE_MAX, time))
     wide = errors[[*_KEYS, "value"]].rename(columns={"value": "error"}).merge(pooled(timed, _KEYS), how="left", on=_KEYS)
-    wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
+    # The largest angle between two reference solutions, rad, of scenes without an exact one (see `Truth`).
+    agreement = table[(table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)]
+    resolution = agreement.groupby("scene")["value"].max()
+    wide["error"] = wide["error"].clip(lower=wide["scene"].map(resolution).fillna(0.0))
     wide = wide.dropna(subset=["error"] if untimed else ["error", "time"]).reset_index(drop=True)
     kinds = [class_of(role, method).value for role, method in zip(wide["role"], wide["method"], strict=True)]
-    return _name_lines(wide.assign(**{"class": pd.Series(kinds, index=wide.index, dtype="string")}))
+    # Under the name and the setting of its line; a line of several methods differs in tolerance.
+    alone = wide.groupby("series")["method"].transform("nunique") == 1
+    name, setting = wide["name"].where(alone, wide["line"]), wide["setting"].where(alone, wide["series_setting"])
+    wide = wide.assign(name=name, setting=setting, **{"class": pd.Series(kinds, index=wide.index, dtype="string")})
+    return wide.drop(columns=["line", "series_setting"])
 
 
 def pooled(timed: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
@@ -70,19 +77,6 @@ def all_points(table: pd.DataFrame) -> pd.DataFrame:
     known = set(zip(ours["scene"], ours["name"], strict=True))
     new = [key not in known for key in zip(engines["scene"], engines["name"], strict=True)]
     return pd.concat([ours, engines[new]], ignore_index=True) if any(new) else ours
-
-
-def truth_resolution(table: pd.DataFrame) -> dict[str, float]:
-    """Return the largest angle between two reference solutions, rad, for scenes without an exact one (see `Truth`)."""
-    rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)]
-    return {str(scene): float(value) for scene, value in rows.groupby("scene")["value"].max().items()}
-
-
-def _name_lines(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return points under the name and the setting of their line; a line of several methods differs in tolerance."""
-    alone = rows.groupby("series")["method"].transform("nunique") == 1
-    name, setting = rows["name"].where(alone, rows["line"]), rows["setting"].where(alone, rows["series_setting"])
-    return rows.assign(name=name, setting=setting).drop(columns=["line", "series_setting"])
 
 
 def front(points: pd.DataFrame) -> pd.DataFrame:
@@ -102,7 +96,10 @@ SAME = 0.01
 def picture(points: pd.DataFrame) -> pd.DataFrame:
     """Return the picture of the points of one scene: of each family the front, and all single settings."""
     named = points.assign(
-        name=[_family_name(*row) for row in zip(points["family"], points["version"], points["class"], strict=True)],
+        name=[
+            display_name(family, version, "") + ", integrable motions only" * (kind == MethodClass.SOLUTION)
+            for family, version, kind in zip(points["family"], points["version"], points["class"], strict=True)
+        ],
         line=points["name"],
         setting=points["method"],
         within="",
@@ -115,11 +112,6 @@ def joined(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Return parts of a picture as one, with the columns of a picture."""
     filled = [part.reindex(columns=list(COLUMNS)) for part in parts if len(part)]
     return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COLUMNS))
-
-
-def _family_name(family: str, version: str, kind: str) -> str:
-    name = display_name(family, version, "")
-    return f"{name}, integrable motions only" if kind == MethodClass.SOLUTION else name
 
 
 def first_names(picture: pd.DataFrame) -> tuple[str, ...]:
@@ -141,11 +133,11 @@ def under(lines: Iterable[tuple[str, pd.DataFrame]], x: str, y: str) -> Iterator
     left = dict(lines)
     while left:
         name, line = left.popitem()
-        hidden = [other for other, points in left.items() if _same(points, line, x, y)]
+        hidden = [
+            other
+            for other, points in left.items()
+            if len(points) == len(line) and all(np.allclose(points[c], line[c], rtol=SAME, atol=0) for c in (x, y))
+        ]
         if hidden:
             yield f"Exactly under {name}: {', '.join(hidden)}."
         left = {other: points for other, points in left.items() if other not in hidden}
-
-
-def _same(one: pd.DataFrame, other: pd.DataFrame, x: str, y: str) -> bool:
-    return len(one) == len(other) and all(np.allclose(one[c], other[c], rtol=SAME, atol=0) for c in (x, y))

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
-from typing import IO, Any
+from typing import Any
 
 from conservative import registry
 from conservative.attitude import angle_between, orthonormality
@@ -17,7 +17,7 @@ from conservative.errors import BadInput
 from conservative.files import text_file
 from conservative.grid import Grid, grid_for
 from conservative.integration.one import default_method, integrate, require_support
-from conservative.invariants import Invariant, sizes
+from conservative.invariants import sizes
 from conservative.method import Method
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
@@ -40,7 +40,7 @@ FIRST_STEPS = 10
 def run_once(
     scene_name: str, method_name: str | None, dt: float | None, t_end: float | None, samples: Path | None
 ) -> dict[str, Any]:
-    """Integrate and return the summary; samples go to the file `samples` if there is one.
+    """Integrate and return the summary; samples go to the file `samples` if there is one, one line each, with every digit.
 
     Raises
     ------
@@ -55,7 +55,9 @@ def run_once(
     with text_file(samples, "csv") if samples else nullcontext() as stream:
         trajectory = _integrate(scene, method, grid)
         if stream is not None:
-            write_samples(trajectory, stream)
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            writer.writerows(samples_of(trajectory).tolist())
     return summarize(trajectory, method, grid.dt)
 
 
@@ -123,31 +125,15 @@ def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, An
         "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,
         "outcome": trajectory.outcome,
         "counters": asdict(trajectory.counters),
-        "drift": {invariant.name: _drift(trajectory, invariant) for invariant in scene.invariants},
+        "drift": {each.name: float(sizes(trajectory.drift(each)).max(initial=0.0)) for each in scene.invariants},
         "orthonormality": float(orthonormality(trajectory.R_WB).max(initial=0.0)),
-        "last": _last(trajectory),
+        "last": {
+            "t": float(trajectory.t[-1]),
+            "R_WB": trajectory.R_WB[-1].tolist(),
+            "w_WB_B": trajectory.w_WB_B[-1].tolist(),
+            "energy": float(trajectory.energy[-1]),
+            "momentum_W": trajectory.momentum_W[-1].tolist(),
+        }
+        if len(trajectory)
+        else None,
     }
-
-
-def _drift(trajectory: Trajectory, invariant: Invariant) -> float:
-    """Return the largest change of an invariant, relative to its scale."""
-    return float(sizes(trajectory.drift(invariant)).max(initial=0.0))
-
-
-def _last(trajectory: Trajectory) -> dict[str, Any] | None:
-    if not len(trajectory):
-        return None
-    return {
-        "t": float(trajectory.t[-1]),
-        "R_WB": trajectory.R_WB[-1].tolist(),
-        "w_WB_B": trajectory.w_WB_B[-1].tolist(),
-        "energy": float(trajectory.energy[-1]),
-        "momentum_W": trajectory.momentum_W[-1].tolist(),
-    }
-
-
-def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
-    """Write one line a sample, with every digit, under `COLUMNS` (SI units; R_WB by rows)."""
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(samples_of(trajectory).tolist())

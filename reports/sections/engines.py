@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -17,7 +17,6 @@ from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.studies import ENGINES
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.scene import Scene
 
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
@@ -122,24 +121,20 @@ def section(measured: Measured) -> Section:
     columns = Items([Item(meaning, name) for name, meaning in COLUMNS])
     blocks: list[Block] = [Paragraph(words)]
     for scene in measured.plan.scenes:
-        blocks += _scene_sections(engine_rows(table, scene.name, points), of_scene(points, scene.name), scene)
+        rows, name, dt = engine_rows(table, scene.name, points), scene.name, f"{scene.dt:g}"
+        if count := len({row.engine for row in rows if row.outcome.ok}):
+            about = (
+                f"{count} engines support this scene. {scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
+                f"relative: ✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more."
+            )
+            blocks.append(Section(f"{name}: as installed, and at its best", [Paragraph(about), side_by_side(rows, name)]))
+            drawn = picture_points(rows, of_scene(points, name))
+            none = Paragraph("No run was close enough to the motion to be timed.")
+            blocks.append(Section(f"{name}: work against precision", [figure(drawn, name) if len(drawn) else none]))
+        blocks.append(Section(f"{name}: every setting", [every_setting(rows, dt, name)]))
     blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
     return Section("Engines", blocks, "engines")
-
-
-def _scene_sections(rows: Sequence[EngineRow], points: pd.DataFrame, scene: Scene) -> Iterator[Section]:
-    name, dt = scene.name, f"{scene.dt:g}"
-    if count := len({row.engine for row in rows if row.outcome.ok}):
-        words = (
-            f"{count} engines support this scene. {scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
-            f"relative: ✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more."
-        )
-        yield Section(f"{name}: as installed, and at its best", [Paragraph(words), side_by_side(rows, name)])
-        drawn = picture_points(rows, points)
-        none = Paragraph("No run was close enough to the motion to be timed.")
-        yield Section(f"{name}: work against precision", [figure(drawn, name) if len(drawn) else none])
-    yield Section(f"{name}: every setting", [every_setting(rows, dt, name)])
 
 
 def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFrame:
@@ -188,7 +183,12 @@ def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[E
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}
     timed = {str(name): rows for name, rows in points[points["scene"] == scene].groupby("series", sort=False)}
     measured = [_engine_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
-    return sorted(_mark_best(measured), key=lambda row: (math.isnan(row.error), not row.outcome.ok, row.error, row.label))
+    best: dict[str, EngineRow] = {}  # of each engine: the smallest error, then the shortest time
+    known = (row for row in measured if not math.isnan(row.error))
+    for row in sorted(known, key=lambda row: (row.error, math.isnan(row.second_time), row.second_time)):
+        best.setdefault(row.engine, row)
+    marked = [replace(row, best=best.get(row.engine) is row) for row in measured]
+    return sorted(marked, key=lambda row: (math.isnan(row.error), not row.outcome.ok, row.error, row.label))
 
 
 def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[str, pd.DataFrame]) -> EngineRow:
@@ -260,18 +260,6 @@ def _order(line: pd.DataFrame, expected: float) -> Cell:
     text = f"{order:.2f} ± {_value(line, Measure.ORDER_STDERR):.2f} ({expected:.0f})"
     low = order < expected - FAR_FROM_ORDER
     return Cell(f"✗ {text}" if low else text, Grade.BAD if low else None, value=order)
-
-
-def _mark_best(rows: list[EngineRow]) -> list[EngineRow]:
-    """Return rows with the best setting of each engine marked: the smallest error, then the shortest time."""
-
-    def rank(row: EngineRow) -> tuple[float, float]:
-        return row.error, math.inf if math.isnan(row.second_time) else row.second_time
-
-    best: dict[str, EngineRow] = {}
-    for row in sorted((row for row in rows if not math.isnan(row.error)), key=rank):
-        best.setdefault(row.engine, row)
-    return [replace(row, best=best.get(row.engine) is row) for row in rows]
 
 
 def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:

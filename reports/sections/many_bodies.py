@@ -35,8 +35,8 @@ LINE = ["scene", "name", "line", "way", "family", "class"]
 STATISTICS = (MEDIAN, MOST)
 
 
-def section(table: pd.DataFrame) -> Section:
-    """Return the section of a report from named rows of the study (see `names.with_names`)."""
+def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
+    """Return the section of a report from named rows of the study (see `names.with_names`); it has no samples."""
     rows = lines(table)
     reached = body_costs(rows)
     figure = None

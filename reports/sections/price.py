@@ -22,13 +22,8 @@ TERMS = (
 """Explanation of the table."""
 
 
-def section(table: pd.DataFrame) -> Section:
-    """Return the section of a report from named rows of the study (see `names.with_names`)."""
-    return Section("The price of a run", [as_table(table), Paragraph(TERMS, Emphasis.NOTE)], "price")
-
-
-def as_table(table: pd.DataFrame) -> Table:
-    """Return a row for each side and state of its cache."""
+def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
+    """Return the section of a report from named rows of the study: a row for each side and state of its cache."""
     here = table[table["study"] == PRICE]
     names = here["family"].where(here["role"] == "engine", "conservative") + (", " + here["way"]).where(here["way"] != "", "")
     rows: list[Row] = []
@@ -37,12 +32,6 @@ def as_table(table: pd.DataFrame) -> Table:
         worst = members[members["measure"] == Measure.ATTITUDE_FINAL.text]["value"].max()
         medians = [numeric(each.median(), digits=3) if len(each) else DASH for each in values.values()]
         rows.append([str(name), str(len(values[Measure.PRICE_ONCE])), *medians, numeric(worst)])
-    header = [
-        "side",
-        "bodies",
-        "one run, s",
-        f"{RUNS:,} runs, s",
-        "first run of another body, s",
-        "largest error, rad",
-    ]
-    return Table(header, rows, "The price of a run, with imports, search and compilation")
+    header = ["side", "bodies", "one run, s", f"{RUNS:,} runs, s", "first run of another body, s", "largest error, rad"]
+    compared = Table(header, rows, "The price of a run, with imports, search and compilation")
+    return Section("The price of a run", [compared, Paragraph(TERMS, Emphasis.NOTE)], "price")

@@ -160,20 +160,11 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
     """Return the ratios for JSON: mean with its interval, worst and best, NaN if no body has a ratio."""
     return [
         {
-            "field": each.field,
-            "engine": each.engine,
-            "error": each.error,
+            **{name: getattr(each, name) for name in ("field", "engine", "error", "only_ours", "won", "open", "lost")},
             "bodies": len(each.contests),
             "both": len(each.both),
-            "only_ours": each.only_ours,
             "only_engine": each.only_theirs,
-            "won": each.won,
-            "open": each.open,
-            "lost": each.lost,
-            "mean": each.ratio,
-            "worst": each.worst,
-            "best": each.best,
-            "mean_interval": each.interval,
+            **{"mean": each.ratio, "worst": each.worst, "best": each.best, "mean_interval": each.interval},
             "worst_scene": each.both[0].scene if each.both else None,
         }
         for each in ratios

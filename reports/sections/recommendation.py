@@ -27,13 +27,8 @@ def build(recommendation: Recommendation) -> Document:
     title = f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s"
     blocks: list[Block] = [*tables(recommendation), Section("Basis of the numbers", [Items.of(notes(recommendation))])]
     question = Paragraph(f"{title}\n", Emphasis.LEAD)
-    return Document("conservative recommend", title, blocks, brief=[question, *blocks], data=_data(recommendation))
-
-
-def _data(recommendation: Recommendation) -> dict[str, Any]:
-    conditions, truth = recommendation.conditions, recommendation.conditions.reference
-    amplified = conditions.amplification
-    return {
+    truth, amplified = conditions.reference, conditions.amplification
+    data = {
         "scene": conditions.scene.name,
         "error": conditions.error,
         "duration": conditions.duration,
@@ -57,6 +52,7 @@ def _data(recommendation: Recommendation) -> dict[str, Any]:
             "by": amplified.label,
         },
     }
+    return Document("conservative recommend", title, blocks, brief=[question, *blocks], data=data)
 
 
 def _advice(advice: Advice) -> dict[str, Any]:
@@ -113,9 +109,12 @@ def notes(recommendation: Recommendation) -> list[str]:
     advice, conditions = recommendation.advice, recommendation.conditions
     truth, amplified = conditions.reference, conditions.amplification
     after = ", and by any angle after that" if amplified.is_lost else ""
+    kinds = {"cheapest": "of all", "cheapest_general": "of our general integrators", "cheapest_engine": "of the engines"}
+    winners = ((kinds[kind], method_text(each) if each else "none") for kind, each in recommendation.winners.items())
+    fastest = ", ".join(map(" ".join, winners))
     growth = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
     return [
-        f"Fastest: {_fastest(recommendation)}.",
+        f"Fastest: {fastest}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
         f"conserved: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
@@ -127,13 +126,6 @@ def notes(recommendation: Recommendation) -> list[str]:
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
         *(f"{name}: not installed." for name in conditions.missing),
     ]
-
-
-def _fastest(recommendation: Recommendation) -> str:
-    """Return the fastest method that reaches the error, the fastest general one of ours, and the fastest engine."""
-    kinds = {"cheapest": "of all", "cheapest_general": "of our general integrators", "cheapest_engine": "of the engines"}
-    winners = recommendation.winners.items()
-    return ", ".join(f"{kinds[kind]} {method_text(advice) if advice else 'none'}" for kind, advice in winners)
 
 
 def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
 
 from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
@@ -26,6 +28,8 @@ from . import (
 )
 from .measured import Measured, of_scene
 
+SECTIONS: dict[str, Any] = {THROUGHPUT: many_bodies, LONG_TIME: long_time, PRICE: price}
+"""Studies that have a section of their own rows and samples."""
 SCHEMA = 2
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
@@ -41,12 +45,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     blocks += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
     if plan.engines:
         blocks.append(engines.section(measured))
-    if THROUGHPUT in plan.names:
-        blocks.append(many_bodies.section(measured.rows))
-    if LONG_TIME in plan.names:
-        blocks.append(long_time.section(measured.rows, measured.samples))
-    if PRICE in plan.names:
-        blocks.append(price.section(measured.rows))
+    blocks += [part.section(measured.rows, measured.samples) for name, part in SECTIONS.items() if name in plan.names]
     blocks += hard_cases.sections(rows)
     blocks += filled(paper.section(rows, measured.samples), failures.section(rows), provenance.section(source))
     tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]

@@ -18,7 +18,7 @@ from ..charts.style import colours, families_of
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Emphasis, Figure, Layout, LegendEntry, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
-from ..rows.names import of_measure, of_study, outcomes, without_solutions
+from ..rows.names import MethodClass, of_measure, of_study, outcomes
 from ..rows.points import front, under
 from . import scene_contests
 from .measured import Measured, long_run_drifts, of_scene, scenes_in_trouble
@@ -54,7 +54,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         'compiled code available, and "first call" the first run after that. The first column of numbers is the time per step '
         f"relative to `{DEFAULT_METHOD}`."
     )
-    picture = figures.work_precision(points, front(without_solutions(points)), name)
+    picture = figures.work_precision(points, front(points[points["class"] != MethodClass.SOLUTION]), name)
     work: list[Block] = [families_figure(summary, f"work_precision_{name}", name, picture), classes]
     if decades.rows:
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))

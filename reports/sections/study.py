@@ -8,15 +8,15 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import RANDOM
 from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
 from ..document.model import Block, Document, Facts, Paragraph, Row, Section, Table, filled
 from ..rows.names import with_names
 from ..run.measure import Measurements
-from . import long_time, many_bodies, price, random_bodies
-from .report import records
+from . import random_bodies
+from .report import SECTIONS, records
 
 
 def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:
@@ -39,13 +39,9 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
         sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
         shown, terms = filled(random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence), random_bodies.TERMS
         data["ratios"] = random_bodies.records(ratios)
-    elif name == THROUGHPUT:
-        shown = [block for block in many_bodies.section(named).blocks if isinstance(block, Table | Section)]
-        terms = many_bodies.TERMS
-    elif name == LONG_TIME:
-        shown, terms = [long_time.as_table(named)], long_time.TERMS
-    elif name == PRICE:
-        shown, terms = [price.as_table(named)], price.TERMS
+    elif name in SECTIONS:
+        part = SECTIONS[name].section(named, with_names(measured.samples))
+        shown, terms = [block for block in part.blocks if isinstance(block, Table | Section)], SECTIONS[name].TERMS
     else:
         shown, terms = [rows_table(name, named)], ""
     data |= {"rows": records(measured.table), "samples": records(measured.samples)}

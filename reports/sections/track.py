@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from conservative.benchmarks.measures.convergence_order import Order
@@ -71,8 +71,23 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         "failures": failures,
         "versions": [{name: getattr(each, name) for name in ("version", "python", "packages")} for each in environments],
         "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
-        "changes": [_change_record(each) for each in transitions if each.changes],
+        "changes": [
+            {
+                **{"scene": each.now.scene, "setting": each.now.setting, "from": each.was.version, "to": each.now.version},
+                "sentence": changes_text(each),
+                "lost": bool(each.lost),
+                "changes": [{"aspect": c.aspect.value, "quantity": c.quantity, "lost": c.lost} for c in each.changes],
+            }
+            for each in transitions
+            if each.changes
+        ],
     }
+    checks = []  # of each setting, scene and pair of consecutive versions
+    for each in transitions:
+        text, name = changes_text(each), f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
+        checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if gated and each in lost_last else ""))
+    if failures and not lost_last:
+        checks.append(Check("all", names[-1], failure="\n".join(failures)))
     return Document(
         f"conservative track {engine}",
         f"Versions of {engine}: {', '.join(names)}",
@@ -86,21 +101,9 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         ),
         brief=filled(*tables, changed, unfinished, *verdict),
         data=data,
-        checks=_checks(transitions, lost_last if gated else [], failures, names[-1]),
+        checks=checks,
         failures=failures,
     )
-
-
-def _checks(transitions: Sequence[Transition], failed: Sequence[Transition], failures: list[str], last: str) -> list[Check]:
-    """Return a check for each setting, scene and pair of consecutive versions."""
-    checks = []
-    for each in transitions:
-        text = changes_text(each)
-        name = f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
-        checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if each in failed else ""))
-    if failures and not failed:
-        checks.append(Check("all", last, failure="\n".join(failures)))
-    return checks
 
 
 def _seen(line: EngineLine) -> list[Observation]:
@@ -162,13 +165,6 @@ def _record(line: EngineLine, seen: Observation) -> dict[str, Any]:
         "step_times_s": (line.times or {}).get(seen.version, ()),
         "time_ratio": _ratio(line, seen),
     }
-
-
-def _change_record(transition: Transition) -> dict[str, Any]:
-    was, now = transition.was, transition.now
-    names = {"scene": now.scene, "setting": now.setting, "from": was.version, "to": now.version}
-    aspects = [{"aspect": each.aspect.value, "quantity": each.quantity, "lost": each.lost} for each in transition.changes]
-    return {**names, "sentence": changes_text(transition), "lost": bool(transition.lost), "changes": aspects}
 
 
 def changes_text(transition: Transition) -> str:

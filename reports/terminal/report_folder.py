@@ -53,7 +53,8 @@ def report_folder(target: Path) -> Iterator[Path]:
         try:
             yield fresh
         except NotWritten as error:
-            raise _in_place(error, fresh, target) from None
+            # an error about a file in the new folder is one about its place
+            raise NotWritten("out", target, error.cause, _FOLDER) if error.path.is_relative_to(fresh) else error from None
         with unstoppable():
             _swap(fresh, target)
 
@@ -93,11 +94,6 @@ def _manifest(path: Path) -> list[str] | None:
 def _make(path: Path) -> int:
     path.mkdir()
     return os.open(path, os.O_RDONLY)
-
-
-def _in_place(error: NotWritten, fresh: Path, target: Path) -> NotWritten:
-    """Return an error about a file in the new folder as an error about its place."""
-    return NotWritten("out", target, error.cause, _FOLDER) if error.path.is_relative_to(fresh) else error
 
 
 def _swap(fresh: Path, target: Path) -> None:

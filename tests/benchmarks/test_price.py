@@ -10,7 +10,7 @@ from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.studies import price, price_program
 from conservative.benchmarks.studies.study import Study
 from conservative.reports.rows.names import with_names
-from conservative.reports.sections.price import as_table
+from conservative.reports.sections.price import section
 
 SCENES = price.scenes()[:2]
 STUDY = Study("price", SCENES, (cv.Reduced(),))
@@ -37,7 +37,8 @@ def test_a_thousand_runs_contain_the_first(rows):
 
 
 def test_the_table_has_medians_and_the_largest_error(rows):
-    table = as_table(with_names(frame(rows + rows)))
+    named = with_names(frame(rows + rows))
+    table = section(named, named).blocks[0]
     assert [row[0] for row in table.rows] == ["conservative", "heyoka"]
     assert [row[1] for row in table.rows] == ["2", "2"]
     for line, family in zip(table.rows, (rows[0].family, "heyoka"), strict=True):
