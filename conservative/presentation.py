@@ -1,18 +1,19 @@
-"""A trajectory as a table, a chart, and a card in a notebook. pandas and Altair are imported on demand."""
+"""A trajectory as a table, a chart, and a card in a notebook. pandas and Altair are imported on demand.
+
+The argument `trajectory` is always a `Trajectory`, whose file imports this one.
+"""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from .attitude import Array
 from .errors import BadInput, require_extra
-from .invariants import Invariant, sizes
-from .outcome import Outcome
-from .scene import Scene
+from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
@@ -36,58 +37,13 @@ MOST_DRAWN = 1000
 _WIDTH, _HEIGHT = 480, 160
 
 
-class Sampled(Protocol):
-    """A `Trajectory`, whose file imports this one."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene."""
-
-    @property
-    def t(self) -> Array:
-        """Times (n,), s."""
-
-    @property
-    def R_WB(self) -> Array:
-        """Attitudes (n, 3, 3), body to world."""
-
-    @property
-    def w_WB_B(self) -> Array:
-        """Angular velocities (n, 3), rad/s, body axes."""
-
-    @property
-    def energy(self) -> Array:
-        """Energies (n,), J."""
-
-    @property
-    def momentum_W(self) -> Array:
-        """Angular momenta (n, 3), kg m^2/s, world axes."""
-
-    @property
-    def label(self) -> str:
-        """Method with version and setting."""
-
-    @property
-    def outcome(self) -> Outcome:
-        """Outcome of the run."""
-
-    @property
-    def work(self) -> dict[str, int]:
-        """Counts of work by their names."""
-
-    def drift(self, invariant: Invariant) -> Array:
-        """Return the relative drift of an invariant, (n,) or (n, 3)."""
-
-    def __len__(self) -> int: ...
-
-
-def samples(trajectory: Sampled) -> Array:
+def samples(trajectory: Any) -> Array:
     """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
     return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
 
 
-def table(trajectory: Sampled) -> pandas.DataFrame:
+def table(trajectory: Any) -> pandas.DataFrame:
     """Return the samples as a table with `COLUMNS`; its `attrs` contain scene, method and outcome.
 
     Raises
@@ -103,7 +59,7 @@ def table(trajectory: Sampled) -> pandas.DataFrame:
     return frame
 
 
-def picture(trajectory: Sampled) -> altair.VConcatChart:
+def picture(trajectory: Any) -> altair.VConcatChart:
     """Return an interactive chart of the body rates and of the drift of every invariant over time.
 
     Raises
@@ -158,7 +114,7 @@ def _mimebundle(chart: altair.VConcatChart) -> dict[str, Any]:
     return shown
 
 
-def _lines(trajectory: Sampled, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
+def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
     """Return one line for each of `series`, (n,), over time."""
     import altair as alt
     import pandas as pd
@@ -186,7 +142,7 @@ def _lines(trajectory: Sampled, series: dict[str, Array], quantity: str, scale: 
     return chart
 
 
-def card(trajectory: Sampled) -> str:
+def card(trajectory: Any) -> str:
     """Return a small HTML table with scene, method, outcome, work and drifts."""
     work = [f"{count} {name}" for name, count in trajectory.work.items()]
     end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"

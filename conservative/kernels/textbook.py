@@ -20,7 +20,7 @@ from .vector import add, apply, cross, dot, in_body, inverse, product, scale, su
 
 FAILURE = "no solution within 100 corrections"  # of generalised-alpha
 PAUSE = 2**13  # steps between two calls of handlers of signals
-MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC, IMPLICIT_GYROSCOPIC = range(6)
+MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC = range(5)
 ROUND_OFF, REST = 1e-30, 1e-4
 """Squared correction, relative to squared accelerations and REST, that counts as none."""
 
@@ -125,16 +125,9 @@ def buss_step(h, t, J_inverse, field, q, L):
 
 
 @kernel
-def gyroscopic_step(implicit, h, t, J, J_inverse, field, q, L):
-    """Return the state after a step of a game engine: first the rates, then the attitude with the new rates.
-
-    The gyroscopic torque is that at the start, or the result of one Newton iteration of an implicit Euler step.
-    """
-    w = times(J_inverse, L)
-    gyroscopic = cross(L, w)
-    if implicit:
-        gyroscopic = times(J, apply(inverse(gyroscopic_tangent(J, h, w, L)), gyroscopic))
-    L = add(L, scale(h, add(gyroscopic, torque(field, t, q))))
+def gyroscopic_step(h, t, J_inverse, field, q, L):
+    """Return the state after a step of a game engine: first the rates, then the attitude with the new rates."""
+    L = add(L, scale(h, add(cross(L, times(J_inverse, L)), torque(field, t, q))))
     return product(q, exponential(scale(h, times(J_inverse, L)))), L
 
 
@@ -162,7 +155,7 @@ def march(model, coefficients, workspace):
             elif scheme == BUSS:
                 q, L = buss_step(h, t, J_inverse, field, q, L)
             else:
-                q, L = gyroscopic_step(scheme == IMPLICIT_GYROSCOPIC, h, t, J, J_inverse, field, q, L)
+                q, L = gyroscopic_step(h, t, J_inverse, field, q, L)
             until_sample -= 1
             if until_sample == 0 or step == n_steps:
                 until_sample = every

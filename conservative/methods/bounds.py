@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 
 from ..grid import Grid
+from ..method import Method
 from ..scene import Scene
 from ..trajectory import Bounds
 
@@ -20,6 +21,11 @@ ROUNDING, SOLVER = 4.0, 10.0
 """Drift that a step may cause, in units of round-off and of the tolerance."""
 UNIT_QUATERNIONS = 1e-13
 """Bound on the orthonormality error of matrices that are computed from unit quaternions."""
+
+
+def within_round_off(method: Method, scene: Scene, grid: Grid) -> Bounds:
+    """Return the bounds of a method without a tolerance, as its `bounds`."""
+    return bounds_of(scene, grid)
 
 
 def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS) -> Bounds:

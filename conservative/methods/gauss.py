@@ -18,8 +18,7 @@ from ..grid import Grid
 from ..method import Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start, quadruple
@@ -87,8 +86,7 @@ class Gauss(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):

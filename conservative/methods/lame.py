@@ -45,8 +45,7 @@ from ..grid import Grid
 from ..method import Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, in_gravity_or_free, moments_of_gravity, take_pieces, turn_samples
 from .many import Block, RunMany
 from .non_spinning import frame_unsupported
@@ -89,8 +88,7 @@ class Lame(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "axial momentum"})
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):

@@ -17,8 +17,7 @@ from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, take_pieces
 from .many import Block, RunMany
 from .principal_axes import PrincipalStart, start_along
@@ -89,8 +88,7 @@ class MoserVeselov(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "axial momentum"})
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         return None if scene.free else "it is for free bodies"

@@ -15,8 +15,7 @@ from ..invariants import JACOBI_INTEGRAL
 from ..method import Method, Role, Run
 from ..potentials.turning import Turning
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
@@ -59,8 +58,7 @@ class Projected(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis"})
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None

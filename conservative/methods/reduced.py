@@ -110,7 +110,7 @@ class Reduced(Method):
     @property
     def stages(self) -> int:
         """Number of substeps of order 2 in a step."""
-        return len(composition_of(self.order, self.composition).lengths(1.0))
+        return composition_of(self.order, self.composition).stages
 
     def unsupported(self, scene: Scene) -> str | None:
         return frame_unsupported(self.frame, scene)

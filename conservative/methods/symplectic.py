@@ -14,8 +14,7 @@ from ..deferred_imports import kernels
 from ..grid import Grid
 from ..method import Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.splittings import Lengths, lengths_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
@@ -76,8 +75,7 @@ class Splitting(Method):
         momenta = {"momentum", "vertical momentum", "momentum along the field's axis"}
         return frozenset(momenta if self.kind == "AXES" else momenta | {"axial momentum"})
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None

@@ -14,16 +14,13 @@ from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4
 from .principal_axes import principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
-Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic", "implicit_gyroscopic"]
-
-
+Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic"]
 _RADIUS = "a spectral radius from 0 to 1"
 SCHEMES = {
     "rkmk": ("RKMK 4", 4),
@@ -31,7 +28,6 @@ SCHEMES = {
     "generalized_alpha": ("generalised-alpha", 2),
     "buss": ("Buss 3", 3),
     "gyroscopic": ("explicit gyroscopic step", 1),
-    "implicit_gyroscopic": ("implicit gyroscopic step", 1),
 }
 """Titles in tables, and orders. In the order of the numbers in `conservative.kernels.textbook`."""
 
@@ -51,8 +47,7 @@ class Textbook(Method):
         IV.8.2). "crouch_grossman": order 4 with five stages (IV.8.1; Jackiewicz, Marthinsen & Owren 2000).
         "generalized_alpha": order 2, implicit (Brüls & Cardona 2010). "buss": order 3, one rotation a step (Buss 2000, for a
         free body; the torque is integrated by Radau's rule of order 3). "gyroscopic": order 1, the explicit gyroscopic torque
-        and semi-implicit Euler step of Bullet and ODE. "implicit_gyroscopic": the same with one Newton iteration for the
-        gyroscopic torque (Catto, Game Developers Conference 2015).
+        and semi-implicit Euler step of Bullet and ODE.
     rho
         Spectral radius of generalised-alpha at infinite frequency, 0 to 1: 1 has no numerical damping.
 
@@ -96,8 +91,7 @@ class Textbook(Method):
         rho = {"rho": f"rho={self.rho}"} if self.scheme == "generalized_alpha" else {}
         return {"scheme": SCHEMES[self.scheme][0], **rho}
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -77,7 +77,7 @@ def random_body(field: str = FIELDS[0], seed: int = 0, index: int = 0) -> Scene:
     inertia = R_BP @ np.diag(J) @ R_BP.T
     body = RigidBody((inertia + inertia.T) / 2)
     energy = float(w_P @ (J * w_P)) / 4 / _log_uniform(draw, ENERGY)  # half of the field's range
-    potential = _BUILDERS[field](draw, energy, R_BP @ point_P, body)
+    potential = _draw_field(field, draw, energy, R_BP @ point_P, body)
     name = "random_body" if (field, seed, index) == (FIELDS[0], 0, 0) else name_of(field, seed, index)
     t_end = TURN / float(np.linalg.norm(w_P))
     return Scene(name, body, _rotation(draw), R_BP @ w_P, t_end, potential, group="random", source="ours")
@@ -130,46 +130,25 @@ def _moments(draw: Draw) -> Array:
     return J * (_log_uniform(draw, MEAN_MOMENT) / J.mean())
 
 
-def _gravity(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Potential:
-    return UniformGravity(energy / float(np.linalg.norm(point_B)), point_B)
-
-
-def _spring(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Potential:
-    anchor_W = _anchor(draw, point_B)
-    rest_length = draw() * float(np.linalg.norm(anchor_W))
-    unit = half_range(LinearSpring(1.0, point_B, anchor_W, rest_length), rest_length)
-    return LinearSpring(energy / unit, point_B, anchor_W, rest_length)
-
-
-def _attraction(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Potential:
-    anchor_W = _anchor(draw, point_B)
-    return PointAttraction(energy / half_range(PointAttraction(1.0, point_B, anchor_W)), point_B, anchor_W)
-
-
-def _gradient(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Turning:
-    normal_W, other_W = _direction(draw), _direction(draw)
-    orbit = Orbit(_fixed_gradient(draw, energy, point_B, body).rate, normal_W)
-    return orbit.gravity_gradient(body.inertia, np.cross(normal_W, other_W))
-
-
-def _fixed_gradient(draw: Draw, energy: float, point_B: Array, body: RigidBody) -> GravityGradient:
+def _draw_field(field: str, draw: Draw, energy: float, point_B: Array, body: RigidBody) -> Potential | Turning:
+    """Return the field of this name; `energy`, J, is half of its range over all attitudes."""
+    arm = float(np.linalg.norm(point_B))
+    if field == "gravity":
+        return UniformGravity(energy / arm, point_B)
+    if field in ("spring", "attraction"):
+        anchor_W = (1 + _log_uniform(draw, GAP)) * arm * _direction(draw)
+        if field == "attraction":
+            return PointAttraction(energy / half_range(PointAttraction(1.0, point_B, anchor_W)), point_B, anchor_W)
+        rest_length = draw() * float(np.linalg.norm(anchor_W))
+        unit = half_range(LinearSpring(1.0, point_B, anchor_W, rest_length), rest_length)
+        return LinearSpring(energy / unit, point_B, anchor_W, rest_length)
+    orbit_W = [_direction(draw) for _ in range(2 if field == "gradient" else 0)]
     direction_W = _direction(draw)
-    unit = GravityGradient(1.0, body.inertia, direction_W)
-    range_ = unit.scale() * (1 - body.moments.min() / body.moments.max())
-    return GravityGradient(math.sqrt(2 * energy / range_), body.inertia, direction_W)
-
-
-_BUILDERS: dict[str, Callable[[Draw, float, Array, RigidBody], Potential | Turning]] = {
-    "gravity": _gravity,
-    "spring": _spring,
-    "attraction": _attraction,
-    "gradient": _gradient,
-    "fixed_gradient": _fixed_gradient,
-}
-
-
-def _anchor(draw: Draw, point_B: Array) -> Array:
-    return (1 + _log_uniform(draw, GAP)) * float(np.linalg.norm(point_B)) * _direction(draw)
+    range_ = GravityGradient(1.0, body.inertia, direction_W).scale() * (1 - body.moments.min() / body.moments.max())
+    rate = math.sqrt(2 * energy / range_)
+    if orbit_W:
+        return Orbit(rate, orbit_W[0]).gravity_gradient(body.inertia, np.cross(orbit_W[0], orbit_W[1]))
+    return GravityGradient(rate, body.inertia, direction_W)
 
 
 def half_range(field: PointPotential, rest_length: float = math.inf) -> float:

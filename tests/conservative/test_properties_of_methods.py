@@ -9,7 +9,7 @@ import conservative as cv
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
-from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
+from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, composition_of
 
 from .one_body import free, in_field, top
 
@@ -75,12 +75,6 @@ def test_order_and_invariants(method, name, order, conserves):
         (lambda: cv.Substepped(3), "method"),
         (lambda: cv.Substepped("reducd"), "method"),
         (lambda: cv.Substepped("reduced:order=3"), "order"),
-        (lambda: Composition("odd", 3, "", ("1",)), "order"),
-        (lambda: Composition("none", 0, "", ("1",)), "order"),
-        (lambda: explicit.ExplicitTableau("", 1, ((), ()), (0.5, 0.5)), "A"),
-        (lambda: explicit.ExplicitTableau("", 2, ((), (0.6,)), (0.0, 1.0)), "b"),
-        (lambda: explicit.ExplicitTableau("", 1, ((),), (1.0 + 1e-12,)), "b"),
-        (lambda: explicit.ExplicitTableau("", 3, ((), (2 / 3,), (2 / 3, 0.0)), (1 / 4, 0.0, 3 / 4)), "b"),
     ],
 )
 def test_wrong_settings_are_refused(make, argument):

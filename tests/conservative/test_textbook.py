@@ -101,13 +101,6 @@ def gyroscopic(scene, h, R, w):
     return R @ expm(h * hat(w_1)), w_1
 
 
-def implicit_gyroscopic(scene, h, R, w):
-    J = scene.body.inertia
-    jacobian = J + h * (hat(w) @ J - hat(J @ w))
-    w_1 = w - solve(jacobian, h * np.cross(w, J @ w)) + h * solve(J, torque(scene, R))
-    return R @ expm(h * hat(w_1)), w_1
-
-
 @scenes
 @schemes
 def test_a_step_is_that_of_the_formulas(scheme, scene):
