@@ -274,7 +274,10 @@ def _solver(
     With a scene, a run that would exceed the limit of steps is not started.
     """
     with _digits(bits + 32) as mp:
-        J = _tensor(mp, inertia)
+        if np.ndim(inertia) == 1:
+            J = mp.diag([_mpf(mp, x) for x in inertia])
+        else:
+            J = mp.matrix([[_mpf(mp, x) for x in row] for row in inertia])
         quaternion = [_mpf(mp, x) for x in q0]
         norm = mp.sqrt(mp.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
@@ -306,12 +309,6 @@ def _digits(bits: int) -> Iterator[Any]:
     """Yield a private context of mpmath: the global one has a single precision for all threads."""
     with _mp_lock, _mp.workprec(bits):
         yield _mp
-
-
-def _tensor(mp: Any, inertia: Sequence[Any]) -> Any:
-    if np.ndim(inertia) == 1:
-        return mp.diag([_mpf(mp, x) for x in inertia])
-    return mp.matrix([[_mpf(mp, x) for x in row] for row in inertia])
 
 
 def _mpf(mp: Any, x: Number) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from enum import IntEnum
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,13 +36,6 @@ def classify(drift: float) -> DriftClass | None:
         return None
     size = abs(drift)
     return DriftClass.CONSERVED if size <= CONSERVED else DriftClass.SMALL if size <= SMALL else DriftClass.LARGE
-
-
-class Slope(NamedTuple):
-    """A least-squares slope, 1/s, and its standard error; nan where there are too few samples."""
-
-    value: float
-    stderr: float
 
 
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
@@ -90,12 +82,12 @@ def measure_drifts(trajectory: Trajectory) -> list[Value]:
     for invariant in trajectory.scene.invariants:
         relative = trajectory.drift(invariant)
         size = sizes(relative)
-        slope = secular_slope(trajectory.t, relative)
+        slope, stderr = secular_slope(trajectory.t, relative)
         drifts += [
             Value(Measure.DRIFT_MAX, float(size.max()), invariant.name),
             Value(Measure.DRIFT_FINAL, float(size[-1]), invariant.name),
-            Value(Measure.DRIFT_SLOPE, slope.value, invariant.name),
-            Value(Measure.DRIFT_SLOPE_STDERR, slope.stderr, invariant.name),
+            Value(Measure.DRIFT_SLOPE, slope, invariant.name),
+            Value(Measure.DRIFT_SLOPE_STDERR, stderr, invariant.name),
         ]
     return [*drifts, Value(Measure.ORTHONORMALITY, float(orthonormality(trajectory.R_WB).max()))]
 
@@ -106,18 +98,18 @@ def blanks(scene: Scene) -> list[Value]:
     return [replace(value, value=math.nan) for value in measure_errors(start, start)]
 
 
-def secular_slope(t: Array, drift: Array) -> Slope:
-    """Return the least-squares slope of a drift (n,) over t (n,) with its standard error.
+def secular_slope(t: Array, drift: Array) -> tuple[float, float]:
+    """Return the least-squares slope of a drift (n,) over t (n,), 1/s, and its standard error; nan for less than three samples.
 
     For a vector (n, 3) it is the length of the three slopes. The standard error assumes independent residuals. A drift that
     only oscillates has a slope within a few standard errors, or one that decreases with the length of the run.
     """
     if len(t) < 3:
-        return Slope(math.nan, math.nan)
+        return math.nan, math.nan
     if drift.ndim == 1:
-        return Slope(*fit_line(t, drift)[:2])
+        return fit_line(t, drift)[:2]
     lines = [fit_line(t, column) for column in drift.T]
-    return Slope(math.hypot(*(line.slope for line in lines)), math.hypot(*(line.stderr for line in lines)))
+    return math.hypot(*(line.slope for line in lines)), math.hypot(*(line.stderr for line in lines))
 
 
 def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from functools import partial
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from conservative.errors import IntegrationFailed
 from conservative.integration.pickling import NotTransferable
@@ -28,18 +28,12 @@ PROCESSES, QUICK_PROCESSES = 5, 3
 """Processes of a study of times, and of a quick one. A default report has one."""
 
 
-class Processes:
+class Processes(ExitStack):
     """A number of processes: this one, and others that start with the first timing and end with the block."""
 
     def __init__(self, number: int = 1) -> None:
-        self._others = [python_worker(show_output=True) for _ in range(number - 1)]
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        for other in self._others:
-            other.close()
+        super().__init__()
+        self._others = [self.enter_context(closing(python_worker(show_output=True))) for _ in range(number - 1)]
 
     def time(
         self,

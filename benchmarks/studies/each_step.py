@@ -14,10 +14,8 @@ within its longer steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import replace
-from functools import partial
-from typing import Any
 
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
@@ -30,7 +28,7 @@ from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from .case import Case
 from .line import list_settings, measure_line
-from .speed import CALL, ROUNDS, keep_end
+from .speed import Runs, keep_end, time_runs
 from .study import Progress, Study
 
 ERROR = 1e-6
@@ -54,7 +52,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                     continue
                 chosen += yield from choose_setting(study, scene, method, truth)
             tell(f"{scene.name}: timing {len(chosen)} methods")
-            yield from time_chosen(study, scene, chosen, processes)
+            yield from time_chosen(study, chosen, processes)
 
 
 def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
@@ -69,35 +67,20 @@ def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory
     return []
 
 
-def time_chosen(study: Study, scene: Scene, chosen: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
+def time_chosen(study: Study, chosen: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
     """Yield the times of a scene's cases over the motion of their errors, s per simulated second, a row for each process.
 
     A call is repeated and not made longer: arrays of many samples cost more per sample (heyoka: twice as much from 40,000 on).
     """
-    runs: dict[tuple[Case, Measure], Any] = {}
-    prepares: dict[tuple[Case, Measure], Callable[[], Any]] = {}
+    ready: Runs = {}
     for case in chosen:
         for measure, grid in ((Measure.TIME_SAMPLED, case.grid), (Measure.TIME, keep_end(case.grid))):
-            done = study.attempt_here(replace(case, grid=grid))
+            timed = replace(case, grid=grid)
+            done = study.attempt_here(timed)
             if isinstance(done, Outcome):
                 yield case.row(Value(measure, math.nan), done)
                 continue
-            runs[case, measure], prepares[case, measure] = done.run, partial(case.method.prepare, scene, grid)
+            ready[case, measure] = timed, done.run
             if measure == Measure.TIME_SAMPLED and case.method.role == Role.ENGINE and hasattr(done.run, "own_loop"):
-                own = case, Measure.TIME_OWN_LOOP
-                runs[own], prepares[own] = done.run.own_loop, partial(_prepare_own_loop, case.method, scene, grid)
-    timings = processes.time(
-        runs,
-        prepares,
-        limit=study.hang_limit * (1 + len(runs)),
-        rounds=min(study.rounds, ROUNDS),
-        min_time=CALL / 2,
-        budget=study.timing_budget / 2,
-        shared=[scene],
-    )
-    for (case, measure), each in timings.items():
-        yield from case.time_rows(measure, each, float(case.grid.t[-1]))
-
-
-def _prepare_own_loop(method: Method, scene: Scene, grid: Grid) -> Any:
-    return method.prepare(scene, grid).own_loop  # type: ignore[attr-defined]
+                ready[case, Measure.TIME_OWN_LOOP] = timed, done.run.own_loop
+    yield from time_runs(study, ready, processes)

@@ -35,7 +35,15 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
         An engine is not installed, and `skip_missing` is False.
     """
     every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
-    methods = [method for name in dict.fromkeys(every) for method in _settings(name, skip_missing)]
+    methods: list[Method] = []
+    for name in dict.fromkeys(every):
+        family = _family(*split_requirement(name))
+        try:
+            methods += dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants")))
+        except MissingEngine as error:
+            if not skip_missing:
+                raise
+            methods.append(Missing(name, error=error))
     if not methods:
         raise BadInput("engines", repr(ALL), "engines that are installed: conservative engines install NAME")
     return tuple({method.label: method for method in reversed(methods)}.values())[::-1]
@@ -59,17 +67,6 @@ def _version_here(family: type[Method]) -> str | None:
         return family().maker.version
     except MissingEngine:
         return None
-
-
-def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
-    engine, version = split_requirement(name)
-    family = _family(engine, version)
-    try:
-        return tuple(dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants"))))
-    except MissingEngine as error:
-        if not skip_missing:
-            raise
-        return (Missing(name, error=error),)
 
 
 def _family(engine: str, version: str) -> type[Method]:

@@ -56,7 +56,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, list[TimedRun]]:
     """Yield the rows of one engine except its times; return the run to be timed in a list, which may be empty."""
     done = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
-    yield from list_properties(case, OK if isinstance(done, Success) else done)
+    method = case.method
+    if not isinstance(method, Missing):
+        bits = float(getattr(method, "precision", "f64").removeprefix("f"))
+        order = math.nan if method.order is None else float(method.order)
+        properties = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
+        outcome = OK if isinstance(done, Success) else done
+        yield from case.rows(properties, outcome, AS_INSTALLED if is_as_installed(method) else "")
     yield from measure_accuracy(case, done, truth)
     if isinstance(done, Success):
         # The same steps with few samples, and fewer steps if the run is slow.
@@ -67,17 +73,6 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
         yield from case.rows(blanks(*MEASURES), done)
         return []
     return [TimedRun(case, done, done)]
-
-
-def list_properties(case: Case, outcome: Outcome) -> list[Measurement]:
-    """Return the properties of an engine: bits of its numbers, and the expected order or nan."""
-    method = case.method
-    if isinstance(method, Missing):
-        return []
-    bits = float(getattr(method, "precision", "f64").removeprefix("f"))
-    order = math.nan if method.order is None else float(method.order)
-    known = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
-    return case.rows(known, outcome, AS_INSTALLED if is_as_installed(method) else "")
 
 
 def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> list[Measurement]:

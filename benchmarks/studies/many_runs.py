@@ -60,11 +60,16 @@ def list_ways(method: Method) -> tuple[Way, ...]:
 
 
 class RunBlocks:
-    """A run of many bodies, block by block, which returns the result of the last block."""
+    """A run of many bodies, prepared and made block by block, which returns the result of the last block."""
 
-    def __init__(self, runs: list[RunMany], threads: int) -> None:
-        self._runs = runs
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+    def __init__(self, way: Way, bodies: Batch, grid: Grid) -> None:
+        self._runs: list[RunMany] = []
+        for first in range(0, len(bodies), BLOCK):
+            block = bodies[first : first + BLOCK]
+            together = way.method.prepare_many(block, grid) if way.together else None
+            alone = (way.method.prepare(block.take(i), grid) for i in range(len(block)))
+            self._runs.append(_Loop(list(alone), grid) if together is None else together)
+        self._pool = ThreadPoolExecutor(way.threads) if way.threads > 1 else None
 
     def __call__(self) -> Block:
         for block in (self._pool.map if self._pool else map)(lambda run: run(), self._runs):
@@ -76,17 +81,6 @@ class RunBlocks:
         if self._pool is None:
             return sum(wall_time(run, calls) for run in self._runs)
         return wall_time(self.__call__, calls)
-
-
-def prepare_blocks(way: Way, bodies: Batch, grid: Grid) -> RunBlocks:
-    """Return the run of bodies, prepared block by block."""
-    runs: list[RunMany] = []
-    for first in range(0, len(bodies), BLOCK):
-        block = bodies[first : first + BLOCK]
-        together = way.method.prepare_many(block, grid) if way.together else None
-        alone = (way.method.prepare(block.take(i), grid) for i in range(len(block)))
-        runs.append(_Loop(list(alone), grid) if together is None else together)
-    return RunBlocks(runs, way.threads)
 
 
 class _Loop:
@@ -125,17 +119,14 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     try:
         with time_limit(limit):
-            run, spent = _time_preparation(way, bodies, grid)
-            if spent > COMPILED:
-                run, spent = _time_preparation(way, bodies, grid)
+            for _ in range(2):
+                start = perf_counter()
+                run = RunBlocks(way, bodies, grid)
+                if (spent := perf_counter() - start) <= COMPILED:
+                    break
             return ManyDone(run, run(), spent, wall_time(run))
     except Exception as error:
         return outcome_of_error(way.method, error, skip_missing)
-
-
-def _time_preparation(way: Way, bodies: Batch, grid: Grid) -> tuple[RunBlocks, float]:
-    start = perf_counter()
-    return prepare_blocks(way, bodies, grid), perf_counter() - start
 
 
 def settings(method: Method) -> tuple[Method, ...]:

@@ -22,34 +22,32 @@ TOL = 1e-9
 """Tolerance of heyoka, with which its errors on the bodies of the study are below `ERROR`."""
 RUNS = 1000
 
-Side = tuple[float, Callable[[Any], Any], Callable[[float], Any]]
-"""Time before the import; a function that runs a scene for the first time; one that runs it again with rates times a factor.
-
-The first function returns one for the method and the final attitude."""
+Functions = tuple[Callable[[float], Any], Callable[[], tuple[str, Any]]]
+"""Functions that run a scene again, with rates times a factor, and that return the method and the final attitude."""
+Side = tuple[float, Callable[[Any], Functions]]
+"""Time before the import, and a function that runs a scene for the first time."""
 
 
 def ours() -> Side:
-    """Return the functions of `integrate` with a target error, and of the method and the step size that it chose."""
+    """Return `integrate` with a target error, and then with the method and the step size that it chose."""
     begin = perf_counter()
     import conservative as cv
 
-    last: list[Any] = []
-
-    def first(scene: Any) -> Any:
+    def first(scene: Any) -> Functions:
         found = cv.integrate(scene, error=ERROR)
-        last[:] = scene, found.choice
-        return lambda: (last[1].method.name, found.R_WB[-1])
+        choice: Any = found.choice
 
-    def again(factor: float) -> None:
-        scene, choice = last
-        start = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 * factor)
-        cv.integrate(start, choice.dt, choice.method, sample_every=round(scene.t_end / choice.dt))
+        def again(factor: float) -> None:
+            start = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 * factor)
+            cv.integrate(start, choice.dt, choice.method, sample_every=round(scene.t_end / choice.dt))
 
-    return begin, first, again
+        return again, lambda: (choice.method.name, found.R_WB[-1])
+
+    return begin, first
 
 
 def heyoka() -> Side:
-    """Return the functions of heyoka: base vectors, numbers of bodies as parameters, so that bodies share the compiled code."""
+    """Return heyoka with base vectors and numbers of bodies as parameters, so that bodies share the compiled code."""
     from conservative.references.heyoka_equations import formulations
     from conservative.references.samples import to_body_axes
 
@@ -57,34 +55,33 @@ def heyoka() -> Side:
     import heyoka as hy
 
     compiled: dict[Any, Any] = {}
-    last: list[Any] = []
 
-    def first(scene: Any) -> Any:
+    def first(scene: Any) -> Functions:
         problem = formulations.base_vectors(scene)
         if problem.form not in compiled:
             compiled[problem.form] = hy.taylor_adaptive(problem.form.build(), [0.0] * 9, tol=TOL, fast_math=True)
-        last[:] = compiled[problem.form], problem, scene.t_end
-        states = formulations.gather([problem])(again(1.0).copy()[None, None])
-        return lambda: ("heyoka", to_body_axes(np.array([scene.t_end]), states, problem.axes.R_BF[None])[0])
+        integrator = compiled[problem.form]
 
-    def again(factor: float) -> Any:
-        integrator, problem, t_end = last
-        integrator.pars[:] = problem.parameters
-        integrator.time = 0.0
-        integrator.state[:] = problem.start
-        integrator.state[-3:] *= factor
-        integrator.propagate_until(t_end)
-        return integrator.state
+        def again(factor: float) -> None:
+            integrator.pars[:] = problem.parameters
+            integrator.time = 0.0
+            integrator.state[:] = problem.start
+            integrator.state[-3:] *= factor
+            integrator.propagate_until(scene.t_end)
 
-    return begin, first, again
+        again(1.0)
+        states = formulations.gather([problem])(integrator.state.copy()[None, None])
+        return again, lambda: ("heyoka", to_body_axes(np.array([scene.t_end]), states, problem.axes.R_BF[None])[0])
+
+    return begin, first
 
 
 def main(side: str, name: str, other_name: str) -> None:
     """Print the times."""
-    begin, first, again = {"ours": ours, "heyoka": heyoka}[side]()
+    begin, first = {"ours": ours, "heyoka": heyoka}[side]()
     from conservative import registry
 
-    read = first(registry.scene(name))
+    again, read = first(registry.scene(name))
     once = perf_counter() - begin
     for number in range(1, RUNS):
         again(1 + 1e-6 * number)

@@ -46,7 +46,7 @@ from ..measures.timing import wall_time
 from .case import NOT_DRAWN, Case, Drawn, Success, outcome_of_error
 from .line import list_settings
 from .selection import Missing, tolerance_setting
-from .speed import keep_end
+from .speed import keep_end, prepare_loop
 from .study import Progress, Study, remember_truths
 
 DECADES = tuple(10.0**-k for k in range(2, 13))
@@ -184,15 +184,12 @@ def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Genera
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), done)
             continue
         error = float(angle_between(truth.R_WB, done.trajectory.R_WB).max())
-        line.append(TimedSetting(case, done, error, estimate_time(done) / case.scene.t_end))
+        spent = min(wall_time(done.run) for _ in range(2))  # the first may compile
+        if spent <= SLOW:
+            spent = min(spent, *(wall_time(done.run) for _ in range(3)))
+        line.append(TimedSetting(case, done, error, spent / case.scene.t_end))
         yield case.row(Value(Measure.ATTITUDE_MAX, error))
     return line
-
-
-def estimate_time(done: Success) -> float:
-    """Return the estimated time of a run, s: the smallest of a few calls, of two if it is slow. The first may compile."""
-    spent = min(wall_time(done.run) for _ in range(2))
-    return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
 
 
 def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
@@ -226,7 +223,7 @@ def time_rows(study: Study, points: list[TimedSetting], processes: Processes) ->
                 runs[case] = getattr(run, "own_loop", run)
         timings = processes.time(
             runs,
-            {case: partial(_prepare_loop, case) for case in runs},
+            {case: partial(prepare_loop, case) for case in runs},
             limit=study.hang_limit * (1 + len(runs)),
             rounds=QUICK_ROUNDS if study.quick else ROUNDS,
             min_time=CALL,
@@ -249,10 +246,3 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
     except Exception as error:
         return outcome_of_error(case.method, error)
     return run if outcome.ok else outcome
-
-
-def _prepare_loop(case: Case) -> Callable[[], Any]:
-    """Return a function that makes the run of a case without converting its samples, or the run of an engine without one."""
-    run = case.method.prepare(case.scene, case.grid)
-    run()  # so that engines find their limits outside of the loop
-    return getattr(run, "own_loop", run)

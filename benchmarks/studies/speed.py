@@ -7,9 +7,10 @@ then the conversion of the scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
@@ -39,8 +40,8 @@ LONGEST = 2**16
 """Largest factor by which the number of steps of a timed run increases."""
 ROUNDS = 5
 """Largest number of rounds for each of hundreds of points."""
-Extend = Callable[[Grid, int], Grid]
-"""Maps a grid and a factor to a grid with that many times as many steps."""
+Runs = dict[tuple[Case, Measure], tuple[Case, Callable[[], Any]]]
+"""Timed cases and runs, by the case and the measure of their rows."""
 UNCOUNTED = Outcome(OutcomeKind.UNSUPPORTED, "its engine does not count steps")
 
 
@@ -63,11 +64,11 @@ class TimedRun:
         return self.case.grid.dt * self.case.grid.n_steps
 
 
-def make_timed(study: Study, case: Case, extend: Extend = keep_end) -> TimedRun | Outcome:
+def make_timed(study: Study, case: Case) -> TimedRun | Outcome:
     """Return a case that is ready to be timed, or the outcome of its failure.
 
-    It has so many steps that a call takes about `CALL` s, or the most steps that do not fail. `extend` determines the samples.
-    The number of steps is determined in several rounds, because a short call is mostly overhead.
+    It has so many steps that a call takes about `CALL` s, or the most steps that do not fail. Their number is determined in
+    several rounds, because a short call is mostly overhead.
     """
     first = study.attempt_here(case)
     if isinstance(first, Outcome):
@@ -75,7 +76,7 @@ def make_timed(study: Study, case: Case, extend: Extend = keep_end) -> TimedRun 
     longest, done, times = case, first, 1
     while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
-        longer = replace(case, grid=extend(case.grid, times))
+        longer = replace(case, grid=keep_end(case.grid, times))
         again = study.attempt_here(longer)
         if isinstance(again, Outcome):
             break
@@ -145,29 +146,36 @@ def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
         yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")
 
 
-def time_cases(
-    study: Study, cases: Sequence[Case], extend: Mapping[Measure, Extend], processes: Processes
-) -> Iterator[Measurement]:
-    """Yield the times of cases, s per simulated second, all in interleaved rounds, a row for each process.
-
-    `extend` has the measures of each case, and the functions that lengthen the grid of their runs.
-    """
-    ready: dict[tuple[Case, Measure], TimedRun] = {}
+def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of cases, final state only; see `time_runs`."""
+    ready: Runs = {}
     for case in cases:
-        for measure, lengthen in extend.items():
-            timed = make_timed(study, replace(case, grid=lengthen(case.grid, 1)), lengthen)
-            if isinstance(timed, Outcome):
-                yield case.row(Value(measure, math.nan), timed)
-            else:
-                ready[case, measure] = timed
+        timed = make_timed(study, replace(case, grid=keep_end(case.grid)))
+        if isinstance(timed, Outcome):
+            yield case.row(Value(Measure.TIME, math.nan), timed)
+        else:
+            ready[case, Measure.TIME] = timed.case, timed.done.run
+    yield from time_runs(study, ready, processes)
+
+
+def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of runs, s per simulated second, all in interleaved rounds, a row for each process."""
     timings = processes.time(
-        {key: timed.done.run for key, timed in ready.items()},
-        {key: partial(timed.case.method.prepare, timed.case.scene, timed.case.grid) for key, timed in ready.items()},
+        {key: run for key, (_, run) in ready.items()},
+        {key: partial(prepare_loop, case, key[1] == Measure.TIME_OWN_LOOP) for key, (case, _) in ready.items()},
         limit=study.hang_limit * (1 + len(ready)),
         rounds=min(study.rounds, ROUNDS),
         min_time=CALL / 2,
         budget=study.timing_budget / 2,
-        shared=list({case.scene: None for case in cases}),
+        shared=list({case.scene: None for case, _ in ready}),
     )
     for key, each in timings.items():
-        yield from ready[key].case.time_rows(key[1], each, ready[key].simulated)
+        case, _ = ready[key]
+        yield from key[0].time_rows(key[1], each, case.grid.dt * case.grid.n_steps)
+
+
+def prepare_loop(case: Case, own: bool = True) -> Callable[[], Any]:
+    """Return the run of a case; if `own`, without the conversion of its samples, if it can be run without one."""
+    run = case.method.prepare(case.scene, case.grid)
+    run()  # so that engines find their limits outside of the loop
+    return getattr(run, "own_loop", run) if own else run

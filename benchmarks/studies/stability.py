@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,43 +72,29 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = [method for method in study.methods if method.order is not None or isinstance(method, Missing)]
     tell = study.count(progress, len(methods))
     for scene in study.scenes:
-        motion = TrueMotion.of(study, scene)
-        for method in methods:
-            tell(f"{scene.name}: {method.name}")
-            yield from longest_step(study, motion, method)
-
-
-@dataclass(frozen=True, eq=False)
-class TrueMotion:
-    """A scene, its initial rate |w| (rad/s), and its exact attitudes (n, 3, 3) at whole units of |w| t, for half a turn."""
-
-    scene: Scene
-    rate: float
-    R_WB: Array
-
-    @classmethod
-    def of(cls, study: Study, scene: Scene) -> TrueMotion:
-        """Return the exact motion of a scene. A scene at rest is measured in units of its step size."""
+        # A scene at rest is measured in units of its step size.
         rate = float(np.linalg.norm(scene.w_WB_B0)) or UNIT / scene.dt
         truth = study.truth(scene, Grid(UNIT / rate, math.floor(math.pi / UNIT))).trajectory
         turn = np.cumsum(np.linalg.norm(truth.w_WB_B, axis=1)) * UNIT / rate
-        return cls(scene, rate, truth.R_WB[: np.count_nonzero(turn <= math.pi)])
+        half_turn = truth.R_WB[: np.count_nonzero(turn <= math.pi)]
+        for method in methods:
+            tell(f"{scene.name}: {method.name}")
+            yield from longest_step(study, scene, method, rate, half_turn)
 
-    def grid(self, size: int) -> Grid:
-        """Return the steps of a size."""
-        return Grid(UNIT * size / self.rate, STEPS)
 
+def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: Array) -> list[Measurement]:
+    """Return the rows of one method on a scene with the initial rate |w|, rad/s.
 
-def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measurement]:
-    """Return the rows of one method on one scene."""
+    `R_WB` are the exact attitudes (n, 3, 3) at whole units of |w| t, for half a turn.
+    """
     works, fails, limit, outcome = math.nan, math.nan, max(FIRST_LIMIT, study.longest_run), OK
-    case = Case(study.name, motion.scene, method, motion.grid(STEP_SIZES[0]))
     for size in STEP_SIZES:
-        done = attempt_apart(limit, replace(case, grid=motion.grid(size)), study.skip_missing)
+        case = Case(study.name, scene, method, Grid(UNIT * size / rate, STEPS))
+        done = attempt_apart(limit, case, study.skip_missing)
         if isinstance(done, Outcome):
             outcome = done
         else:
-            outcome = detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
+            outcome = detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, R_WB, size) or OK
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
             break
@@ -131,12 +116,11 @@ def detect_divergence(trajectory: Trajectory) -> Outcome | None:
     return Diverged(float(trajectory.t[int(np.argmax(off))]), energy.name).outcome if off.any() else None
 
 
-def detect_wrong_branch(trajectory: Trajectory, motion: TrueMotion, size: int) -> Outcome | None:
+def detect_wrong_branch(trajectory: Trajectory, R_WB: Array, size: int) -> Outcome | None:
     """Return the outcome of a run whose first step ends further from the truth than it began, otherwise None."""
-    if size >= len(motion.R_WB):
+    if size >= len(R_WB):
         return None
-    true = motion.R_WB[size]
-    off, turn = (float(angle_between(true, R)) for R in (trajectory.R_WB[1], motion.R_WB[0]))
+    off, turn = (float(angle_between(R_WB[size], R)) for R in (trajectory.R_WB[1], R_WB[0]))
     if off <= turn + TOLERANCE:
         return None
     return Outcome(OutcomeKind.WRONG_BRANCH, f"first step {off:.2g} rad off, the body turns by {turn:.2g} rad")

@@ -38,11 +38,10 @@ from ..contest import list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
-from ..measures.timing import Timing
 from .case import Case, Drawn
 from .ensembles import DURATION, KINDS, draw
 from .line import list_settings
-from .many_runs import ManyDone, RunBlocks, Way, attempt_many, list_ways, prepare_blocks
+from .many_runs import ManyDone, RunBlocks, Way, attempt_many, list_ways
 from .paper import agreement_row
 from .selection import Missing, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
@@ -94,11 +93,6 @@ class ThroughputStudy(Study):
     sizes: tuple[int, ...] = SIZES
     bodies: int = BODIES
     seed: int = 0
-
-    @property
-    def longest_errors(self) -> float:
-        """Time budget, s, of a run for errors."""
-        return 4 * self.longest_run
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -207,16 +201,17 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
     one = _case(study, kind.bodies.scene, way.method, EXACT_STEPS if exact else SAMPLES)
     one = replace(one, bodies=n, way=way.text)
     for case in list_settings(one, map(_grid, STEPS[few]), TOLERANCES[few]):
-        if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * n > study.longest_errors):
+        if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or line[-1].spent * n > 2 * study.longest_run):
             break
-        done = attempt_many(replace(way, method=case.method), kind.few, case.grid, study.hang_limit, study.skip_missing)
+        chosen = replace(way, method=case.method)
+        done = attempt_many(chosen, kind.few, case.grid, study.hang_limit, study.skip_missing)
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
             if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
                 break  # at any tolerance
             continue
         errors = read_errors(done, kind.truth)
-        line.append(BatchSetting(way, case, errors, done.spent / n, done.prepare / n))
+        line.append(BatchSetting(chosen, case, errors, done.spent / n, done.prepare / n))
         values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
         yield from case.rows(values, detail=EXACT if exact else "")
     return line
@@ -242,18 +237,20 @@ def select_deciding(line: list[BatchSetting]) -> list[BatchSetting]:
 def time_rows(
     kind: Kind, points: list[BatchSetting], size: int, processes: Processes
 ) -> Generator[Measurement, None, list[BatchSetting]]:
-    """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
+    """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget.
+
+    They are time, s per simulated second, steps per second and preparation, s, each per body.
+    """
     study, ready, prepares = kind.study, dict[BatchSetting, ManyDone](), {}
     for point in (replace(each, case=replace(each.case, bodies=size)) for each in points):
         done: ManyDone | Outcome | None = refuse_long(point, size, study.longest_run)
         if done is None:
-            way = replace(point.way, method=point.case.method)
-            done = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
+            done = attempt_many(point.way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
         if isinstance(done, Outcome):
             yield point.case.row(Value(Measure.TIME, math.nan), done)
         else:
             ready[point] = done
-            prepares[point] = partial(prepare_drawn, way, point.case.drawn, size, keep_end(point.case.grid))
+            prepares[point] = partial(prepare_drawn, point.way, point.case.drawn, size, keep_end(point.case.grid))
     timings = processes.time(
         {point: done.run for point, done in ready.items()},
         prepares,
@@ -263,9 +260,14 @@ def time_rows(
         budget=study.timing_budget,
     )
     timed = []
-    for point, (timing, *others) in timings.items():
-        prepare = ready[point].prepare / size
-        yield from time_body(point.case, size, [timing, *others], prepare)
+    for point, each in timings.items():
+        case, timing, prepare = point.case, each[0], ready[point].prepare / size
+        yield from case.time_rows(Measure.TIME, each, size * DURATION)
+        if timing.outcome.ok and tolerance_setting(case.method):
+            yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
+        else:
+            yield case.time_row(Measure.BODY_STEPS, case.grid.n_steps * size / timing.minimum, timing)
+        yield case.time_row(Measure.PREPARE, prepare, timing)
         if timing.outcome.ok:
             timed.append(replace(point, spent=min(point.spent, timing.minimum / size), prepare=prepare))
     return timed
@@ -274,7 +276,7 @@ def time_rows(
 def prepare_drawn(way: Way, drawn: Drawn, size: int, grid: Grid) -> RunBlocks:
     """Return the run of the first bodies of a kind and seed."""
     assert drawn.seed is not None
-    return prepare_blocks(way, draw(drawn.field, size, drawn.seed), grid)
+    return RunBlocks(way, draw(drawn.field, size, drawn.seed), grid)
 
 
 def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
@@ -283,15 +285,3 @@ def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
         if size > 1 and seconds * size > most:
             return Outcome(OutcomeKind.SKIPPED, f"{what} would take {seconds * size:.2g} s; --time-limit raises that")
     return None
-
-
-def time_body(case: Case, size: int, timings: list[Timing], prepare: float) -> Iterator[Measurement]:
-    """Yield the cost of a body in a batch: time, s per simulated second, steps per second, and preparation, s."""
-    yield from case.time_rows(Measure.TIME, timings, size * DURATION)
-    timing = timings[0]
-    a_body = timing.minimum / size
-    if timing.outcome.ok and tolerance_setting(case.method):
-        yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
-    else:
-        yield case.time_row(Measure.BODY_STEPS, case.grid.n_steps / a_body, timing)
-    yield case.time_row(Measure.PREPARE, prepare, timing)

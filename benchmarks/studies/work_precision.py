@@ -15,7 +15,7 @@ from . import step_ladder
 from .case import Case
 from .line import list_settings, measure_line
 from .selection import tolerance_setting
-from .speed import keep_end, time_cases
+from .speed import time_cases
 from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
@@ -42,7 +42,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                     else:
                         yield point.case.row(TIME, point.outcome)
             tell(f"{scene.name}: timing {len(good)} points")
-            yield from time_cases(study, good, {Measure.TIME: keep_end}, processes)
+            yield from time_cases(study, good, processes)
 
 
 def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int | None = None) -> list[Case]:

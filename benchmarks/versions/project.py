@@ -23,6 +23,7 @@ from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
+from conservative.references.environments.plain_numbers import Answer
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -110,15 +111,15 @@ class ProjectSide:
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
-    def solver(self, states: States, **values: Any) -> WorkerRun[Trajectory]:
+    def solver(self, read: Callable[[Answer], Trajectory], **values: Any) -> WorkerRun[Trajectory]:
         """Return a run whose result is a trajectory."""
-        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, states)
+        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, read)
 
     def timed(self, scene: str, method: str, dt: float, n_steps: int) -> VersionRun:
         """Return a prepared run of n_steps steps dt, s, to be timed."""
         values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
-        states = States(registry.scene(scene), method)
-        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, states)
+        read = read_states(registry.scene(scene), method)
+        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, read)
         run.prepare()
         return run
 
@@ -133,21 +134,18 @@ class VersionRun(WorkerRun[Trajectory]):
         return float(self._ask("time", calls=calls)["seconds"])
 
 
-@dataclass(frozen=True)
-class States:
-    """Makes trajectories of a scene from the states of a version."""
+def read_states(scene: Scene, label: str) -> Callable[[Answer], Trajectory]:
+    """Return a function that makes trajectories of a scene from the states of a version."""
 
-    scene: Scene
-    label: str
-
-    def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
+    def read(answer: Answer) -> Trajectory:
+        if isinstance(answer, IntegrationFailed):
+            return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
         counts = Counters(**{name: answer["counts"].get(name) for name in _COUNTS})
         failure = answer["failure"]
         ended = FailedThere(Outcome(OutcomeKind(failure[0]), *failure[1:])) if failure else None
-        return Trajectory(self.scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, ended)
+        return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], label, counts, ended)
 
-    def failure(self, failure: IntegrationFailed) -> Trajectory:
-        return Trajectory(self.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), failure)
+    return read
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,7 +165,7 @@ class Remote(StandIn):
     def prepare(self, scene: Scene, grid: Grid) -> WorkerRun[Trajectory]:
         """Return the run. It is prepared at its first call, so that a failure to prepare is a failure of the run."""
         values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
-        return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)
+        return self.side.solver(read_states(scene, self.label), scene=self.scene_name, method=self.name, **values)
 
 
 def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:

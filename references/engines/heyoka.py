@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,14 +16,15 @@ from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, RunMany
-from conservative.methods.units import SI, find_units, in_own_units
+from conservative.methods.units import in_own_units
 from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import STEP_LIMIT, EngineRun, limit_reason, pace_reason, symmetric_axes, version
+from ..environments.plain_numbers import take_axes
 from ..heyoka_equations import accelerations, forms, formulations
-from ..samples import States, to_body_axes
+from ..samples import to_body_axes
 
 FRAMES = ("body", "non_spinning", "lean", "base_vectors")
 _TOLERANCES_AND_FRAMES = tuple(f"tol={tol},frame={frame}" for frame in FRAMES[:3] for tol in ("1e-6", "1e-9", "1e-12", "1e-16"))
@@ -179,18 +179,25 @@ class Heyoka(Method):
         return forms.compile_double(problem.form, self.tol, problem.fast_math, numbers, width)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
-        scenes = [bodies.take(i) for i in range(len(bodies))]
-        if not scenes or any(self.unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
-            return None
-        problems = [getattr(formulations, self.frame)(scene) for scene in scenes]
-        if any(problem.form != problems[0].form for problem in problems):
+        axes = take_axes(bodies, grid, self.unsupported)
+        problems = [getattr(formulations, self.frame)(each.scene) for each in axes or ()]
+        if not problems or any(problem.form != problems[0].form for problem in problems):
             return None
         if self.numbers == "compiled" and any(problem.parameters != problems[0].parameters for problem in problems):
             raise BadInput("numbers", "'compiled' for bodies that differ", "bodies with the same equations, or 'parameters'")
         width = self.width or int(forms.heyoka().recommended_simd_size())
-        together = _gather(problems, self.integrators(problems[0], width), width)
+        padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
+        parameters, start = (np.array([getattr(each, name) for each in padded]).T for name in ("parameters", "start"))
+        batches = Batches(self.integrators(problems[0], width), width, parameters, start)
         march, t = _run_batches if self.driver == "batch" else _run_ensemble, grid.t
-        return lambda: together.read(march(together, t), t)
+        samples, R_BF = formulations.gather(problems), np.array([problem.axes.R_BF for problem in problems])
+
+        def run() -> Block:
+            values = march(batches, t)[..., : len(problems)].transpose(2, 0, 1)
+            R_WB, w_WB_B, finite = to_body_axes(t, samples(values), R_BF)
+            return Block(R_WB, w_WB_B, finite == len(t))
+
+        return run
 
 
 def _begin(integrator: Any, problem: formulations.Formulation) -> None:
@@ -219,8 +226,7 @@ def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, str]:
     return states, steps, limit_reason(steps, 1.0) or f"heyoka: {outcome.name}"
 
 
-@dataclass(frozen=True, eq=False)
-class Batches:
+class Batches(NamedTuple):
     """Bodies of one form in the lanes of heyoka's batch integrators (heyoka's documentation, Batch mode).
 
     Attributes
@@ -229,37 +235,12 @@ class Batches:
         Integrators, and the number of bodies that each integrates at once.
     parameters, start
         Parameters (k, n) and initial states (m, n); n is a multiple of the width.
-    samples
-        Makes the states of all bodies out of their values.
-    R_BF
-        Rotations (n, 3, 3), axes of the equations to body axes; not padded.
     """
 
     integrators: forms.Integrators
     width: int
     parameters: Array
     start: Array
-    samples: Callable[[Array], States]
-    R_BF: Array
-
-    def read(self, states: Array, t: Array) -> Block:
-        """Return the samples of the bodies from states (samples, m, n) at times t."""
-        values = states[..., : len(self.R_BF)].transpose(2, 0, 1)
-        R_WB, w_WB_B, finite = to_body_axes(t, self.samples(values), self.R_BF)
-        return Block(R_WB, w_WB_B, finite == len(t))
-
-
-def _gather(problems: Sequence[formulations.Formulation], integrators: forms.Integrators, width: int) -> Batches:
-    """Return scenes of one form as batches."""
-    padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
-    return Batches(
-        integrators=integrators,
-        width=width,
-        parameters=np.array([problem.parameters for problem in padded]).T,
-        start=np.array([problem.start for problem in padded]).T,
-        samples=formulations.gather(problems),
-        R_BF=np.array([problem.axes.R_BF for problem in problems]),
-    )
 
 
 def _run_batches(batches: Batches, t: Array) -> Array:

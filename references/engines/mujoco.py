@@ -98,7 +98,12 @@ def prepare_many(bodies):
         states, callback = [start], _passive(mj, field) if field else nullcontext()
         with _quiet(mj, _ignore), callback, Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
             for n_steps in np.diff(given.steps).tolist():
-                states.append(_roll_on(pool, (models, datas), states[-1], n_steps, room))
+                state = states[-1]
+                while n_steps:  # in parts, because a rollout stores every step
+                    part = np.ascontiguousarray(room[:, :n_steps])
+                    pool.rollout(models, datas, state, nstep=part.shape[1], state=part)
+                    state, n_steps = part[:, -1].copy(), n_steps - part.shape[1]
+                states.append(state)
         states = np.stack(states, axis=1)
         # A rollout that fails keeps its state and its time.
         states[states[..., 0] < given.steps * given.dt * (1 - 1e-9)] = np.nan
@@ -108,19 +113,14 @@ def prepare_many(bodies):
     return run
 
 
-def _roll_on(pool, engine, state, n_steps, room):
-    """Return the states (n, size) after more steps, in parts, because a rollout stores every step."""
-    while n_steps:
-        part = np.ascontiguousarray(room[:, :n_steps])
-        pool.rollout(*engine, state, nstep=part.shape[1], state=part)
-        state, n_steps = part[:, -1].copy(), n_steps - part.shape[1]
-    return state
-
-
 def _model(mj, given):
+    integrator = getattr(mj.mjtIntegrator, f"mjINT_{given.integrator.upper()}", None)
+    if integrator is None:
+        has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
+        raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {given.integrator}, but {', '.join(has)}")
     spec = mj.MjSpec()
     spec.option.timestep = given.dt
-    spec.option.integrator = _integrator(mj, given.integrator)
+    spec.option.integrator = integrator
     spec.option.gravity = (0, 0, -given.gravity)
     field = pack_field(given)
     off = (*SWITCHED_OFF, *("GRAVITY",) * (given.gravity == 0), *PASSIVE * (not field.any()))
@@ -185,14 +185,6 @@ def _compile_callback(numeric, attitude, force, time):
         out[2] += t3
 
     return passive
-
-
-def _integrator(mj, name):
-    integrator = getattr(mj.mjtIntegrator, f"mjINT_{name.upper()}", None)
-    if integrator is None:
-        has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
-        raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {name}, but {', '.join(has)}")
-    return integrator
 
 
 def _start(mj, model, data, given):

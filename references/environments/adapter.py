@@ -26,7 +26,7 @@ from conservative.scene import Scene
 
 from ..engine import EngineRun, load, principal_axes, unsupported_reason, version
 from .environment import Distribution
-from .plain_numbers import FIELDS, EngineSamples, ManySamples, describe, take_axes
+from .plain_numbers import FIELDS, describe, read_many, read_one, take_axes
 
 
 @dataclass(frozen=True)
@@ -214,24 +214,23 @@ class LocalEngine(AdapterMethod):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Prepare the run. Raise `Unsupported` if this version does not support it."""
         axes = principal_axes(scene)
-        samples = EngineSamples(axes, grid, self.label)
         try:
             run = self._load().prepare(SimpleNamespace(**self.settings, **describe(axes, grid)))
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
-        return EngineRun(run, samples.trajectory)
+        return EngineRun(run, read_one(axes, grid, self.label))
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Prepare the run of many bodies; return None if the engine does not support it for these bodies."""
         axes = take_axes(bodies, grid, self.unsupported)
         if axes is None:
             return None
-        samples = ManySamples(axes, grid)
+        read = read_many(axes, grid)
         try:
             run = self._load().prepare_many([SimpleNamespace(**self.settings, **describe(each, grid)) for each in axes])
         except NotImplementedError:
             return None
-        return lambda: samples.trajectory(run())
+        return lambda: read(run())
 
     def _load(self) -> Any:
         load(self.data.module, self.data.package, self.family)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from time import perf_counter_ns
 from types import ModuleType, SimpleNamespace
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from conservative.batch import Batch
 from conservative.card import Maker
@@ -22,7 +22,7 @@ from ..engine import principal_axes
 from ..worker.client import Worker
 from .adapter import AdapterMethod, method_class
 from .environment import Environment, find_environment, worker_of
-from .plain_numbers import EngineSamples, ManySamples, describe, describe_many, take_axes
+from .plain_numbers import Answer, describe, describe_many, read_many, read_one, take_axes
 
 
 def engine_class(module: ModuleType) -> type[EngineMethod]:
@@ -62,14 +62,14 @@ class EngineMethod(AdapterMethod):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Prepare the run in the worker. Raise `Unsupported` if this version does not support it."""
         axes = principal_axes(scene)
-        samples = EngineSamples(axes, grid, self.label)
-        run = self._run(describe(axes, grid), samples)
+        read = read_one(axes, grid, self.label)
+        run = self._run(describe(axes, grid), read)
         try:
             run.prepare()
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
         except IntegrationFailed as failure:
-            return partial(samples.failure, failure)
+            return partial(read, failure)
         return run
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
@@ -77,46 +77,36 @@ class EngineMethod(AdapterMethod):
         axes = take_axes(bodies, grid, self.unsupported) if self in self.settings_for("many") else None
         if axes is None:
             return None
-        run = self._run(describe_many(axes, grid), ManySamples(axes, grid))
+        run = self._run(describe_many(axes, grid), read_many(axes, grid))
         try:
             run.prepare()
         except NotImplementedError:
             return None
         return run
 
-    def _run(self, numbers: Mapping[str, Any], samples: Reads[Result]) -> WorkerRun[Result]:
+    def _run(self, numbers: Mapping[str, Any], read: Callable[[Answer], Result]) -> WorkerRun[Result]:
         worker = worker_of(self.environment, self.precision)
         adapter = os.path.realpath(str(self.adapter.__file__))
-        return WorkerRun(worker, {"adapter": adapter, "settings": self.settings, **numbers}, samples)
+        return WorkerRun(worker, {"adapter": adapter, "settings": self.settings, **numbers}, read)
 
 
-Result = TypeVar("Result", covariant=True)
-
-
-class Reads(Protocol[Result]):
-    """Converts the answer of an engine into the result of a run."""
-
-    def trajectory(self, answer: Mapping[str, Any]) -> Result:
-        """Return the samples."""
-
-    def failure(self, failure: IntegrationFailed) -> Result:
-        """Return the result of a run whose engine failed."""
+Result = TypeVar("Result")
 
 
 class WorkerRun(Generic[Result]):
     """A run in a worker. `wall_time` excludes the communication with the worker."""
 
-    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Reads[Result]) -> None:
-        self._worker, self._given, self._samples = worker, given, samples
+    def __init__(self, worker: Worker, given: Mapping[str, Any], read: Callable[[Answer], Result]) -> None:
+        self._worker, self._given, self._read = worker, given, read
         self._number, self._start = 0, 0
         self._answer: Mapping[str, Any] = {}
 
     def __call__(self) -> Result:
         try:
             self._answer = self._ask("run")
-            return self._samples.trajectory(self._answer)
+            return self._read(self._answer)
         except IntegrationFailed as failure:
-            return self._samples.failure(failure)
+            return self._read(failure)
 
     @property
     def own_loop(self) -> SimpleNamespace:
@@ -135,7 +125,7 @@ class WorkerRun(Generic[Result]):
         inside = self.own_loop.wall_time(calls)
         start = perf_counter_ns()
         for _ in range(calls):
-            self._samples.trajectory(answer)
+            self._read(answer)
         return inside + (perf_counter_ns() - start) * 1e-9
 
     def prepare(self) -> None:

@@ -101,33 +101,31 @@ def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
     return States(kind, values.reshape(-1, *values.shape[-2:]), rates_in_world="w" not in answer)
 
 
-class ManySamples:
-    """Converts the answer of an engine for n bodies into a block of samples in body axes."""
-
-    def __init__(self, axes: Sequence[EngineAxes], grid: Grid) -> None:
-        self._R_BF, self._t = np.array([each.R_BF for each in axes]), grid.t
-
-    def trajectory(self, answer: Mapping[str, Any]) -> Block:
-        states = _read(answer, (len(self._R_BF), len(self._t)))
-        R_WB, w_WB_B, finite = to_body_axes(self._t, states, self._R_BF)
-        return Block(R_WB, w_WB_B, finite == len(self._t))
-
-    def failure(self, failure: IntegrationFailed) -> Block:
-        raise failure
+Answer = Mapping[str, Any] | IntegrationFailed
+"""The answer of an engine to a request for a run, or its failure."""
 
 
-class EngineSamples:
-    """Converts the answer of an engine into a trajectory in body axes."""
+def read_many(axes: Sequence[EngineAxes], grid: Grid) -> Callable[[Answer], Block]:
+    """Return a function that converts an answer for n bodies into samples in body axes; it raises a failure."""
+    R_BF = np.array([each.R_BF for each in axes])
 
-    def __init__(self, axes: EngineAxes, grid: Grid, label: str) -> None:
-        self.axes, self.grid, self.label = axes, grid, label
+    def read(answer: Answer) -> Block:
+        if isinstance(answer, IntegrationFailed):
+            raise answer
+        R_WB, w_WB_B, finite = to_body_axes(grid.t, _read(answer, (len(R_BF), grid.n_samples)), R_BF)
+        return Block(R_WB, w_WB_B, finite == grid.n_samples)
 
-    def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
-        states = _read(answer, (self.grid.n_samples,))
-        work = Counters(answer.get("steps", self.grid.n_steps), evaluations=answer.get("evaluations"))
-        return self.axes.trajectory(self.grid, self.label, states, work, answer.get("reason") or "the state is not finite")
+    return read
 
-    def failure(self, failure: IntegrationFailed) -> Trajectory:
-        """Return a trajectory without samples."""
-        nothing = np.empty((0, 3))
-        return Trajectory(self.axes.scene, np.empty(0), np.empty((0, 3, 3)), nothing, self.label, Counters(0), failure)
+
+def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Trajectory]:
+    """Return a function that converts an answer into a trajectory in body axes, which has no samples after a failure."""
+
+    def read(answer: Answer) -> Trajectory:
+        if isinstance(answer, IntegrationFailed):
+            return Trajectory(axes.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
+        work = Counters(answer.get("steps", grid.n_steps), evaluations=answer.get("evaluations"))
+        reason = answer.get("reason") or "the state is not finite"
+        return axes.trajectory(grid, label, _read(answer, (grid.n_samples,)), work, reason)
+
+    return read

@@ -113,7 +113,7 @@ def test_slope_of_a_line_with_noise_is_within_its_standard_error():
     t = np.linspace(0, 5, 400)
     noise = np.random.default_rng(3).standard_normal((200, 400))
     measured = [secular_slope(t, 0.2 * t + 0.01 * row) for row in noise]
-    off = np.array([(slope.value - 0.2) / slope.stderr for slope in measured])
+    off = np.array([(slope - 0.2) / stderr for slope, stderr in measured])
     assert 0.8 < off.std() < 1.2  # measured 1.06 over 200 draws
     assert abs(off.mean()) < 0.25  # measured -0.03
 
@@ -167,7 +167,7 @@ def test_three_samples_have_a_slope_and_two_have_none():
     bent = np.array([0.0, 2.0, 1.0])
     alone, turned = secular_slope(t, bent), secular_slope(t, np.outer(bent, [0.6, 0.0, 0.8]))
     assert turned == pytest.approx(alone)
-    assert alone.stderr > 0.1
+    assert alone[1] > 0.1
 
 
 def test_at_rest_rates_have_a_scale():

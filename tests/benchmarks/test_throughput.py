@@ -151,7 +151,7 @@ class OursFails(Fails):
 
 def test_ways_have_the_same_results():
     bodies, grid = draw("free_bodies", 3), Grid(0.1, 4, 2)
-    results = [many_runs.prepare_blocks(way, bodies, grid)().R_WB for way in many_runs.list_ways(Ours("RK4"))]
+    results = [many_runs.RunBlocks(way, bodies, grid)().R_WB for way in many_runs.list_ways(Ours("RK4"))]
     assert len(results) == 3
     assert np.abs(results[0] - results[1]).max() < 1e-14  # measured 4e-16
     assert np.array_equal(results[0], results[2])

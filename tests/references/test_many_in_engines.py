@@ -10,7 +10,7 @@ from conservative.grid import Grid
 from conservative.potentials.point_to_point import PointAttraction
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka, mujoco
-from conservative.references.environments.plain_numbers import ManySamples, describe_many
+from conservative.references.environments.plain_numbers import describe_many, read_many
 from conservative.references.heyoka_equations import formulations
 from conservative.references.worker.program import Runs
 
@@ -82,7 +82,7 @@ def test_a_worker_receives_many_bodies():
     runs = Runs()
     numbers = describe_many(axes, GRID)
     number = runs.prepare(mujoco.__file__, {"integrator": "RK4", "threads": 1}, **numbers)["run"]
-    block = ManySamples(axes, GRID).trajectory(runs.run(number))
+    block = read_many(axes, GRID)(runs.run(number))
     assert differences(block, registry.method("mujoco:RK4"), TOPS).max() < 1e-14  # measured 9e-16
 
 

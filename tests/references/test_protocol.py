@@ -17,7 +17,7 @@ from conservative.grid import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.engine import principal_axes
 from conservative.references.environments.engine_method import WorkerRun
-from conservative.references.environments.plain_numbers import EngineSamples, describe
+from conservative.references.environments.plain_numbers import describe, read_one
 from conservative.references.worker import program
 from conservative.references.worker.calls import python_worker
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, Worker
@@ -47,7 +47,7 @@ def start():
 
 def run_of(worker, dt, scene=BRICK, **settings):
     grid, axes = grid_for(scene, dt), principal_axes(scene)
-    return WorkerRun(worker, {"adapter": "", "settings": settings, **describe(axes, grid)}, EngineSamples(axes, grid, "theirs"))
+    return WorkerRun(worker, {"adapter": "", "settings": settings, **describe(axes, grid)}, read_one(axes, grid, "theirs"))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
