@@ -7,7 +7,6 @@ import subprocess
 import sys
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from conservative.benchmarks.measures import measurement
@@ -50,31 +49,29 @@ def test_small_numbers(value, text):
     assert load("__main__").small(value) == text
 
 
-def timed(series, error, time, method=None, dt=0.1):
-    """Return the two rows of a timed setting; `time` in s per simulated second."""
-    common = {"series": series, "method": method or series, "dt": dt, "outcome": "ok"}
-    return [
-        common | {"measure": "attitude error max", "value": error},
-        common | {"measure": "time per simulated second", "value": time},
-    ]
-
-
-def test_the_fastest_setting_at_an_error_is_found_between_its_points():
-    rows = [
-        *timed("a", 1e-4, 1e-6, dt=0.2),
-        *timed("a", 1e-8, 1e-4, dt=0.1),
-        *timed("b", 1e-7, 3e-5),
-        *timed("c", 1e-5, 1e-7),  # does not reach the error
-    ]
-    time, name = load("measure").fastest(pd.DataFrame(rows), 1e-6)
-    assert name == "a"
-    assert time == pytest.approx(1e-5)
-    assert load("measure").fastest(pd.DataFrame(rows), 1e-10) == (float("inf"), "")
-
-
-def test_the_time_of_several_processes_is_their_geometric_mean():
-    rows = timed("a", 1e-7, 1e-6) + timed("a", 1e-7, 4e-6)[1:]
-    assert load("measure").fastest(pd.DataFrame(rows), 1e-6) == (pytest.approx(2e-6), "a")
+def test_the_fastest_setting_of_a_family_and_the_ratio_have_the_times_of_all_processes():
+    rows = []
+    for name, family, role, errors, times in (
+        ("taylor:order=8", "taylor", "ours", (1e-4, 1e-8), (1e-6, 1e-4)),
+        ("taylor:order=12", "taylor", "ours", (1e-5, 1e-7), (1e-7, 2e-5)),
+        ("heyoka", "heyoka", "engine", (1e-5, 1e-7), (1e-5, 4e-5)),
+        ("scipy", "scipy", "engine", (1e-3, 1e-5), (1e-6, 1e-5)),  # does not reach the error
+    ):
+        for dt, error, time in zip((0.2, 0.1), errors, times, strict=True):
+            common = {"scene": "brick_flip", "role": role, "dt": dt, "family": family}
+            rows.append(row("work_precision", name, "attitude error max", error, **common))
+            for process, noise in enumerate((1.0, 1.21)):
+                spent = time * (noise if role == "ours" else 1.0)
+                rows.append(row("work_precision", name, "time per simulated second", spent, **common, process=process))
+    measure = load("measure")
+    timed = measure.points(measure.with_names(measurement.frame(rows)))
+    found = {(each["name"], each["quantity"]): each["value"] for each in measure._time_rows(timed, "brick_flip")}
+    assert found["heyoka", "time"] == pytest.approx(20)
+    assert found["ours", "time"] == pytest.approx(1.1 * 1e6 * (1e-7 * 2e-5) ** 0.5)  # between its points; the mean of processes
+    assert found["SciPy", "time"] == float("inf")
+    mean, low, high = (found["ours", f"heyoka's time over ours{end}"] for end in ("", ", low", ", high"))
+    assert mean == pytest.approx(found["heyoka", "time"] / found["ours", "time"])
+    assert low < mean < high
 
 
 def study(bodies, processes=5):
@@ -117,5 +114,6 @@ def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
     monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
     text = " ".join(program.render().split())
     assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
-    assert "2 random bodies in each of 1 fields (spring), at 11 attitude errors" in text
-    assert "in none of these 22 cases, and 11 are open" in text
+    assert "Of these 22 cases, heyoka is faster beyond the interval" in text
+    assert "in none; 11 are open" in text
+    assert program.render_table().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")

@@ -1,4 +1,4 @@
-"""The rows of measured.csv and the picture, from a report and from a study of random bodies."""
+"""The rows of measured.csv and the picture, from a report, a study of times and a study of random bodies."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Ratios, cost
+from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
 from conservative.reports.rows.names import with_names
+from conservative.reports.rows.points import points
 from conservative.reports.sections.random_bodies import ANY, ratios
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
@@ -21,15 +22,22 @@ GENERAL = "taylor:order=12"
 ENGINES = {"heyoka": "heyoka", "SciPy": "scipy", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
+TIMES = (
+    "conservative study work_precision --scenes brick_flip,lagrange_top"
+    " --methods taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
+)
 RANDOM = "conservative study random --bodies 20 --seed 1002 --methods gauss,projected,taylor,heyoka"
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
 
 
-def scene_rows(report: Path) -> Iterator[dict[str, Any]]:
+def scene_rows(report: Path, times: Path) -> Iterator[dict[str, Any]]:
     """Yield the rows of the paper's two scenes, as dictionaries with the keys `COLUMNS`."""
-    table = _read(report / "measurements.csv")
-    common = {"command": "conservative report", "date": _date(report / "measurements.csv")}
-    yield from (common | row for scene in CLOSED_FORMS for row in _scene(table[table["scene"] == scene], scene))
+    table, timed = _read(report / "measurements.csv"), points(with_names(_read(times / "study.csv")))
+    for scene in CLOSED_FORMS:
+        for row in _run_rows(table[table["scene"] == scene], scene):
+            yield row | {"command": "conservative report", "date": _date(report / "measurements.csv")}
+        for row in _time_rows(timed[timed["scene"] == scene], scene):
+            yield row | {"command": TIMES, "date": _date(times / "study.csv")}
 
 
 def random_rows(random: Path) -> Iterator[dict[str, Any]]:
@@ -39,23 +47,32 @@ def random_rows(random: Path) -> Iterator[dict[str, Any]]:
     yield from (common | row for row in _random(bodies))
 
 
-def _scene(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
-    """Yield drift, error and time of each row of README's table, and the error of the paper's integrator.
-
-    Drift and error are those of one run at the scene's own step. The time is that of the fastest setting of the
-    same family that reaches `ERROR`.
-    """
+def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
+    """Yield drift and error of one run at the scene's own step: of each row of README's table, and of `Reduced`."""
     paper = table[(table["study"] == "paper") & (table["dt"] == table[table["study"] == "paper"]["dt"].max())]
-    timed = table[table["study"] == "work_precision"]
-    for name, method in {"ours": GENERAL, "closed form": CLOSED_FORMS[scene], **ENGINES}.items():
+    for name, method in {"ours": GENERAL, "closed form": CLOSED_FORMS[scene], **ENGINES, "reduced": "reduced"}.items():
         run = paper[paper["method"] == method]
         common = {"scene": scene, "name": name, "version": run["version"].iloc[0], "method": method}
         yield common | {"quantity": "drift", "unit": "1", "value": run[run["measure"] == "drift max"]["value"].max()}
         yield common | {"quantity": "error", "unit": "rad", "value": _error(run)}
-        time, setting = fastest(timed[timed["family"] == run["family"].iloc[0]], ERROR)
-        yield common | {"quantity": "time", "unit": "us per s", "value": 1e6 * time, "method": setting}
-    common = {"scene": scene, "name": "reduced", "method": "reduced", "version": ""}
-    yield common | {"quantity": "error", "unit": "rad", "value": _error(paper[paper["method"] == "reduced"])}
+
+
+def _time_rows(timed: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
+    """Yield the time of the fastest setting of each family that reaches `ERROR`, and heyoka's time over ours."""
+    reached, common = costs(timed, [ERROR]), {"scene": scene, "version": ""}
+    families = {"ours": GENERAL.partition(":")[0], "closed form": CLOSED_FORMS[scene], **ENGINES}
+    fastest = {name: cheapest(reached[reached["family"] == family]) for name, family in families.items()}
+    for name, each in fastest.items():
+        time, method = (1e6 * each.time, each.name) if each else (math.inf, "")
+        yield common | {"name": name, "quantity": "time", "unit": "us per s", "value": time, "method": method}
+    for name in ("ours", "closed form"):
+        yield from _ratio_rows(common | {"name": name}, Contest(scene, ERROR, fastest[name], fastest["heyoka"]))
+
+
+def _ratio_rows(place: dict[str, Any], each: Contest | Ratios) -> Iterator[dict[str, Any]]:
+    """Yield heyoka's time over ours and the ends of its interval."""
+    for quantity, value in zip(("", ", low", ", high"), (each.ratio, *each.interval), strict=True):
+        yield place | {"quantity": f"heyoka's time over ours{quantity}", "value": value, "unit": "1", "method": ""}
 
 
 def _error(run: pd.DataFrame) -> float:
@@ -70,29 +87,11 @@ def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
     common = {"name": "random bodies", "unit": "1", "method": "", "version": ""}
     found = [each for each in ratios(with_names(table)) if each.engine == ANY]
     for each in found:
-        place = common | {"scene": f"{each.field} {each.error:g} rad"}
-        for quantity, value in zip(("", ", low", ", high"), (each.ratio, *each.interval), strict=True):
-            yield place | {"quantity": f"heyoka's time over ours{quantity}", "value": value}
+        yield from _ratio_rows(common | {"scene": f"{each.field} {each.error:g} rad"}, each)
     every = Ratios(tuple(contest for each in found for contest in each.contests))
     counts = {"cases": len(every.contests), "cases won": every.won, "cases open": every.open, "cases lost": every.lost}
     for quantity, count in ({"bodies in each field": len(found[0].contests)} | counts).items():
         yield common | {"scene": "all fields", "quantity": quantity, "value": count}
-
-
-def fastest(rows: pd.DataFrame, error: float) -> tuple[float, str]:
-    """Return the time, s per simulated second, of the fastest series of settings at an error, and its name; else inf and ''."""
-    measures = ["attitude error max", "time per simulated second"]
-    kept = rows[rows["measure"].isin(measures) & (rows["outcome"] == "ok")]
-    # Several processes may have measured the time: the geometric mean counts.
-    points = kept.groupby(["series", "method", "dt", "measure"], sort=False)["value"].agg(_geometric_mean)
-    points = points.unstack(sort=False).reindex(columns=measures)
-    points = points.dropna(subset=measures[0])
-    found = [(cost(*(line[name].tolist() for name in measures), error), name) for name, line in points.groupby("series")]
-    return min((entry for entry in found if not math.isnan(entry[0])), default=(math.inf, ""))
-
-
-def _geometric_mean(values: pd.Series) -> float:
-    return float(values.iloc[0]) if len(values) == 1 else math.exp(sum(map(math.log, values)) / len(values))
 
 
 def _read(path: Path) -> pd.DataFrame:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..card import Card, Structure
 from ..deferred_imports import kernels
+from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
 from ..scene import Scene
@@ -121,6 +123,15 @@ class Rattle(Splitting):
 
     family: ClassVar[str] = "rattle"
     kind: ClassVar[str] = "ENDS"
+
+    def longest_step(self, scene: Scene) -> float:
+        speed = float(np.linalg.norm(scene.w_WB_B0))
+        return 0.99 / speed if speed > 0 else math.inf  # c of a steady spin has no solution beyond 1 rad
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        if grid.dt > (longest := self.longest_step(scene)):
+            raise BadInput("dt", f"{grid.dt:g}", f"a step of less than 1 rad at the initial rate: at most {longest:.6g} s")
+        return super().prepare(scene, grid)
 
 
 @dataclass(frozen=True)
