@@ -17,7 +17,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     short_help="Measure the paper's two scenes and write a report.",
     epilog=epilog(
         "conservative report",
-        "conservative report --full                   everything, in about five minutes",
+        "conservative report --full                   everything",
         "conservative report --quick --out quick_report",
         "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
         "conservative report --engines all --methods reduced",
