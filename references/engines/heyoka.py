@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -226,7 +226,8 @@ def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, str]:
     return states, steps, limit_reason(steps, 1.0) or f"heyoka: {outcome.name}"
 
 
-class Batches(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Batches:
     """Bodies of one form in the lanes of heyoka's batch integrators (heyoka's documentation, Batch mode).
 
     Attributes
