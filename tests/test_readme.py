@@ -74,6 +74,19 @@ def test_the_fastest_setting_of_a_family_and_the_ratio_have_the_times_of_all_pro
     assert low < mean < high
 
 
+def test_the_picture_has_the_chosen_methods_of_the_top(tmp_path):
+    rows = []
+    for name, role in (("taylor:order=12", "ours"), ("mujoco", "engine"), ("gauss", "ours")):
+        for dt, error in ((0.02, 1e-3), (0.01, 1e-6)):
+            common = {"scene": "lagrange_top", "role": role, "dt": dt}
+            rows.append(row("work_precision", name, "attitude error max", error, **common))
+            rows.append(row("work_precision", name, "time per simulated second", 1e-6 / dt, **common))
+    measurement.frame(rows).to_csv(tmp_path / "measurements.csv", index=False)
+    load("measure").draw(tmp_path, tmp_path / "picture.svg")
+    picture = (tmp_path / "picture.svg").read_text(encoding="utf-8")
+    assert [name in picture for name in ("taylor", "mujoco", "gauss")] == [True, True, False]
+
+
 def study(bodies, processes=5):
     """Return the rows of a study on a spring; each body is a pair of times of both sides, s, or None for a side that misses."""
     rows = []

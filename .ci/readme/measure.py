@@ -107,11 +107,10 @@ def draw(report: Path, picture: Path) -> None:
     """Draw time against error on the Lagrange top, for a few methods of a report; `picture` ends in .svg."""
     from conservative.reports.charts import figures
     from conservative.reports.report import save_picture
-    from conservative.reports.rows.names import with_names, without_solutions
+    from conservative.reports.rows.names import MethodClass
     from conservative.reports.rows.points import front
-    from conservative.reports.rows.points import points as points_of
 
     table = _read(report / "measurements.csv")
-    few = table[(table["scene"] == "lagrange_top") & table["series"].isin(PICTURED)]
-    points = points_of(with_names(few))
-    save_picture(figures.work_precision(points, front(without_solutions(points)), "lagrange_top"), picture, png=False)
+    few = points(with_names(table[(table["scene"] == "lagrange_top") & table["series"].isin(PICTURED)]))
+    best = front(few[few["class"] != MethodClass.SOLUTION])
+    save_picture(figures.work_precision(few, best, "lagrange_top"), picture, png=False)
