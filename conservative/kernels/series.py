@@ -156,7 +156,7 @@ class Vectors:
         return self._parts[2 * k], self._parts[2 * k + 1]
 
     def locate(self):
-        """Return what `recall` needs: for one body, the address of the first r of order 1 and the bytes of an order."""
+        """Return the argument of `recall`: for one body, the address of the first r of order 1 and the bytes of an order."""
         memory, places = self._series.memory, self._parts[0].places
         if not self._series.one_body:
             return self if memory is None else 0
