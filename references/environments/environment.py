@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -48,12 +48,15 @@ class Distribution:
         Requirements other than NumPy, such as `numpy<2`.
     oldest
         Oldest version that is installed unless another one is named.
+    kind
+        Kind of its environments, a key of `COMMANDS`.
     """
 
     package: str
     module: str
     requirements: tuple[str, ...] = ()
     oldest: str = ""
+    kind: str = "python"
 
 
 def distribution_of(engine: str) -> Distribution:
@@ -89,6 +92,8 @@ class Environment:
         Version of its Python.
     packages
         All installed packages, as `name==version`.
+    kind
+        A key of `COMMANDS`.
     """
 
     engine: str
@@ -96,6 +101,7 @@ class Environment:
     folder: Path
     python: str
     packages: tuple[str, ...]
+    kind: str = "python"
 
     @property
     def is_build(self) -> bool:
@@ -105,7 +111,7 @@ class Environment:
     @property
     def command(self) -> tuple[str | Path, ...]:
         """Command line of the program that runs the engine."""
-        return interpreter_of(self.folder), "-I", program.__file__
+        return COMMANDS[self.kind](self.folder)
 
     def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = 0) -> Worker:
         """Return a new worker with its own home directory, where engines keep compiled code, and three quarters of the memory.
@@ -129,6 +135,10 @@ class Environment:
         write_text(self.folder / RECORD, json.dumps(record, indent=2), "engines")
 
 
+COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
+    "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
+}
+"""Kinds of environments, and the command line of the program that runs the engine in a folder of each kind."""
 _workers: dict[tuple[Path, str, int], Worker] = {}
 
 
@@ -181,7 +191,8 @@ def read_environment(folder: Path) -> Environment | None:
     """Return the environment in a folder; None if there is no complete one."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        environment = Environment(record["engine"], record["version"], folder, record["python"], tuple(record["packages"]))
+        fixed = {"folder": folder, "packages": tuple(record["packages"])}
+        environment = Environment(**{**record, **fixed})
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return environment if (environment.engine, environment.version) == (folder.parent.name, folder.name) else None
