@@ -129,7 +129,7 @@ def _turn(field: TorqueExpression) -> TorqueExpression:
 class Precise(Method):
     """Quaternion and body rates integrated by heyoka in multi-precision; dt is only the sampling interval.
 
-    The initial state is taken as exact numbers, and samples are rounded to double. `states` returns them unrounded.
+    The initial state is taken as exact numbers, and samples are rounded to double.
 
     Parameters
     ----------
@@ -152,7 +152,9 @@ class Precise(Method):
     card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True)
 
     def __post_init__(self) -> None:
-        _check_bits(self.bits)
+        allowed = "an integer from 53 (double precision) to 4096"
+        if not 53 <= positive_integer("bits", self.bits, allowed) <= 4096:
+            raise BadInput("bits", describe(self.bits), allowed)
         version("heyoka", "heyoka")
 
     @property
@@ -188,59 +190,6 @@ class Precise(Method):
         return run
 
 
-def states(
-    inertia: Sequence[Any],
-    q0: Sequence[Number],
-    w0: Sequence[Number],
-    t: Sequence[Number],
-    moment_B: Sequence[Number] | None = None,
-    bits: int = 256,
-) -> tuple[list[list[mpmath.mpf]], list[list[mpmath.mpf]]]:
-    """Return quaternions and body rates at given times, as multi-precision numbers.
-
-    Parameters
-    ----------
-    inertia
-        Moments (3,) or tensor (3, 3), kg m^2, body axes. Every number can be a float (taken as exact), an
-        `mpmath.mpf` or a text.
-    q0
-        Attitude at t = 0, body to world: quaternion (4,), scalar first; normalised here.
-    w0
-        Rates at t = 0 (3,), rad/s, body axes.
-    t
-        Increasing times (n,), s, not negative.
-    moment_B
-        Weight times centre of mass (3,), N m, body axes; gravity points along the world's -z. None for a free body.
-    bits
-        Precision, 53 to 4096.
-
-    Returns
-    -------
-    q
-        Quaternions (n, 4), scalar first, body to world.
-    w
-        Rates (n, 3), rad/s, body axes.
-
-    Raises
-    ------
-    BadInput
-        bits is out of range.
-    """
-    _check_bits(bits)
-    field = None if moment_B is None else FIELDS[UniformGravity]
-    solve = _solver(inertia, q0, w0, field, () if moment_B is None else moment_B, bits)
-    _, _, reals = solve(_reals([0, *t], bits), None)
-    with _digits(bits) as mp:
-        rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in reals[1:]]
-    return [row[:4] for row in rows], [row[4:] for row in rows]
-
-
-def _check_bits(bits: object) -> None:
-    allowed = "an integer from 53 (double precision) to 4096"
-    if not 53 <= positive_integer("bits", bits, allowed) <= 4096:
-        raise BadInput("bits", describe(bits), allowed)
-
-
 @dataclass(frozen=True)
 class QuaternionEquations:
     """The equations q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w); parameters J (9), J^-1 (9) and the field's."""
@@ -274,14 +223,10 @@ def _solver(
     With a scene, a run that would exceed the limit of steps is not started.
     """
     with _digits(bits + 32) as mp:
-        if np.ndim(inertia) == 1:
-            J = mp.diag([_mpf(mp, x) for x in inertia])
-        else:
-            J = mp.matrix([[_mpf(mp, x) for x in row] for row in inertia])
-        quaternion = [_mpf(mp, x) for x in q0]
+        J, quaternion = mp.matrix(inertia), [mp.mpf(x) for x in q0]
         norm = mp.sqrt(mp.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
-        form, used = forms.form_of(QuaternionEquations(field), [*J, *J**-1, *(_mpf(mp, x) for x in values)])
+        form, used = forms.form_of(QuaternionEquations(field), [*J, *J**-1, *map(mp.mpf, values)])
         parameters = _reals(used, bits)
     integrators = _compile(form, bits)
 
@@ -311,17 +256,13 @@ def _digits(bits: int) -> Iterator[Any]:
         yield _mp
 
 
-def _mpf(mp: Any, x: Number) -> Any:
-    return mp.mpf(float(x) if isinstance(x, np.floating) else x)
-
-
 def _real(x: Number, bits: int) -> Any:
     """Return a number as `heyoka.real`: floats and integers exactly, others from their digits."""
     hy = forms.heyoka()
     if isinstance(x, float | int):
         return hy.real(x, bits)
     with _digits(bits + 32) as mp:
-        return hy.real(mp.nstr(_mpf(mp, x), math.ceil(bits * 0.30103) + 5), bits)
+        return hy.real(mp.nstr(mp.mpf(x), math.ceil(bits * 0.30103) + 5), bits)
 
 
 def _reals(values: Sequence[Number], bits: int) -> Reals:

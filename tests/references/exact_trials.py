@@ -6,6 +6,7 @@ symmetric in random axes is not quite symmetric in doubles.
 
 from dataclasses import dataclass, replace
 
+import mpmath
 import numpy as np
 
 import conservative as cv
@@ -19,6 +20,20 @@ FREE_BOUND, TOP_BOUND = 1e-13, 1e-12  # claimed at any time: attitudes, rad, and
 # Of the integration, and of one near a separatrix. The motions are integrable: a distance d from the separatrix costs the
 # digits of 1/d^2 once, not at every reversal.
 BITS, NEAR_BITS = 128, 192
+
+
+def states_in_digits(inertia, q0, w0, t, moment_B=None, bits=256):
+    """Return quaternions and body rates at times (n,) as multi-precision numbers.
+
+    Numbers are floats (exact), `mpmath.mpf` or texts; moments are (3,) or (3, 3), the moment of the weight is (3,) N m.
+    """
+    diagonal = [[x if i == j else 0 for j in range(3)] for i, x in enumerate(inertia)]
+    field = None if moment_B is None else precise.FIELDS[cv.UniformGravity]
+    solve = precise._solver(inertia if np.ndim(inertia) == 2 else diagonal, q0, w0, field, moment_B or (), bits)
+    _, _, reals = solve(precise._reals([0, *t], bits), None)
+    with precise._digits(bits) as mp:
+        rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in reals[1:]]
+    return [row[:4] for row in rows], [row[4:] for row in rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +55,7 @@ class Trial:
     def integrate(self):
         moment = None if self.potential is None else self.potential.moment_B.tolist()
         q0, w0 = to_quaternion(self.R_WB0).tolist(), self.w_WB_B0.tolist()
-        q, w = precise.states(self.body.inertia.tolist(), q0, w0, self.t.tolist(), moment, self.bits)
+        q, w = states_in_digits(self.body.inertia.tolist(), q0, w0, self.t.tolist(), moment, self.bits)
         return from_quaternion(np.array(q, dtype=float)), np.array(w, dtype=float)
 
     def errors(self):

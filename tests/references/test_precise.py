@@ -10,9 +10,10 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.grid import Grid
-from conservative.references import precise
 from conservative.references.engines.scipy import SciPy
 from conservative.references.precise import Precise
+
+from .exact_trials import states_in_digits
 
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
 
@@ -26,7 +27,7 @@ def moment_of(case):
 def test_thirty_digits_of_every_reference_state(name):
     case = CASES[name]
     times = [state["t"] for state in case["states"]]
-    q, w = precise.states(case["J"], case["q0"], case["w0"], times, moment_of(case), bits=208)
+    q, w = states_in_digits(case["J"], case["q0"], case["w0"], times, moment_of(case), bits=208)
     with mpmath.workprec(208):
         for state, row in zip(case["states"], zip(q, w, strict=True), strict=True):
             expected, computed = state["q"] + state["w"], [*row[0], *row[1]]
@@ -51,8 +52,8 @@ def test_inertia_with_off_diagonal_terms_in_many_digits(heavy):
         J = B * mpmath.diag([1, 2, mpmath.mpf("2.5")]) * B
         w = B * mpmath.matrix(["0.3", "-0.4", "1.1"])
         m = B * mpmath.matrix(["0.1", "0.7", "-0.2"])
-        q, v = precise.states(J.tolist(), [0, -s, -s, -s], list(w), ["1.5"], list(m), bits=160)
-        q_P, v_P = precise.states(
+        q, v = states_in_digits(J.tolist(), [0, -s, -s, -s], list(w), ["1.5"], list(m), bits=160)
+        q_P, v_P = states_in_digits(
             [1, 2, "2.5"], [1, 0, 0, 0], ["0.3", "-0.4", "1.1"], ["1.5"], ["0.1", "0.7", "-0.2"], bits=160
         )
         assert max(abs(x - y) for x, y in zip(B * mpmath.matrix(v[0]), v_P[0], strict=True)) < mpmath.mpf(

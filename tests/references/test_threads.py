@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.references import precise
 from conservative.references.engines.catalogue import MuJoCo
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.exact.method import Exact
 from conservative.references.heyoka_equations import forms, formulations
 from conservative.references.precise import Precise
+
+from .exact_trials import states_in_digits
 
 pytestmark = pytest.mark.slow
 
@@ -58,7 +59,7 @@ def test_preparing_in_threads_and_precisions():
 
 def test_states_in_threads_have_all_their_digits():
     def rows(bits):
-        q, w = precise.states((1, 2, "2.5"), (1, 0, 0, 0), ("0.1", "0.2", "1.7"), ["0.5", "1.5"], bits=bits)
+        q, w = states_in_digits((1, 2, "2.5"), (1, 0, 0, 0), ("0.1", "0.2", "1.7"), ["0.5", "1.5"], bits=bits)
         return [mpmath.nstr(x, 40) for row in (*q, *w) for x in row]
 
     wanted = [80, 150, 300, 200] * 3
