@@ -96,12 +96,13 @@ class Method(ABC):
         return frozenset()
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        """Return the limits on orthonormality, and on the drift of the invariants in `conserves`, for the outcome ok.
+        """Return the limits on the drift of the invariants in `conserves`, on orthonormality, and on the drift of the energy.
 
-        The defaults, 0.001 and 0.1, are meant for engines with loose tolerances. Methods that conserve something should
-        return tighter limits.
+        The defaults of the first two, 0.001 and 0.1, are meant for engines with loose tolerances. Methods that conserve
+        something should return tighter limits. An energy that is wrong by more than its reference scale ends a run. Engines
+        have no such limit, because comparisons show their drift.
         """
-        return Bounds(drift=1e-3, orthonormality=0.1)
+        return Bounds(drift=1e-3, orthonormality=0.1, energy=math.inf if self.role == Role.ENGINE else 1.0)
 
     @_refuse_time
     def unsupported(self, scene: Scene) -> str | None:
@@ -144,7 +145,7 @@ class Method(ABC):
         if mistake is None and result.failure is None and self.card.kernel:
             reference = scene.derive(scene_reference, conserved)
             drifts = reference.measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
-            if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift:
+            if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift and drifts[1] <= bounds.energy:
                 return result
         mistake = mistake or find_misplaced(result, grid)
         if mistake is None:

@@ -137,11 +137,13 @@ class Bounds(NamedTuple):
     """Limits for every sample of a run with the outcome ok, dimensionless.
 
     `drift` limits the drift of the invariants that a method conserves, relative to their scales. `orthonormality` limits the
-    largest component of |R'R - 1|.
+    largest component of |R'R - 1|. `energy` limits the drift of the energy, or of the Jacobi integral in a turning field, for
+    methods that do not conserve it: a run beyond it has diverged.
     """
 
     drift: float
     orthonormality: float
+    energy: float = 1.0
 
 
 def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
@@ -191,10 +193,15 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
         quantities = [("orthonormality", orthonormality(result.R_WB), bounds.orthonormality)]
         for invariant, size in invariants.kept_sizes(result.scene, conserved).items():
             quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / size), bounds.drift))
+        if (energy := invariants.find_energy(result.scene.invariants)) is not None:
+            quantities.append((energy.name, sizes(result.drift(energy)), bounds.energy))
     n, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
     if n == len(result):
         return result
-    return _cut(result, n, NotConserved(float(result.t[max(n - 1, 0)]), name, float(values.max()), bound))
+    time, drift = float(result.t[max(n - 1, 0)]), float(values.max())
+    if name in {"orthonormality", *conserved}:
+        return _cut(result, n, NotConserved(time, name, drift, bound))
+    return _cut(result, n, Diverged(time, f"the drift of {name} is {drift:.3g}, the bound {bound:.3g}"))
 
 
 def _count_within(values: Array, bound: float) -> int:

@@ -4,8 +4,8 @@
 intervals cost more: a method with a step size takes one or more steps per interval, and a method with a tolerance interpolates
 within its longer steps.
 
-* The setting of a method is the coarsest whose largest attitude error over all samples is at most `ERROR`. A method without
-  such a setting has errors and no time.
+* The setting of a method is the coarsest that is credited (see `contest`) with an attitude error over all samples of at most
+  `ERROR`: a finer setting with a larger error disqualifies it. A method without such a setting has errors and no time.
 * It is timed twice, interleaved with all others: with all samples stored as attitude matrices and rates, and with the final
   state only, as in all other studies. For an engine the first includes the conversion of its states, which one compiled loop
   does for all engines in 10 to 40 ns per sample; the engine's own loop is timed as well, without it.
@@ -23,11 +23,12 @@ from conservative.outcome import Outcome
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..contest import credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from .case import Case
-from .line import list_settings, measure_line
+from .line import LinePoint, list_settings, measure_line
 from .speed import Runs, keep_end, time_runs
 from .study import Progress, Study
 
@@ -39,7 +40,7 @@ TOLERANCES = tuple(10.0**-k for k in range(4, 13))
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield the errors of every method up to the setting that reaches `ERROR`, and both times of that setting."""
+    """Yield the errors of the settings of every method, and both times of the coarsest that is credited with `ERROR`."""
     tell = study.count(progress, len(study.lines) + 1)
     with Processes(study.processes) as processes:
         for scene in study.scenes:
@@ -56,15 +57,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
-    """Yield the errors of a method's settings, coarse to fine; return the first that reaches `ERROR`, or an empty list."""
+    """Yield the errors of a method's settings; return the coarsest that is credited with `ERROR`, or an empty list."""
     grid = grid_for(scene, scene.dt)
     grids, tolerances = [Grid(grid.dt / k, grid.n_steps * k, k) for k in STEPS], TOLERANCES[:: 2 if study.quick else 1]
     settings = list_settings(Case(study.name, scene, method, grid), grids, tolerances)
+    line: list[LinePoint] = []
     for point in measure_line(study, settings, truth, [Measure.ATTITUDE_MAX]):
         yield from point.rows()
-        if point.errors[Measure.ATTITUDE_MAX] <= ERROR:
-            return [point.case]
-    return []
+        if point.outcome.ok:
+            line.append(point)
+    first = first_within(credit([point.errors[Measure.ATTITUDE_MAX] for point in line]), ERROR)
+    return [] if first is None else [line[first].case]
 
 
 def time_chosen(study: Study, chosen: Iterable[Case], processes: Processes) -> Iterator[Measurement]:

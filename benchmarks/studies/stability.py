@@ -23,13 +23,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from conservative.attitude import Array, angle_between
-from conservative.errors import Diverged
 from conservative.grid import Grid
-from conservative.invariants import find_energy
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
+from conservative.trajectory import Bounds, Trajectory, cut_at_failure
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
@@ -94,7 +92,8 @@ def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: 
         if isinstance(done, Outcome):
             outcome = done
         else:
-            outcome = detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, R_WB, size) or OK
+            kept = cut_at_failure(done.trajectory, frozenset(), Bounds(math.inf, math.inf))  # engines may lose their energy
+            outcome = (detect_wrong_branch(kept, R_WB, size) or OK) if kept.ok else kept.outcome
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
             break
@@ -104,16 +103,6 @@ def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: 
         case.row(Value(Measure.FAILING_STEP, fails), outcome, "every step works" if outcome.ok else ""),
     ]
     return [drop_step(row) for row in rows]
-
-
-def detect_divergence(trajectory: Trajectory) -> Outcome | None:
-    """Return the outcome of a run whose energy or Jacobi integral drifts by more than its reference scale, otherwise None."""
-    energy = find_energy(trajectory.scene.invariants)
-    if energy is None:
-        return None
-    with np.errstate(over="ignore", invalid="ignore"):
-        off = ~(np.abs(trajectory.drift(energy)) <= 1.0)
-    return Diverged(float(trajectory.t[int(np.argmax(off))]), energy.name).outcome if off.any() else None
 
 
 def detect_wrong_branch(trajectory: Trajectory, R_WB: Array, size: int) -> Outcome | None:

@@ -108,7 +108,8 @@ def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> 
 
     def are_within(i: int, part: Any) -> Any:
         bounds = method.bounds(bodies.take(i), grid)
-        return (measured[part, 4] <= bounds.drift) & (measured[part, 0] <= bounds.orthonormality)
+        skew, energy, conserved = measured[part, 0], measured[part, 1], measured[part, 4]
+        return (conserved <= bounds.drift) & (skew <= bounds.orthonormality) & (energy <= bounds.energy)
 
     if bodies.inertia is None:
         return are_within(0, slice(None))

@@ -110,7 +110,7 @@ def integrate(
     NotConverged
         The equations of a step could not be solved.
     Diverged
-        The state is no longer finite, or an engine stopped.
+        The state is no longer finite, its energy is wrong by more than the reference scale, or an engine stopped.
     NotConserved
         Orthonormality, or an invariant that the method conserves, is outside the method's `bounds`.
     InvalidResult

@@ -11,12 +11,11 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
-from conservative.benchmarks.studies import long_runs, paper_figures, speed, sphere_curves, stability, studies
+from conservative.benchmarks.studies import long_runs, paper_figures, speed, sphere_curves, studies
 from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
 from conservative.outcome import OK, OutcomeKind
-from conservative.trajectory import Trajectory
 
 BRICK = registry.scene("brick_flip:t_end=1")
 
@@ -88,14 +87,3 @@ def test_the_cost_of_a_setting_is_the_least_time_of_a_simulated_second(monkeypat
     conditions = SimpleNamespace(target=1e-3, scene=BRICK, time_limit=60.0)
     result = recommend.time_settings(conditions, {"a": SimpleNamespace(best=lambda target: probe)})
     assert result == {"a": pytest.approx(2.0 / 0.5)}
-
-
-@pytest.mark.parametrize(("gain", "kind"), [(-1.5, "diverged"), (1.5, "diverged"), (-0.9, None), (0.9, None)])
-def test_energy_that_is_lost_is_as_bad_as_energy_that_is_gained(gain, kind):
-    scene = cv.Scene("up", cv.RigidBody((1, 1, 2)), np.eye(3), (0, 0, 0), 1.0, cv.UniformGravity(1, (0, 0, 1)))
-    height = min(1.0, 1 + gain)  # of the centre of mass; the rest of the energy is in the spin
-    tilt = cv.attitude.rotation_about((1, 0, 0), np.arccos(height))
-    spin = np.sqrt(max(gain, 0.0))
-    result = Trajectory(scene, np.array([0, 1.0]), np.array([np.eye(3), tilt]), np.array([[0, 0, 0], [0, 0, spin]]), "made up")
-    outcome = stability.detect_divergence(result)
-    assert (outcome and outcome.kind) == kind

@@ -159,6 +159,44 @@ def test_an_invariant_is_checked_if_the_method_names_it(scene: cv.Scene, quantit
 
 
 @kinds
+@pytest.mark.parametrize("gain", [-1.5, -0.9, 0.9, 1.5])
+def test_an_energy_that_is_wrong_by_more_than_its_scale_is_no_solution(gain: float, kind: type[Foreign]) -> None:
+    scene = cv.Scene("up", cv.RigidBody((1, 1, 2)), np.eye(3), (0, 0, 0), 0.1, cv.UniformGravity(1, (0, 0, 1)))
+    tilt = rotation_about((1, 0, 0), math.acos(min(1.0, 1 + gain)))  # lowers the centre of mass; the spin has the rest
+
+    def spoil(good: Trajectory) -> Trajectory:
+        R_WB, w_WB_B = np.broadcast_to(np.eye(3), (3, 3, 3)).copy(), np.zeros((3, 3))
+        R_WB[1], w_WB_B[1, 2] = tilt, math.sqrt(max(gain, 0.0))
+        return replace(good, R_WB=R_WB, w_WB_B=w_WB_B)
+
+    grid = Grid(0.05, 2)
+    engine = type("Engine", (kind,), {"role": cv.Role.ENGINE})
+    assert engine(spoil).solve(scene, grid).ok
+    run = kind(spoil).solve(scene, grid)
+    assert run.ok is (abs(gain) < 1)
+    if not run.ok:
+        assert (run.outcome.kind, len(run)) == (OutcomeKind.DIVERGED, 1)
+        assert run.outcome.reason == "the drift of energy is 1.5, the bound 1"
+
+
+@kinds
+def test_in_a_turning_field_the_jacobi_integral_is_checked(kind: type[Foreign]) -> None:
+    scene = cv.scenes.tumbling_satellite()
+    grid = Grid(scene.dt, 3)
+    spoil = changed("w_WB_B", 2, 10 * float(np.linalg.norm(scene.w_WB_B0)))
+    run = kind().check(scene, grid, spoil(cv.Taylor().prepare(scene, grid)()))
+    assert (run.outcome.kind, len(run)) == (OutcomeKind.DIVERGED, 2)
+    assert "Jacobi integral" in run.outcome.reason
+
+
+def test_a_symplectic_method_whose_energy_is_lost_has_diverged() -> None:
+    run = cv.integrate(cv.scenes.asymmetric_top(), 0.8, "splitting:order=2", 32000, 80, on_failure="return")
+    assert run.outcome.kind is OutcomeKind.DIVERGED, run.outcome
+    assert np.abs(run.drift("energy")).max() <= 1 < len(run)
+    assert run.t[-1] < 1000  # 896 s
+
+
+@kinds
 @pytest.mark.parametrize(("share", "ok"), [(0.98, True), (1.02, False)])
 def test_runs_are_ok_up_to_their_bounds(share: float, ok: bool, kind: type[Foreign]) -> None:
     def gain_energy(good: Trajectory) -> Trajectory:

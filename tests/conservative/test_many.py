@@ -370,13 +370,24 @@ def shear(block):
     block.R_WB[3, 1, 0, 2] += 1e-9
 
 
-@pytest.mark.parametrize("damage", [leave_unfinished, break_sample, lose_energy, shear])
+class Careless(Damaged):
+    """The same; it conserves nothing by construction."""
+
+    conserves = frozenset()
+
+
+def spin_up(block):
+    block.w_WB_B[3, 1] *= 10
+
+
+@pytest.mark.parametrize("damage", [leave_unfinished, break_sample, lose_energy, shear, spin_up])
 @pytest.mark.parametrize("own_inertia", [False, True])
 def test_lanes_that_are_not_right_are_run_alone(damage, own_inertia, monkeypatch):
     given = {"w_WB_B0": starts(FEW)[1], "inertia": tensors(FEW) if own_inertia else None}
     right, alone = cv.integrate_many(scene(), **given, method=Damaged(repr), **EVERY_OTHER), []  # which changes nothing
     monkeypatch.setattr(blocks, "run_alone", lambda *what: (alone.append(what[3]), run_alone(*what))[1])
-    found = cv.integrate_many(scene(), **given, method=Damaged(damage), **EVERY_OTHER)
+    method = Careless(damage) if damage is spin_up else Damaged(damage)
+    found = cv.integrate_many(scene(), **given, method=method, **EVERY_OTHER)
     assert alone == [3]
     np.testing.assert_array_equal(found.R_WB, right.R_WB)
     np.testing.assert_array_equal(found.w_WB_B, right.w_WB_B)

@@ -83,7 +83,7 @@ def largest(measure, method):
         for dt in STEPS:
             try:
                 found.append(measure(method, scene, PART.get(method.family, 1.0) * dt))
-            except (cv.BadInput, cv.NotConverged):  # too long
+            except (cv.BadInput, cv.NotConverged, cv.Diverged):  # too long
                 continue
     return max(found)
 
