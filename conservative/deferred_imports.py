@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
+from .programs import list_programs
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -31,10 +32,15 @@ def kernels(name: str) -> Any:
 
 @lru_cache(maxsize=8)
 def list_entries(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group such as `SCENES` by name, sorted; nothing is imported."""
-    from importlib.metadata import entry_points  # here: it takes 20 ms, often unneeded
+    """Return the entry points of a group such as `SCENES` by name, sorted; nothing is imported. Programs are engines too."""
+    from importlib.metadata import EntryPoint, entry_points  # here: it takes 20 ms, often unneeded
 
-    return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+    entries = list(entry_points(group=group))
+    if group == ENGINES:
+        entries += [
+            EntryPoint(name, f"{__package__}.references.environments.programs:{name}", group) for name in list_programs()
+        ]
+    return {entry.name: entry for entry in sorted(entries, key=lambda entry: entry.name)}
 
 
 def load_entry(group: str, argument: str, name: str) -> Any:

@@ -17,6 +17,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from conservative import registry
 from conservative.attitude import Array
 from conservative.check import positive_number
 from conservative.errors import BadInput, nearest
@@ -116,7 +117,7 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     """
     wanted = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
     if names is not None:
-        known = {names_of(method)["family"] for method in wanted}
+        known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
             if name.partition(":")[0] not in known:
                 raise BadInput("engine", repr(name), nearest(name, known))

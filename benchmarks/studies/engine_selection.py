@@ -8,6 +8,7 @@ from typing import Any
 from conservative import registry
 from conservative.errors import BadInput, MissingEngine, nearest
 from conservative.method import Method, Role
+from conservative.programs import list_programs
 from conservative.references.environments.environment import list_environments
 from conservative.references.environments.lock import split_requirement
 
@@ -37,8 +38,8 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
     methods: list[Method] = []
     for name in dict.fromkeys(every):
-        family = _family(*split_requirement(name))
         try:
+            family = _family(*split_requirement(name))
             methods += dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants")))
         except MissingEngine as error:
             if not skip_missing:
@@ -50,7 +51,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
 
 
 def list_installed() -> tuple[str, ...]:
-    """Return the installed engines: those in this environment, then the newest version of each in an environment of its own.
+    """Return the installed engines: those in this environment, the newest version of each in its own environment, and programs.
 
     If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """
@@ -58,7 +59,7 @@ def list_installed() -> tuple[str, ...]:
     known = registry.list_engines()
     newest = {each.engine: each for each in list_environments() if each.engine in known}  # older versions come first
     apart = [f"{name}=={each.version}" for name, each in newest.items() if here.get(name) != each.version]
-    return (*(name for name, version in here.items() if version is not None), *apart)
+    return (*(name for name, version in here.items() if version is not None), *apart, *list_programs())
 
 
 def _version_here(family: type[Method]) -> str | None:

@@ -17,8 +17,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from conservative import registry
-from conservative.errors import MissingEngine, require_extra
+from conservative.errors import BadInput, MissingEngine, require_extra
 from conservative.files import write_text
+from conservative.programs import list_programs
 
 from ..worker import program
 from ..worker.client import Worker
@@ -60,7 +61,9 @@ class Distribution:
 
 
 def distribution_of(engine: str) -> Distribution:
-    """Return the package of an engine. Raise as `conservative.registry.engine`."""
+    """Return the package of an engine. Raise as `conservative.registry.engine`, or `BadInput` for a registered program."""
+    if engine in (programs := list_programs()):
+        raise BadInput("engine", f"{engine!r}, a program of {programs[engine].file}", "an engine with a package")
     distribution: Distribution = registry.engine(engine).data
     return distribution
 
@@ -126,8 +129,7 @@ class Environment:
         home = self.folder / "home"
         home.mkdir(parents=True, exist_ok=True)
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "XDG_"))}
-        memory = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
-        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory)
+        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory or MEMORY)
 
     def write(self) -> None:
         """Write the record, which turns a folder into an environment."""
@@ -135,6 +137,8 @@ class Environment:
         write_text(self.folder / RECORD, json.dumps(record, indent=2), "engines")
 
 
+MEMORY = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
+"""Memory limit of a worker in bytes."""
 COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
 }

@@ -97,7 +97,7 @@ class Worker:
     ) -> None:
         self._command, self._folder, self._variables = tuple(command), folder, variables
         self._memory, self._show_output = memory, show_output
-        self._binary = False
+        self._binary, self._greeting = False, dict[str, Any]()
         self._forget_process()
         self._lock = Lock()
         self._unwanted: list[tuple[int, int]] = []
@@ -123,9 +123,7 @@ class Worker:
             The engine does not support the request; the message gives the reason.
         """
         with self._lock:
-            if self.pid is None:
-                self._end()
-                self._start()
+            self._start_if_ended()
             unwanted, self._unwanted = self._unwanted, []
             forget = [run for start, run in unwanted if start == self.starts]
             with self._ended_by_failure(_limit.get()) as deadline:
@@ -135,6 +133,12 @@ class Worker:
         if "error" in answer:
             raise EngineCrashed(f"{answer['error']}: {answer['message']}")
         return answer
+
+    def greet(self) -> dict[str, Any]:
+        """Return the answer of the program to `hello`. Raise as `ask`."""
+        with self._lock:
+            self._start_if_ended()
+        return self._greeting
 
     def forget(self, start: int, run: int) -> None:
         """Forget a run that was prepared after a given start. The next request tells the program to free it."""
@@ -160,7 +164,10 @@ class Worker:
             if self._owner == os.getpid():
                 self._end()
 
-    def _start(self) -> None:
+    def _start_if_ended(self) -> None:
+        if self.pid is not None:
+            return
+        self._end()
         self._binary = False
         self._work = self._folder and Path(tempfile.mkdtemp(prefix=f"work-{os.getpid()}-", dir=self._folder))
         self._output = None if self._show_output else tempfile.TemporaryFile(dir=self._work)  # noqa: SIM115  # closed in _end
@@ -186,10 +193,10 @@ class Worker:
         _limit_resources(self._process.pid, self._memory)
         with self._ended_by_failure(START_LIMIT) as deadline:
             greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"], "life": life}
-            answer = self._exchange(greeting, deadline)
-            if answer.get("protocol") != program.PROTOCOL:
-                raise program.Unreadable(answer)
-            self._binary = answer.get("framing") == "binary"
+            self._greeting = self._exchange(greeting, deadline)
+            if self._greeting.get("protocol") != program.PROTOCOL:
+                raise program.Unreadable(self._greeting)
+            self._binary = self._greeting.get("framing") == "binary"
 
     def _exchange(self, message: dict[str, Any], deadline: float) -> dict[str, Any]:
         """Send a request and return the answer."""

@@ -13,6 +13,8 @@ from conservative.errors import require_extra
 from .options import allow_build_option, epilog, find_links_option, json_option, show
 
 if TYPE_CHECKING:
+    from conservative.programs import Program
+    from conservative.references.environments.environment import Environment
     from conservative.references.environments.install import Installation
 
 Value = TypeVar("Value")
@@ -65,6 +67,30 @@ def install(
     ctx.exit(int(any(each.trouble for each in done)))
 
 
+@engines.command(
+    short_help="Register a program as an engine.",
+    epilog=epilog(
+        "conservative engines add ./my_engine",
+        "conservative engines add 'node engine.js' --name my_engine --project",
+        "conservative run brick_flip --method my_engine",
+    ),
+)
+@click.argument("command")
+@click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
+@click.option("--project", is_flag=True, help="Register it in conservative.toml of this project, not for the user.")
+def add(command: str, name: str, project: bool) -> None:
+    """Register COMMAND, an executable or a command line, that speaks the protocol of references/PROTOCOL.md.
+
+    Its name then works like that of any engine. `engines remove NAME` takes it back.
+    """
+    require_extra("conservative engines", "environments")
+    from conservative.references.environments.programs import add
+
+    from ..sections.environments import program_line
+
+    click.echo(f"{program_line(add(command, name, project))}: added")
+
+
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))
 @json_option
 def list_engines(as_json: bool) -> None:
@@ -79,13 +105,19 @@ def list_engines(as_json: bool) -> None:
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @json_option
 def remove(names: tuple[str, ...], as_json: bool) -> None:
-    """Remove the environment of each NAME==VERSION, or all environments of NAME."""
+    """Remove the environment of each NAME==VERSION, or all environments of NAME. A program is not an engine any more."""
     require_extra("conservative engines", "environments")
+    from conservative.programs import list_programs
+    from conservative.references.environments import programs
     from conservative.references.environments.install import remove
 
     from ..sections.environments import removal_line
 
-    _show((environment for name in names for environment in remove(name)), removal_line, as_json)
+    def remove_each() -> Iterable[Environment | Program]:
+        for name in names:
+            yield from [programs.remove(name)] if name in list_programs() else remove(name)
+
+    _show(remove_each(), removal_line, as_json)
 
 
 def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:

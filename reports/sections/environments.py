@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from conservative import registry
+from conservative.programs import Program, list_programs
 from conservative.references.environments.environment import Environment, list_environments
 from conservative.references.environments.install import Installation
 
@@ -10,12 +11,13 @@ from ..document.model import Document, Paragraph
 
 
 def build() -> Document:
-    """Return a line for each environment, and one for each engine without any."""
-    environments, lines = list_environments(), []
-    for engine in registry.list_engines():
+    """Return a line for each program and each environment, and one for each engine without any."""
+    environments, programs = list_environments(), list_programs()
+    lines = [program_line(program) for program in programs.values()]
+    for engine in (name for name in registry.list_engines() if name not in programs):
         mine = [environment for environment in environments if environment.engine == engine]
         lines += [_line(environment) for environment in mine] or [f"{engine}: no environment"]
-    data = {"engines": registry.list_engines(), "environments": environments}
+    data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}
     return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)
 
 
@@ -32,6 +34,11 @@ def installation_line(done: Installation) -> str:
     return f"{name}: {how}, {len(environment.packages)} packages, Python {environment.python}{trouble}{advice}"
 
 
-def removal_line(environment: Environment) -> str:
-    """Return one line about a removed environment."""
-    return f"{environment.engine}=={environment.version}: removed"
+def program_line(program: Program) -> str:
+    """Return the name, the command line and the file of a program."""
+    return f"{program.name}: {program.command} ({program.file})"
+
+
+def removal_line(gone: Environment | Program) -> str:
+    """Return one line about a removed environment or program."""
+    return f"{program_line(gone) if isinstance(gone, Program) else f'{gone.engine}=={gone.version}'}: removed"

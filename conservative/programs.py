@@ -1,0 +1,72 @@
+"""Programs that are registered as engines: a name and a command line in the file of a project or of the user.
+
+    [engines]                       # conservative.toml
+    my_engine = "build/my_engine"   # relative to this file
+    other_engine = "node engine.js --fast"
+
+The project's file is `conservative.toml` in the working directory, or in the nearest folder above it that has one. The variable
+CONSERVATIVE_PROJECT names another folder to start from. The user's file is in the configuration folder of platformdirs. A name
+in the project's file takes precedence. `conservative.references.environments.programs` runs the programs.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import tomllib
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from .errors import BadInput
+
+FILE = "conservative.toml"
+
+
+@dataclass(frozen=True)
+class Program:
+    """A registered program: its name, the file that it is registered in, and its command line, relative to that file."""
+
+    name: str
+    file: Path
+    command: str
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The command line. Words that name a file are absolute paths, and so is a first word with a slash."""
+        first, *rest = shlex.split(self.command)
+        paths = {word: self.file.parent / word for word in (first, *rest)}
+        program = str(paths[first]) if os.sep in first or paths[first].is_file() else first
+        return (program, *(str(paths[word]) if paths[word].is_file() else word for word in rest))
+
+
+def project_file() -> Path:
+    """Return the project's file, which may not exist."""
+    here = Path(os.environ.get("CONSERVATIVE_PROJECT", "")).absolute()
+    return next((folder / FILE for folder in (here, *here.parents) if (folder / FILE).is_file()), here / FILE)
+
+
+def user_file() -> Path:
+    """Return the user's file, which may not exist. It needs platformdirs."""
+    from platformdirs import user_config_path
+
+    return user_config_path("conservative-rotation") / FILE
+
+
+def list_programs() -> dict[str, Program]:
+    """Return the registered programs by name. Raise `BadInput` if a file cannot be read or has other values than texts."""
+    programs: dict[str, Program] = {}
+    files = []
+    with suppress(ImportError):  # without platformdirs
+        files.append(user_file())
+    with suppress(OSError):  # the working directory was removed
+        files.append(project_file())
+    for file in filter(Path.is_file, files):
+        try:
+            table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
+            entries = {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
+        except (OSError, ValueError, AttributeError) as error:
+            allowed = 'a table [engines] of command lines, such as my_engine = "build/my_engine"'
+            raise BadInput(str(file), str(error), allowed) from None
+        programs |= entries
+    return programs

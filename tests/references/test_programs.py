@@ -1,0 +1,128 @@
+"""Programs of users: registered by a name, they are engines wherever a name of an engine is taken."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative import deferred_imports, registry
+from conservative.benchmarks.recommendation.recommend import list_engines
+from conservative.benchmarks.studies.engine_selection import list_installed, select_engines
+from conservative.reports.cli.main import main
+
+PROGRAMS = Path(__file__).parent / "programs"
+PLAIN = shlex.join([sys.executable, "-I", str(PROGRAMS / "engine.py")])
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Return an empty working directory, in which no program is registered."""
+    for name in ("CONFIG", "CACHE"):
+        monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name))
+    (tmp_path / "project").mkdir()
+    monkeypatch.chdir(tmp_path / "project")
+    deferred_imports.list_entries.cache_clear()
+    yield tmp_path / "project"
+    deferred_imports.list_entries.cache_clear()
+
+
+def run(*arguments):
+    done = CliRunner().invoke(main, arguments)
+    return done.exit_code, done.output
+
+
+def test_a_program_is_an_engine_until_it_is_removed(folder):
+    code, text = run("engines", "add", PLAIN, "--name", "mine")
+    assert (code, text.endswith("conservative.toml): added\n")) == (0, True)
+    assert not list(folder.iterdir())  # of the user
+    assert "mine" in list_installed()
+    (method,) = select_engines(["mine"])
+    assert (method.label, method.order) == ("mine==1/mine", 1)
+    assert [each.name for each in list_engines(["mine"])] == ["mine"]
+    code, text = run("run", "brick_flip", "--method", "mine", "--t-end", "1", "--json")
+    assert (code, json.loads(text)["outcome"]["kind"]) == (0, "ok")
+    assert run("engines", "list")[1].startswith("mine: ")
+    assert "mine: " in run("engines", "remove", "mine")[1]
+    assert run("run", "brick_flip", "--method", "mine")[0] == 2
+
+
+def test_paths_in_the_file_of_a_project_are_relative_to_it(folder, monkeypatch):
+    """The rest of the file stays as it is, and the command works in folders below it."""
+    before = '# ours\n[engines]  # programs\nother = "node other.js"\n'
+    (folder / "conservative.toml").write_text(before)
+    (folder / "src").mkdir()
+    (folder / "src" / "my-engine.py").write_text((PROGRAMS / "engine.py").read_text())
+    monkeypatch.chdir(folder / "src")
+    assert run("engines", "add", f"{sys.executable} my-engine.py", "--project")[0] == 0
+    line = f'my_engine = "{sys.executable} ./src/my-engine.py"\n'
+    assert (folder / "conservative.toml").read_text() == before.replace("other", line + "other", 1)
+    assert cv.integrate(cv.scenes.brick_flip(t_end=1.0), 0.01, registry.method("my_engine")).ok
+    assert run("engines", "remove", "my_engine")[0] == 0
+    assert (folder / "conservative.toml").read_text() == before
+
+
+GREETING = '{"protocol": 1, "program": "x", "version": "2.1", "framing": "lines", "engine": %s}'
+
+
+def speak(folder, engine):
+    """Register a program that says how it is described, and nothing else."""
+    (folder / "p.py").write_text(f"input()\nprint({GREETING % json.dumps(engine)!r}, flush=True)\ninput()\n")
+    return run("engines", "add", shlex.join([sys.executable, "p.py"]))
+
+
+def test_a_program_describes_its_settings(folder):
+    assert speak(folder, {"settings": {"integrator": "rk4", "substeps": 2}, "orders": {"rk4": 4, "euler": 1}})[0] == 0
+    assert (registry.method("p").order, registry.method("p@2.1:euler,substeps=3").order) == (4, 1)
+    with pytest.raises(cv.BadInput, match="integrator: got 'rk5'; expected one of 'rk4'"):
+        registry.method("p:rk5")
+    with pytest.raises(cv.MissingEngine, match=r"its version is 2\.1, not 3"):
+        registry.method("p@3")
+
+
+@pytest.mark.parametrize("engine", [{"colour": "red"}, {"settings": 5}, {"orders": ["rk4"]}, "fast"])
+def test_a_description_that_cannot_be_used_is_reported(engine, folder):
+    code, text = speak(folder, engine)
+    assert code == 2
+    assert "p, a program of" in text
+    assert "its answer to `hello` cannot be used" in text
+    assert not (folder.parent / "CONFIG").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["./missing"], "missing does not exist or cannot be executed. Build it"),
+        (["false"], "conservative.toml: crashed (exit code 1). Run: conservative engines check false"),
+        (["sh -c 'echo hi; sleep 5'"], "an answer that cannot be read from sh, which should speak version 1"),
+        ([PLAIN, "--name", "mujoco"], "name: got 'mujoco'; expected letters"),
+        ([PLAIN, "--name", "my-engine"], "name: got 'my-engine'; expected letters"),
+        ([""], "command: got ''; expected the path of an executable"),
+    ],
+)
+def test_a_program_that_cannot_be_used_is_not_registered(arguments, message, folder):
+    code, text = run("engines", "add", *arguments)
+    assert (code, len(text.splitlines())) == (2, 1)
+    assert message in text
+    assert not (folder.parent / "CONFIG").exists()
+
+
+def test_a_program_that_is_gone_is_named_with_file_and_remedy(folder):
+    (folder / "conservative.toml").write_text('[engines]\nmine = "build/mine"\n')
+    expected = (
+        "mine, a program of {0}/conservative.toml: {0}/build/mine does not exist or cannot be executed. Build it, or run: "
+    )
+    code, text = run("run", "brick_flip", "--method", "mine")
+    assert (code, text) == (2, f"Error: {expected.format(folder)}conservative engines remove mine\n")
+    assert select_engines(["mine"], skip_missing=True)[0].family == "missing"
+    assert "expected an engine with a package" in run("engines", "install", "mine")[1]
+
+
+@pytest.mark.parametrize("text", ["[engines]\nmine = 3\n", "[engines\n", "engines = 3\n", 'engines = "x"'])
+def test_a_file_that_cannot_be_used_is_named(text, folder):
+    (folder / "conservative.toml").write_text(text)
+    code, text = run("engines", "list")
+    assert (code, "conservative.toml: got" in text) == (2, True)
