@@ -272,7 +272,7 @@ def _packages(base: Version, head: Version) -> Iterator[str]:
         environment = version.environment
         by_name = {re.split("[ =@]", text)[0]: text for text in environment.packages}
         by_name.pop(environment.engine, None)  # the project itself
-        packages.append(by_name | {"Python": environment.python})
+        packages.append(by_name | {"runtime": environment.runtime})
     was, now = packages
     for name in sorted(was.keys() | now.keys()):
         if was.get(name) != now.get(name):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 
-from ..environments.adapter import LocalEngine, method_class
+from ..environments.adapter import LocalEngine, method_class, read_script
 from ..environments.engine_method import EngineMethod, engine_class
 from . import mujoco as _mujoco
 from . import pinocchio as _pinocchio
@@ -16,4 +17,5 @@ Pinocchio = method_class(_pinocchio, LocalEngine)
 def __getattr__(name: str) -> type[EngineMethod]:
     if name.startswith("_"):
         raise AttributeError(name)
-    return engine_class(import_module(f"{__package__}.{name}"))
+    script = Path(__file__).with_name(f"{name}.js")
+    return engine_class(read_script(script) if script.is_file() else import_module(f"{__package__}.{name}"))

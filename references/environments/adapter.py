@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cache
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar, TypeVar
 
@@ -78,6 +80,21 @@ class EngineData(Distribution):
     title: str = ""
     prefix: str = ""
     card: Mapping[str, Any] = field(default_factory=dict)
+
+
+@cache
+def read_script(path: Path) -> ModuleType:
+    """Return a module with the documentation and the data of an adapter in JavaScript.
+
+    They are its first comment and `exports.ENGINE`, which is JSON. Its function `prepare` runs in the environment (see
+    `worker/program.js`).
+    """
+    text = path.read_text(encoding="utf-8")
+    words, _, code = text.partition("*/")
+    data, _ = json.JSONDecoder().raw_decode(code.partition("exports.ENGINE = ")[2])
+    module = ModuleType(f"{__package__}.{path.stem}", words[3:].replace("\n *", "\n"))
+    vars(module).update(__file__=str(path), ENGINE={"kind": "npm", "module": data["package"], **data})
+    return module
 
 
 AnyAdapted = TypeVar("AnyAdapted", bound="AdapterMethod")

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -77,6 +78,8 @@ def version_key(version: str) -> tuple[tuple[int, int, str], ...]:
 
 RECORD, LOCK = "record.json", "lock.txt"
 """File that is written last into an environment, and file with the versions and hashes of all packages."""
+NODE = "Node 20 or later with npm, from https://nodejs.org or the system's packages"
+"""What engines in JavaScript need."""
 BUILD = "build."
 """Mark of builds in the local part of a version, such as 4.0.1+build.1a2b3c4d."""
 
@@ -90,9 +93,9 @@ class Environment:
     engine, version
         Name of the engine, such as `bsk`, and its version.
     folder
-        The virtual environment.
-    python
-        Version of its Python.
+        The virtual environment, or the folder of `node_modules`.
+    runtime
+        Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
         All installed packages, as `name==version`.
     kind
@@ -102,7 +105,7 @@ class Environment:
     engine: str
     version: str
     folder: Path
-    python: str
+    runtime: str
     packages: tuple[str, ...]
     kind: str = "python"
 
@@ -141,6 +144,7 @@ MEMORY = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
 """Memory limit of a worker in bytes."""
 COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
+    "npm": lambda folder: (find_node("node"), Path(program.__file__).with_suffix(".js"), folder),
 }
 """Kinds of environments, and the command line of the program that runs the engine in a folder of each kind."""
 _workers: dict[tuple[Path, str, int], Worker] = {}
@@ -171,6 +175,13 @@ def interpreter_of(folder: Path) -> Path:
     return folder / "bin" / "python"
 
 
+def find_node(name: str) -> str:
+    """Return the path of `node` or `npm`. Raise `BadInput` if it is not installed."""
+    if path := shutil.which(name):
+        return path
+    raise BadInput("engine", f"an engine in JavaScript, but no {name} on this machine", NODE)
+
+
 def folder_of_all() -> Path:
     """Return the folder of all environments, which may not exist. Raise `MissingExtra` if platformdirs is not installed."""
     require_extra("engines in environments", "environments", "platformdirs")
@@ -195,6 +206,8 @@ def read_environment(folder: Path) -> Environment | None:
     """Return the environment in a folder; None if there is no complete one."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        if python := record.pop("python", ""):  # written by older versions
+            record["runtime"] = f"Python {python}"
         fixed = {"folder": folder, "packages": tuple(record["packages"])}
         environment = Environment(**{**record, **fixed})
     except (OSError, ValueError, KeyError, TypeError):

@@ -5,18 +5,20 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
 from conservative.files import remove_leftovers, temporary
 
 from ..worker.client import EngineCrashed, EngineTimeout
+from . import lock as python_packages
+from . import npm
 from .environment import (
     BUILD,
     LOCK,
@@ -28,16 +30,17 @@ from .environment import (
     find_environment,
     folder_of_all,
     folder_of_projects,
-    interpreter_of,
     list_environments,
     read_environment,
     temporary_folder,
     version_key,
     worker_of,
 )
-from .lock import Lock, Source, find_python, list_versions, normal_name, resolve, resolve_wheel, split_requirement
+from .lock import Lock, Source, find_python, normal_name, resolve_wheel, split_requirement
 from .uv_command import UvFailed, run_uv
 
+_KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm}
+"""Modules that lock, fill and list the versions of environments: functions `resolve`, `fill` and `list_versions`."""
 _EPOCH = "315532800"  # 1980, the first date in zip files, so that the same sources give the same wheel
 
 
@@ -70,12 +73,12 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
     except MissingEnvironment:
         old = None
     if old is None:
-        return _install(engine, distribution, resolve(distribution, version, source), source, force)
+        return _install(engine, distribution, _KINDS[distribution.kind].resolve(distribution, version, source), source, force)
     try:
         text = (old.folder / LOCK).read_text(encoding="utf-8")
     except OSError:
         raise BadInput("engine", f"{engine}=={old.version} without a lock", "`engines install`") from None
-    return _install(engine, distribution, Lock(old.version, find_python(old.python), text), source, force)
+    return _install(engine, distribution, Lock(old.version, find_python(old.runtime.partition(" ")[2]), text), source, force)
 
 
 def install_build(engine: str, path: Path, source: Source) -> Installation:
@@ -127,7 +130,7 @@ def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
         The engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
-    known = list_versions(distribution.package, source)
+    known = _KINDS[distribution.kind].list_versions(distribution.package, source)
     if not known:
         got = f"no list of versions of {distribution.package} from the package index"
         raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
@@ -166,24 +169,18 @@ def check(requirement: str) -> None:
 def _install(engine: str, distribution: Distribution, lock: Lock, source: Source, force: bool = False) -> Installation:
     folder = folder_of_all() / engine / lock.version
     existing = None if force else read_environment(folder)
-    environment = existing or make(engine, lock, folder, source)
+    environment = existing or make(engine, lock, folder, source, distribution.kind)
     return Installation(environment, existing is None, import_trouble(environment, distribution))
 
 
-def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
+def make(engine: str, lock: Lock, folder: Path, source: Source, kind: str = "python") -> Environment:
     """Create an environment in place of an old one. Raise `BadInput` if a package is missing or the disk is full."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, _make_folder) as (scratch, _):
-            python = interpreter_of(scratch)
             (scratch / LOCK).write_text(lock.text, encoding="utf-8")
-            run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, scratch)
-            options = ("--quiet", "--require-hashes", "--python", python)
-            run_uv("pip", "sync", *options, *source.options, scratch / LOCK)
-            packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
-            ask = [str(python), "-I", "-c", "import platform; print(platform.python_version())"]
-            version = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
-            Environment(engine, lock.version, scratch, version, packages).write()
+            runtime, packages = _KINDS[kind].fill(scratch, lock, source)
+            Environment(engine, lock.version, scratch, runtime, packages, kind).write()
             close_environment(folder)
             with _removed(folder) if folder.exists() else nullcontext():
                 try:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
 
-from .environment import Distribution, version_key
+from .environment import LOCK, Distribution, interpreter_of, version_key
 from .uv_command import UvFailed, run_uv
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
@@ -52,9 +53,9 @@ class Lock:
     version
         Version of the engine.
     python
-        Path of the Python interpreter.
+        Path of the Python interpreter, unless the engine is in JavaScript.
     text
-        Requirements with hashes, in the format of uv and pip.
+        Requirements with hashes, in the format of uv and pip; for engines in JavaScript, npm's `package-lock.json`.
     """
 
     version: str
@@ -88,6 +89,17 @@ def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
     return Lock(pinned[1], python, text)
 
 
+def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
+    """Create a virtual environment from a lock. Return what runs the engine, such as `Python 3.11.4`, and its packages."""
+    python = interpreter_of(folder)
+    run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
+    options = ("--quiet", "--require-hashes", "--python", python)
+    run_uv("pip", "sync", *options, *source.options, folder / LOCK)
+    packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
+    ask = [str(python), "-I", "-c", "import platform; print('Python', platform.python_version())"]
+    return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip(), packages
+
+
 def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source: Source) -> Lock:
     """Return the lock of a wheel of an engine, under a version of our own. Raise as `resolve`."""
     return Lock(version, *_compile(distribution, f"{distribution.package} @ {wheel.as_uri()}", version, source))
@@ -118,17 +130,22 @@ _COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--gene
 
 def _as_bad_input(package: str, name: str, version: str, failure: UvFailed, source: Source) -> BadInput:
     if failure.says("there is no version of", "there are no versions of"):
-        newest = sorted(list_versions(package, source), key=version_key, reverse=True)
-        if not newest:
-            return BadInput("version", repr(name), "a version that exists")
-        nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
-        return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
+        return no_version(name, version, list_versions(package, source))
     if failure.says("Failed to fetch", "error sending request", "network was disabled"):
         return BadInput("engines", f"no answer for {name!r} from the package index", "a network, or --find-links FOLDER")
     if failure.says("was not found in"):
         place = "the package index" if source.find_links is None else str(source.find_links)
         return BadInput("engine", repr(name), f"a package that {place} has")
     return BadInput("engine", repr(name), f"a package that uv can install ({failure.summary})")
+
+
+def no_version(name: str, version: str, known: Iterable[str]) -> BadInput:
+    """Return the error of a version that does not exist, with those that do."""
+    newest = sorted(known, key=version_key, reverse=True)
+    if not newest:
+        return BadInput("version", repr(name), "a version that exists")
+    nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
+    return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
 
 
 def normal_name(package: str) -> str:

@@ -51,7 +51,7 @@ class Plan:
         """The locks of the environments that engines run in, sorted by name."""
         methods = (*self.methods, *self.engines)
         used = {each.environment.folder: each.environment for each in methods if isinstance(each, EngineMethod)}
-        locks = (LockedEngine(f"{each.engine}=={each.version}", each.python, each.packages) for each in used.values())
+        locks = (LockedEngine(f"{each.engine}=={each.version}", each.runtime, each.packages) for each in used.values())
         return tuple(sorted(locks, key=lambda lock: lock.name))
 
     @property

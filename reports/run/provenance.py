@@ -18,10 +18,10 @@ COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy"
 
 @dataclass(frozen=True)
 class LockedEngine:
-    """Contents of an engine's environment: `name`, as `exudyn==1.13.6`, `python`, and all `packages`, as `name==version`."""
+    """Contents of an engine's environment: `name`, as `exudyn==1.13.6`, `runtime`, and all `packages`, as `name==version`."""
 
     name: str
-    python: str
+    runtime: str
     packages: tuple[str, ...]
 
 

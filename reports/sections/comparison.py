@@ -79,7 +79,7 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
     for each in judged.violations:
         failed.setdefault((each.scene, each.method), []).append(each.finding)
-    packages = [(each.title, each.environment.python, ", ".join(each.packages)) for each in versions]
+    packages = [(each.title, each.environment.runtime, ", ".join(each.packages)) for each in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
     notes = Items.of(f"note: {note}" for note in judged.notes)
     data = {
@@ -101,7 +101,7 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
             Section("Violations", filled(Items.of(findings))),
             Section("Rows", [Paragraph(explained), table(comparison, judged.violations)]),
             Section("Notes", filled(notes)),
-            Section("Versions", [Table(("version", "Python", "packages"), packages, "Packages of both versions")]),
+            Section("Versions", [Table(("version", "runtime", "packages"), packages, "Packages of both versions")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
         ),
         brief=filled(Paragraph(verdict), Items.of(findings), notes),

@@ -165,13 +165,13 @@ def figure(points: pd.DataFrame, scene: str) -> Figure:
 
 
 def _versions(measured: Measured) -> Table:
-    """Return version, Python and number of packages of each environment, then the engines installed with this package."""
+    """Return version, runtime and number of packages of each environment, then the engines installed with this package."""
     environments = {lock.name: lock for lock in measured.source.environments}
     engines = dict.fromkeys(str(method.maker) for method in measured.plan.engines if not isinstance(method, Missing))
     locked = [environments[name] for name in engines if name in environments]
-    apart = [[lock.name, "in its own environment", lock.python, str(len(lock.packages))] for lock in locked]
+    apart = [[lock.name, "in its own environment", lock.runtime, str(len(lock.packages))] for lock in locked]
     here = [[name, "with this package", "ours", DASH] for name in engines if name not in environments]
-    return Table(["engine", "runs", "Python", "packages"], [*apart, *here], "Engines of this section")
+    return Table(["engine", "runs", "runtime", "packages"], [*apart, *here], "Engines of this section")
 
 
 def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[EngineRow]:

@@ -22,7 +22,7 @@ def build() -> Document:
 
 
 def _line(environment: Environment) -> str:
-    return f"{environment.engine}=={environment.version}: Python {environment.python}, {', '.join(environment.packages)}"
+    return f"{environment.engine}=={environment.version}: {environment.runtime}, {', '.join(environment.packages)}"
 
 
 def installation_line(done: Installation) -> str:
@@ -31,7 +31,7 @@ def installation_line(done: Installation) -> str:
     name = f"{environment.engine}=={environment.version}"
     trouble = f"; cannot be imported: {done.trouble}" if done.trouble else ""
     advice = f". Run: conservative engines install --force {name}" if done.trouble and not done.new else ""
-    return f"{name}: {how}, {len(environment.packages)} packages, Python {environment.python}{trouble}{advice}"
+    return f"{name}: {how}, {len(environment.packages)} packages, {environment.runtime}{trouble}{advice}"
 
 
 def program_line(program: Program) -> str:

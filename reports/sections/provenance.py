@@ -22,7 +22,7 @@ def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:
     """Return the packages of each environment, folded."""
     return [
         Section(
-            f"{lock.name}: Python {lock.python}, {len(lock.packages)} packages",
+            f"{lock.name}: {lock.runtime}, {len(lock.packages)} packages",
             [Paragraph(", ".join(lock.packages))],
             folded=True,
         )

@@ -63,13 +63,13 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         verdict = filled(
             Paragraph(f"{now} against {was}: {'FAILED' if failures else 'passed'}", Emphasis.LEAD), Items.of(failures)
         )
-    versions = [(each.version, each.python, ", ".join(each.packages)) for each in environments]
+    versions = [(each.version, each.runtime, ", ".join(each.packages)) for each in environments]
     data = {
         "made": dict(made),
         "engine": engine,
         "passed": not failures,
         "failures": failures,
-        "versions": [{name: getattr(each, name) for name in ("version", "python", "packages")} for each in environments],
+        "versions": [{name: getattr(each, name) for name in ("version", "runtime", "packages")} for each in environments],
         "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
         "changes": [
             {
@@ -96,7 +96,7 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
             changed,
             Section("Measurements", [Paragraph(_WORDS), *tables]),
             unfinished,
-            Section("Versions", [Table(("version", "Python", "packages"), versions, "Packages of each version")]),
+            Section("Versions", [Table(("version", "runtime", "packages"), versions, "Packages of each version")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
         ),
         brief=filled(*tables, changed, unfinished, *verdict),

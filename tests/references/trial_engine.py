@@ -24,6 +24,6 @@ def make_environment(folder, version=VERSION):
     (site,) = place.glob("lib/python*/site-packages")
     (site / "dies_at_import.py").write_text("import os\nos.kill(os.getpid(), 11)\n")
     packages = [f"numpy=={numpy.__version__}"]
-    record = {"engine": "trial", "version": version, "python": sys.version.split()[0], "packages": packages}
+    record = {"engine": "trial", "version": version, "runtime": f"Python {sys.version.split()[0]}", "packages": packages}
     (place / "record.json").write_text(json.dumps(record))
     return place

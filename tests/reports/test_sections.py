@@ -78,7 +78,7 @@ def test_engines_and_locks_are_in_the_document(report, nothing_is_measured, tmp_
     plan, measured, source = report
     rows = [*at_step("exudyn==1.0", "RK44", 1e-6), *over_steps("exudyn==1.0", "RK44", (1e-1, 1e-2, 1e-3, 1e-4), 4.0)]
     named = dataclasses.replace(plan, engines=(registry.method("pinocchio"),))
-    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "3.11.7", ("exudyn==1.0", "numpy==2.0")),))
+    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3", ("exudyn==1.0", "numpy==2.0")),))
     document = build(named, Measurements(measurement.frame(rows), measured.samples), locked)
     for text in texts(document, tmp_path):
         assert all(part in text for part in ("exudyn==1.0/RK44", "4.00 ± 0.01 (4)", "exudyn==1.0, numpy==2.0"))
@@ -89,7 +89,7 @@ def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_method
     plan, measured, source = report
     for text in texts(build(plan, measured, source), tmp_path):
         assert not any(part in text for part in ("## Engines", 'id="engines"', "Environments of engines"))
-    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "3.11.7", ("numpy==2.0",)),))
+    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3.11.7", ("numpy==2.0",)),))
     document = build(plan, measured, locked)
     for text in texts(document, tmp_path):
         assert "Environments of engines" in text

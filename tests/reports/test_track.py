@@ -90,7 +90,7 @@ def test_markdown_has_tables_changes_and_versions():
     assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-4 | 3.0e-3 | ✓ done | 2 | 2 |" in text
     assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
     assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text
-    assert "| 1.0 | 3.11.7 | made==1.0 |" in text
+    assert "| 1.0 | Python 3.11.7 | made==1.0 |" in text
     assert "| processor | fast |" in text_of(build(history(GOOD, GOOD), made={"processor": "fast"}), "markdown")
     assert NOTHING_CHANGED in text_of(build(history(GOOD, GOOD)), "markdown")
 
@@ -98,7 +98,7 @@ def test_markdown_has_tables_changes_and_versions():
 def test_json_has_every_figure_and_change():
     found = json.loads(text_of(build(history(GOOD, BAD, times=(TIMES, TIMES)), gated=True), "json"))
     assert (found["engine"], found["passed"], len(found["failures"])) == ("made", False, 1)
-    assert found["versions"][1] == {"version": "2.0", "python": "3.11.7", "packages": ["made==2.0"]}
+    assert found["versions"][1] == {"version": "2.0", "runtime": "Python 3.11.7", "packages": ["made==2.0"]}
     row = found["rows"][1]
     assert row["drifts"]["energy"]["value"] == -0.17
     assert row["attitude_order"] == {"slope": 0.99, "stderr": 0.01, "reason": ""}

@@ -16,8 +16,8 @@ STEP = 1e-6
 """Time of a step, s."""
 
 
-def version(name, *packages, python="3.11.7"):
-    return Version(name, "", Environment("made-up", name, Path(), python, packages))
+def version(name, *packages, runtime="Python 3.11.7"):
+    return Version(name, "", Environment("made-up", name, Path(), runtime, packages))
 
 
 BASE, HEAD = version("was", "numpy==2.0"), version("is", "numpy==2.0")

@@ -60,4 +60,4 @@ def history(*observations, times=()):
 
 def versions(*names):
     """Return made-up versions of an engine."""
-    return [Version(name, "", Environment("made", name, Path(), "3.11.7", (f"made=={name}",))) for name in names]
+    return [Version(name, "", Environment("made", name, Path(), "Python 3.11.7", (f"made=={name}",))) for name in names]

@@ -87,12 +87,12 @@ def test_without_a_row_that_passed_there_is_no_verdict():
 
 
 def test_differences_between_environments_are_notes():
-    other = version("is", "numpy==2.1", "numba==0.68", python="3.12.1")
+    other = version("is", "numpy==2.1", "numba==0.68", runtime="Python 3.12.1")
     result = judge(comparison((row(), row(), None), head=other))
     assert result.notes == (
-        "another Python: was 3.11.7, is 3.12.1",
         "another numba: was not there, is numba==0.68",
         "another numpy: was numpy==2.0, is numpy==2.1",
+        "another runtime: was Python 3.11.7, is Python 3.12.1",
     )
 
 
