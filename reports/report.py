@@ -68,9 +68,10 @@ def save_picture(chart: Any, path: Path, png: bool) -> str:
     """Write a picture as SVG, and as PNG if `png`; return the name of the SVG."""
     import vl_convert
 
-    specification = chart.to_json()
-    svg = path.with_suffix(".svg")
-    files.write_text(svg, vl_convert.vegalite_to_svg(specification), "out")
+    from .charts.style import specification
+
+    picture, svg = specification(chart), path.with_suffix(".svg")
+    files.write_text(svg, vl_convert.vegalite_to_svg(picture), "out")
     if png:
-        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(specification, scale=2), "out")
+        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(picture, scale=2), "out")
     return svg.name

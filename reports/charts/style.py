@@ -38,7 +38,7 @@ PALETTE = {
     "grey": "#7F7F7F",
 }
 """Colours that `Card.colour` can name; legends list families of one role in this order."""
-_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
+_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE", "#CC6677", "#6699CC")
 """For families that name no colour, in the order of their names (Tol's muted scheme)."""
 
 SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-left", "triangle-right")
@@ -82,7 +82,8 @@ def _by_value(name: str) -> list[tuple[float, str]]:
 def colours(families: Families) -> dict[str, str]:
     """Return the colour of each line: the colour of its family, which is the same in every picture."""
     named = family_colours()
-    strangers = sorted(set(families.values()) - named.keys())
+    nameless = sorted(name for name, each in registry.list_families().items() if each.role in (Role.OURS, Role.BASELINE))
+    strangers = [name for name in dict.fromkeys([*nameless, *sorted(set(families.values()))]) if name not in named]
     known = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
     return {name: known[family] for name, family in families.items()}
 
@@ -99,7 +100,7 @@ def number_in_family(families: Families) -> dict[str, int]:
 
 def look(families: Families, second: str, **legend: Any) -> dict[str, Any]:
     """Return the channels of lines: the colour of the family, and the mark ("shape") or dash ("strokeDash") of the setting."""
-    shown = alt.Legend(**({"columns": 1} | legend))
+    shown = alt.Legend(**({"columns": 1 + len(families) // 32, "symbolLimit": 0} | legend))  # 0: without a limit
     looks: Sequence[Any] = SHAPES if second == "shape" else DASHES
     of_settings = [looks[number % len(looks)] for number in number_in_family(families).values()]
     ranges = {"color": list(colours(families).values()), second: of_settings}
@@ -142,6 +143,13 @@ def apply_style(chart: Any) -> Any:
     )
 
 
+def specification(chart: Any) -> dict[str, Any]:
+    """Return a picture in Vega-Lite, with any number of rows: Altair refuses more than 5,000, which a full report has."""
+    with alt.data_transformers.disable_max_rows():
+        whole: dict[str, Any] = chart.to_dict()
+    return whole
+
+
 def svg_text(chart: Any) -> str:
     """Return a picture as SVG that begins with the mark by which a command knows its own files."""
-    return f"{SVG_MARK}\n{vl_convert.vegalite_to_svg(chart.to_dict())}"
+    return f"{SVG_MARK}\n{vl_convert.vegalite_to_svg(specification(chart))}"

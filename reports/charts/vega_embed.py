@@ -15,7 +15,7 @@ from typing import Any
 from conservative.benchmarks.studies import step_ladder
 
 from ..document.model import LegendEntry
-from .style import DASHES, SHAPES, Families, colours, number_in_family
+from .style import DASHES, SHAPES, Families, colours, number_in_family, specification
 
 HIDDEN = "hidden"
 """Name of the parameter that lists the lines not to draw."""
@@ -85,7 +85,7 @@ def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420, hidden: S
         Lines that are hidden at first.
     """
     tooltip = [SHOWN[each] if isinstance(each, str) else each for each in shown]
-    whole: Spec = chart.to_dict()
+    whole: Spec = specification(chart)
     if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
             unit.pop("title", None)  # the caption of the figure says it

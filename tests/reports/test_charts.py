@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 import vl_convert
 
-from conservative import Reduced
+from conservative import Reduced, Role, registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
-from conservative.reports.charts.style import _OTHERS, PALETTE, power_axis
+from conservative.reports.charts.style import _OTHERS, PALETTE, colours, power_axis, svg_text
 from conservative.reports.document.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
 from conservative.reports.rows import lines
 from conservative.reports.rows import points as work_precision
@@ -81,6 +81,20 @@ def test_samples_on_a_sphere_are_not_joined():
 @pytest.mark.parametrize(("low", "high", "powers"), [(0.05, 200.0, [0.1, 1.0, 10.0, 100.0]), (1.0, 100.0, [1.0, 10.0, 100.0])])
 def test_a_logarithmic_axis_has_a_label_at_each_power_of_ten(low, high, powers):
     assert power_axis("title", low, high).values == pytest.approx(powers)
+
+
+def test_a_picture_of_a_full_report_has_all_its_samples_and_names_all_its_lines():
+    many = pd.DataFrame({"t": np.arange(1.0, 131.0), "quantity": "energy", "drift": 1e-9})
+    drifts = pd.concat([many.assign(name=f"a order={i}", family="a") for i in range(40)])  # 5,200 rows, 40 lines
+    drawn = svg_text(figures.drift(drifts, "made_up"))
+    assert all(f">a order={i}<" in drawn for i in range(40))
+
+
+def test_the_colour_of_a_family_is_the_same_in_every_picture_and_of_no_other():
+    ours = [name for name, each in registry.list_families().items() if each.role in (Role.OURS, Role.BASELINE)]
+    together = colours({name: name for name in ours})
+    assert len(set(together.values())) == len(ours)
+    assert all(colours({name: name}) == {name: together[name]} for name in ours)
 
 
 COLOURS = (*PALETTE.values(), *_OTHERS)
