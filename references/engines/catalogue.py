@@ -17,5 +17,5 @@ Pinocchio = method_class(_pinocchio, LocalEngine)
 def __getattr__(name: str) -> type[EngineMethod]:
     if name.startswith("_"):
         raise AttributeError(name)
-    script = Path(__file__).with_name(f"{name}.js")
+    script = Path(__file__).with_name(f"{name}.mjs")
     return engine_class(read_script(script) if script.is_file() else import_module(f"{__package__}.{name}"))

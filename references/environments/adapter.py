@@ -84,16 +84,18 @@ class EngineData(Distribution):
 
 @cache
 def read_script(path: Path) -> ModuleType:
-    """Return a module with the documentation and the data of an adapter in JavaScript.
+    """Return a module with the documentation of an adapter in JavaScript, its first comment, and its data, `ENGINE`.
 
-    They are its first comment and `exports.ENGINE`, which is JSON. Its function `prepare` runs in the environment (see
-    `worker/program.js`).
+    The data are JSON. Those that most engines in JavaScript have in common can be left out. The adapter runs in the environment
+    (see `worker/program.mjs`).
     """
-    text = path.read_text(encoding="utf-8")
-    words, _, code = text.partition("*/")
-    data, _ = json.JSONDecoder().raw_decode(code.partition("exports.ENGINE = ")[2])
+    words, _, code = path.read_text(encoding="utf-8").partition("*/")
+    data, _ = json.JSONDecoder().raw_decode(code.partition("ENGINE = ")[2])
     module = ModuleType(f"{__package__}.{path.stem}", words[3:].replace("\n *", "\n"))
-    vars(module).update(__file__=str(path), ENGINE={"kind": "npm", "module": data["package"], **data})
+    installed = ("as_installed=true",)
+    common = {"kind": "npm", "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
+    common |= {"fields": ("UniformGravity",), "card": {"variants": ("", *installed), "as_installed": installed}}
+    vars(module).update(__file__=str(path), ENGINE=common | data)
     return module
 
 

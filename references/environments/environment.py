@@ -144,7 +144,7 @@ MEMORY = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
 """Memory limit of a worker in bytes."""
 COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
-    "npm": lambda folder: (find_node("node"), Path(program.__file__).with_suffix(".js"), folder),
+    "npm": lambda folder: (find_node("node"), Path(program.__file__).with_suffix(".mjs"), folder),
 }
 """Kinds of environments, and the command line of the program that runs the engine in a folder of each kind."""
 _workers: dict[tuple[Path, str, int], Worker] = {}

@@ -19,7 +19,6 @@ from conservative.errors import BadInput
 from .environment import NODE, Distribution, find_node, folder_of_all, temporary_folder, version_key
 from .lock import Lock, Source, no_version
 
-_OFFLINE = ("ECONNREFUSED", "ECONNRESET", "EAI_AGAIN", "ENOTFOUND", "ENOTCACHED", "ETIMEDOUT")
 _OPTIONS = ("--json", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier")
 
 
@@ -62,24 +61,14 @@ def list_versions(package: str, source: Source) -> list[str]:
 
 def _run_npm(*arguments: str, folder: Path) -> Any:
     """Return the output of a command of npm, which is JSON. Raise `BadInput` if it fails."""
-    done = subprocess.run(
-        [find_node("npm"), *arguments, *_OPTIONS],
-        cwd=folder,
-        env={"npm_config_cache": str(folder_of_all().parent / "npm"), **os.environ},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    try:
-        answer = json.loads(done.stdout)
-    except ValueError:
-        answer = {"error": {"code": "", "summary": f"exit code {done.returncode}"}}
+    command = [find_node("npm"), *arguments, *_OPTIONS]
+    variables = {"npm_config_cache": str(folder_of_all().parent / "npm"), **os.environ}
+    done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 0:
-        return answer
-    code, summary = answer["error"]["code"], re.sub(r"(?<=://)[^/@\s]+@", "", answer["error"]["summary"])  # no passwords
-    if code in _OFFLINE:
-        raise BadInput("engines", f"no answer from npm's registry ({code})", "a network, or packages in npm's cache")
-    if code == "ENOSPC":
-        raise BadInput("engines", f"{folder_of_all()} on a disk without room", "a cache folder with room, or `engines remove`")
-    allowed = f"a package that npm can install ({' '.join(summary.split())[:300]})"
-    raise BadInput("engine", repr(" ".join(arguments)), allowed)
+        return json.loads(done.stdout)
+    # Without the password that an address may have.
+    words = re.sub(r"(?<=://)[^/@\s]+@", "", " ".join((done.stdout + done.stderr).split()))
+    code, summary = (re.search(rf'"{name}": "([^"]*)', words) for name in ("code", "summary"))
+    got = f"npm {arguments[0]} {arguments[-1]}, which failed ({summary[1][:300] if summary else words[-300:]})"
+    remedy = {"E404": "a package of npm's registry", "ENOSPC": "a cache folder with room, or `engines remove`"}
+    raise BadInput("engine", got, remedy.get(code[1] if code else "", "a network, or a package that npm can install"))
