@@ -192,14 +192,12 @@ def _resamples(count: int) -> Array:
 
 def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]) -> tuple[Contest, ...]:
     """Return the contest of two sides, given by rows of `costs`, at each error on each scene, even if no side reaches it."""
-    best = [_cheapest_of_each(side) for side in (ours, theirs)]
+    best = []
+    for reached in (ours, theirs):
+        rows = reached.loc[reached.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(reached) else reached
+        keys = zip(rows["scene"], rows["error"], strict=True)
+        best.append(dict(zip(keys, map(Cheapest, rows["time"], rows["name"], rows["times"]), strict=True)))
     return tuple(Contest(scene, error, *(side.get((scene, error)) for side in best)) for scene in scenes for error in errors)
-
-
-def _cheapest_of_each(reached: pd.DataFrame) -> dict[tuple[str, float], Cheapest]:
-    rows = reached.loc[reached.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(reached) else reached
-    keys = zip(rows["scene"], rows["error"], strict=True)
-    return dict(zip(keys, map(Cheapest, rows["time"], rows["name"], rows["times"]), strict=True))
 
 
 @dataclass(frozen=True)

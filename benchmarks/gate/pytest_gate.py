@@ -17,7 +17,7 @@ import pytest
 
 from conservative.errors import NotWritten
 
-from ..measures.origin import commit, machine
+from ..measures.origin import commit, machine_title
 from . import baseline, compare, results
 from .results import Results, Row, Status
 
@@ -86,7 +86,7 @@ class Gate:
         NoBaseline
             There is nothing to compare with.
         """
-        run = Results(machine().title, self.rows, commit(self.root))
+        run = Results(machine_title(), self.rows, commit(self.root))
         results.write(run, self.folder / results.FILE)
         try:
             self.verdict = compare.judge(baseline.read(self.baseline), run)

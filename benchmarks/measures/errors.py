@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from enum import IntEnum
 
 import numpy as np
 
@@ -20,22 +19,6 @@ from .measure import Measure, Value
 
 CONSERVED, SMALL = 1e-10, 1e-4
 """Relative drift up to which a quantity is conserved, and up to which its drift is small."""
-
-
-class DriftClass(IntEnum):
-    """Class of a drift; a larger number is worse."""
-
-    CONSERVED = 0
-    SMALL = 1
-    LARGE = 2
-
-
-def classify(drift: float) -> DriftClass | None:
-    """Return the class of a relative drift of either sign; None for nan."""
-    if math.isnan(drift):
-        return None
-    size = abs(drift)
-    return DriftClass.CONSERVED if size <= CONSERVED else DriftClass.SMALL if size <= SMALL else DriftClass.LARGE
 
 
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
@@ -57,8 +40,15 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     BadInput
         The trajectory is empty, or its times are not the first ones of the truth.
     """
-    require_same_times(trajectory, truth)
     n = len(trajectory)
+    if n == 0:
+        raise BadInput("trajectory", "no sample", "one sample or more")
+    allowed = f"the {n} times of the trajectory, to {trajectory.t[-1]:g} s, or more"
+    if len(truth) < n:
+        raise BadInput("truth", f"{len(truth)} samples", allowed)
+    off = np.abs(truth.t[:n] - trajectory.t).max()
+    if off > 1e-12 * max(1.0, abs(float(trajectory.t[-1]))):
+        raise BadInput("truth", f"times that differ by up to {off:.3g} s", allowed)
     R_ref, w_ref = truth.R_WB[:n], truth.w_WB_B[:n]
     attitude = angle_between(R_ref, trajectory.R_WB)
     rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=1) / (np.linalg.norm(truth.w_WB_B, axis=1).max() or 1.0)
@@ -110,16 +100,3 @@ def secular_slope(t: Array, drift: Array) -> tuple[float, float]:
         return fit_line(t, drift)[:2]
     lines = [fit_line(t, column) for column in drift.T]
     return math.hypot(*(line.slope for line in lines)), math.hypot(*(line.stderr for line in lines))
-
-
-def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:
-    """Raise `BadInput` unless the trajectory's times are the first times of the reference solution, up to round-off."""
-    n = len(trajectory)
-    if n == 0:
-        raise BadInput("trajectory", "no sample", "one sample or more")
-    allowed = f"the {n} times of the trajectory, to {trajectory.t[-1]:g} s, or more"
-    if len(truth) < n:
-        raise BadInput("truth", f"{len(truth)} samples", allowed)
-    off = np.abs(truth.t[:n] - trajectory.t).max()
-    if off > 1e-12 * max(1.0, abs(float(trajectory.t[-1]))):
-        raise BadInput("truth", f"times that differ by up to {off:.3g} s", allowed)

@@ -5,57 +5,27 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 
-@dataclass(frozen=True)
-class Machine:
-    """Description of a computer.
-
-    Attributes
-    ----------
-    processor, model
-        Name, and family and model numbers of Linux (empty on other systems).
-    architecture, system
-        Such as `x86_64`, and name and release of the operating system.
-    cores
-        Number of cores that this process may use.
-    memory
-        Total memory, as Linux reports it; "unknown" elsewhere.
-    """
-
-    processor: str
-    model: str
-    architecture: str
-    cores: str
-    memory: str
-    system: str
-
-    @property
-    def title(self) -> str:
-        """Processor, architecture and numba's version, on which round-off depends."""
-        processor = " ".join(filter(None, (self.processor, self.model)))
-        return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
-
-    def as_dict(self) -> dict[str, str]:
-        """Return the fields that reports show: all except `model`."""
-        return {name: value for name, value in vars(self).items() if name != "model"}
-
-
-def machine() -> Machine:
-    """Return the computer that this runs on."""
-    processor = first_values("/proc/cpuinfo")
+def machine() -> dict[str, str]:
+    """Return processor, architecture, cores that this process may use, memory (if Linux reports it) and operating system."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return Machine(
-        processor=processor.get("model name", "") or platform.processor() or platform.machine(),
-        model=" ".join(f"{key} {processor[key]}" for key in ("cpu family", "model") if key in processor),
-        architecture=platform.machine(),
-        cores=str(usable),
-        memory=first_values("/proc/meminfo").get("MemTotal", "unknown"),
-        system=f"{platform.system()} {platform.release()}",
-    )
+    return {
+        "processor": first_values("/proc/cpuinfo").get("model name", "") or platform.processor() or platform.machine(),
+        "architecture": platform.machine(),
+        "cores": str(usable),
+        "memory": first_values("/proc/meminfo").get("MemTotal", "unknown"),
+        "system": f"{platform.system()} {platform.release()}",
+    }
+
+
+def machine_title() -> str:
+    """Return what round-off depends on: processor (on Linux with family and model), architecture and numba's version."""
+    numbers = first_values("/proc/cpuinfo")
+    model = [f"{key} {numbers[key]}" for key in ("cpu family", "model") if key in numbers]
+    return ", ".join((" ".join([machine()["processor"], *model]), platform.machine(), f"numba {metadata.version('numba')}"))
 
 
 def first_values(path: str) -> dict[str, str]:

@@ -45,21 +45,11 @@ class Processes(ExitStack):
         budget: float,
         shared: Sequence[object] = (),
     ) -> dict[Key, list[Timing]]:
-        """Return the timing of each run in each process.
+        """Return the timing of each run in each process; several processes have half of the rounds and of the budget each.
 
-        Several processes have half of the rounds and of the budget each.
-
-        Parameters
-        ----------
-        runs, prepares
-            The runs, prepared here, and functions that prepare them elsewhere, such as
-            `partial(method.prepare, scene, grid)`. Functions that cannot be transferred are timed in this process only.
-        limit
-            Time limit of another process, s, for all runs.
-        rounds, min_time, budget
-            See `time_interleaved`.
-        shared
-            See `run_within`: objects that many functions refer to, such as the scene.
+        `runs` are prepared here. `prepares` prepare them elsewhere, such as `partial(method.prepare, scene, grid)`; functions
+        that cannot be transferred are timed in this process only. Another process has `limit`, s, for all runs. For `shared`
+        see `run_within`, for the others `time_interleaved`.
         """
         parts = 2 if self._others else 1
         how: dict[str, Any] = {"rounds": math.ceil(rounds / parts), "min_time": min_time, "budget": budget / parts}

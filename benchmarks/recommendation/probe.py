@@ -103,18 +103,10 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The question that a recommendation answers.
+    """The question that a recommendation answers: which settings keep the attitude error, rad, on a scene over a duration, s.
 
-    Attributes
-    ----------
-    scene, error, duration
-        Scene, largest attitude error, rad, and duration, s.
-    methods, missing
-        The engines to probe, and the names of those that are not installed.
-    cost_limit
-        Largest wall time of a setting per simulated second, s/s.
-    time_limit
-        Wall time, s, after which the run of an engine is stopped.
+    `methods` are the engines to probe, `missing` the names of those that are not installed. A setting may cost `cost_limit` of
+    wall time per simulated second, s/s; a run of an engine is stopped after `time_limit`, s.
     """
 
     scene: Scene
@@ -130,18 +122,9 @@ class Question:
 class Conditions(Question):
     """A question with the conditions under which all of its probes run.
 
-    Attributes
-    ----------
-    spacing, samples
-        Sampling interval, s, and number of samples in a short window.
-    reference
-        The reference solution.
-    truth
-        Returns the true attitudes (n, 3, 3) on a grid.
-    truth_until
-        End of the truth, s.
-    rate
-        Largest angular speed, rad/s.
+    `spacing` is the sampling interval, s, and `samples` the number of samples in a short window. `truth` returns the attitudes
+    (n, 3, 3) of the reference solution on a grid that ends at `truth_until`, s, or before. `rate` is the largest angular speed,
+    rad/s.
     """
 
     spacing: float
@@ -187,15 +170,15 @@ class Conditions(Question):
         order = np.argsort(t, kind="stable")
         return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)
 
-    def step_at_most(self, dt: float) -> float:
-        """Return the longest round step, s, of at most dt."""
-        spacing = self.spacing
-        return spacing * _round_down(dt / spacing) if dt >= spacing else spacing / _round_up(spacing / dt)
-
-    def step_at_least(self, dt: float) -> float:
-        """Return the shortest round step, s, of at least dt."""
-        spacing = self.spacing
-        return spacing * _round_up(dt / spacing) if dt >= spacing else spacing / _round_down(spacing / dt)
+    def round_step(self, dt: float, up: bool = False) -> float:
+        """Return the longest round step, s, of at most dt, or if `up` the shortest of at least dt."""
+        longer = dt >= self.spacing
+        ratio = dt / self.spacing if longer else self.spacing / dt
+        if up is longer:
+            number = _ROUND[bisect.bisect_left(_ROUND, ratio * (1 - 1e-9))]
+        else:
+            number = _ROUND[bisect.bisect_right(_ROUND, ratio * (1 + 1e-9)) - 1]
+        return self.spacing * number if longer else self.spacing / number
 
     def choose_ours(self, methods: Sequence[Method] | None = None, error: float | None = None) -> tuple[Method, float]:
         """Return the method of the automatic choice for a short window, among all candidates or some, and its round step, s.
@@ -204,7 +187,7 @@ class Conditions(Question):
         """
         wanted = self.target * min(1.0, self.short / self.duration) if error is None else error
         method, dt = find_cheapest(trials_of(self.scene), wanted, self.short, methods)
-        return method, self.step_at_most(min(dt, self.short / STEPS))
+        return method, self.round_step(min(dt, self.short / STEPS))
 
     def window(self, dt: float, cost: float, long: bool) -> Grid:
         """Return the samples of a run with steps of at most dt, s, that cost `cost` s/s: as far as the time limit allows.
@@ -291,14 +274,6 @@ class Conditions(Question):
         """Return whether a probe covered a whole short window without losing the attitude, so that it shows how errors grow."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
-
-
-def _round_down(ratio: float) -> float:
-    return float(_ROUND[bisect.bisect_right(_ROUND, ratio * (1 + 1e-9)) - 1])
-
-
-def _round_up(ratio: float) -> float:
-    return float(_ROUND[bisect.bisect_left(_ROUND, ratio * (1 - 1e-9))])
 
 
 def prepare_conditions(asked: Question) -> Conditions:

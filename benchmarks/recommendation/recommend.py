@@ -69,22 +69,9 @@ def ask(
     cost_limit: float = COST_LIMIT,
     time_limit: float = HANG_LIMIT,
 ) -> Question:
-    """Check the arguments of a recommendation.
+    """Return the question of a recommendation (see `Question`), after checking the arguments.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    error
-        Largest attitude error over the duration, rad.
-    duration
-        Duration, s; default: that of the scene.
-    engine_names
-        Engines, such as `("mujoco",)`; default: all that are installed.
-    cost_limit
-        Largest wall time of a setting per simulated second, s/s.
-    time_limit
-        Wall time, s, after which the run of an engine is stopped.
+    The default duration is that of the scene. Engines are named as in `("mujoco",)`; by default all that are installed.
 
     Raises
     ------
@@ -128,24 +115,12 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
 
 @dataclass(frozen=True)
 class Advice:
-    """The recommended setting of one method.
+    """The recommended setting of one method. `line` is its name without the setting that is searched.
 
-    Attributes
-    ----------
-    line
-        Name of the method without the setting that is searched.
-    best
-        The probe at the recommended setting; if no setting reaches the error, the nearest one.
-    reached
-        True if the requested error can be expected.
-    cost
-        Wall time per simulated second at that setting, s/s, interleaved minimum; NaN if it could not be timed.
-    order
-        Observed order in the step; None for adaptive methods and for methods without truncation error.
-    probes
-        All runs, coarse to fine.
-    reason
-        Why the method cannot be used or does not reach the error; empty if it does.
+    `best` is the probe at the recommended setting, or at the nearest one if no setting reaches the error, and `reached` is true
+    if the error can be expected there. `cost` is its wall time per simulated second, s/s, an interleaved minimum; NaN if it
+    could not be timed. `order` is the observed one in the step; None for adaptive methods and without truncation error. The
+    probes are all runs, coarse to fine. `reason` is why the method cannot be used or does not reach the error.
     """
 
     line: str
@@ -169,11 +144,6 @@ class Recommendation:
 
     conditions: Conditions
     advice: tuple[Advice, ...]
-
-    @property
-    def ours(self) -> Advice:
-        """Advice on the method of the automatic choice."""
-        return self.advice[0]
 
     @property
     def winners(self) -> dict[str, Advice | None]:
@@ -260,9 +230,9 @@ def _refine_from_start(conditions: Conditions, method: Method, step: float) -> R
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))
         return refine(conditions, selection.at_tolerance(method, setting, float(f"{loosest:.0e}")), conditions.spacing)
-    longest = conditions.step_at_most(conditions.short / STEPS)
+    longest = conditions.round_step(conditions.short / STEPS)
     if method.role != Role.OURS:
-        return refine(conditions, method, min(longest, conditions.step_at_most(step_ladder.RADIANS / conditions.rate)))
+        return refine(conditions, method, min(longest, conditions.round_step(step_ladder.RADIANS / conditions.rate)))
     return refine(conditions, method, step if method.order is None else min(COARSER_START * step, longest))
 
 
@@ -295,7 +265,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     if order is not None and first.expected < COARSEN_BELOW * conditions.target:
         # At most four times: the error must still shrink with its order there.
         factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / order))
-        step = conditions.step_at_most(first.dt * factor)
+        step = conditions.round_step(first.dt * factor)
         long += [conditions.probe(method, step, first.cost * first.dt / step, True)] if step > first.dt else []
     return Refinement(tuple(short), tuple(long))
 
@@ -325,9 +295,9 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     growing = sum(conditions.shows_growth(probe) for probe in probes)
     if conditions.shows_growth(last) and growing < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that an order can be observed
-    dt = conditions.step_at_most(last.dt * factor)
+    dt = conditions.round_step(last.dt * factor)
     if dt < per_step / conditions.cost_limit:
-        dt = conditions.step_at_least(per_step / conditions.cost_limit)
+        dt = conditions.round_step(per_step / conditions.cost_limit, up=True)
     return (last.method, dt, per_step / dt) if dt < last.dt * (1 - 1e-9) else None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 from conservative import registry
@@ -55,19 +56,15 @@ def list_installed() -> tuple[str, ...]:
 
     If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """
-    here = {name: _version_here(family) for name, family in registry.list_families().items() if family.role == Role.ENGINE}
+    here = {}
+    for name, family in registry.list_families().items():
+        if family.role == Role.ENGINE:
+            with suppress(MissingEngine):
+                here[name] = family().maker.version
     known = registry.list_engines()
     newest = {each.engine: each for each in list_environments() if each.engine in known}  # older versions come first
     apart = [f"{name}=={each.version}" for name, each in newest.items() if here.get(name) != each.version]
-    return (*(name for name, version in here.items() if version is not None), *apart, *list_programs())
-
-
-def _version_here(family: type[Method]) -> str | None:
-    """Return the version of an engine in this environment; None if it is not installed."""
-    try:
-        return family().maker.version
-    except MissingEngine:
-        return None
+    return (*here, *apart, *list_programs())
 
 
 def _family(engine: str, version: str) -> type[Method]:
@@ -80,8 +77,3 @@ def _family(engine: str, version: str) -> type[Method]:
         return registry.list_families()[engine]
     engine_class: Any = registry.engine(engine)
     return engine_class.at_version(version) if version else engine_class
-
-
-def is_as_installed(method: Method) -> bool:
-    """Return whether a method is its engine as installed, with nothing set but the step."""
-    return not isinstance(method, Missing) and method in method.settings_for("as_installed")

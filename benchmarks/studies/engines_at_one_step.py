@@ -22,7 +22,6 @@ from ..measures import errors
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from .case import Case, Success
-from .engine_selection import is_as_installed
 from .selection import Missing
 from .speed import MEASURES, TimedRun, time_steps
 from .step_ladder import SAMPLES
@@ -62,7 +61,7 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
         order = math.nan if method.order is None else float(method.order)
         properties = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
         outcome = OK if isinstance(done, Success) else done
-        yield from case.rows(properties, outcome, AS_INSTALLED if is_as_installed(method) else "")
+        yield from case.rows(properties, outcome, AS_INSTALLED if method in method.settings_for("as_installed") else "")
     yield from measure_accuracy(case, done, truth)
     if isinstance(done, Success):
         # The same steps with few samples, and fewer steps if the run is slow.
@@ -81,18 +80,13 @@ def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> 
     if isinstance(done, Outcome):
         return case.rows([*errors.blanks(case.scene), *blanks(*counted)], done)
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
-        values = errors.measure_errors(done.trajectory, truth)
-        rows = [case.row(value, detail=find_direction(value, done.trajectory)) for value in values]
+        rows = case.rows(errors.measure_errors(done.trajectory, truth))
+        if energy := find_energy(case.scene.invariants):
+            direction = "gained" if done.trajectory.drift(energy)[-1] > 0 else "lost"
+            place = next(i for i, row in enumerate(rows) if (row.measure, row.quantity) == (Measure.DRIFT_MAX, energy.name))
+            rows[place] = replace(rows[place], detail=direction)
     turns = (count_turns_over(done.trajectory), count_turns_over(truth)) if counted else ()
     return rows + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
-
-
-def find_direction(value: Value, trajectory: Trajectory) -> str:
-    """Return whether the energy drift is a gain or a loss; empty for other quantities."""
-    energy = find_energy(trajectory.scene.invariants)
-    if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
-        return ""
-    return "gained" if trajectory.drift(energy)[-1] > 0 else "lost"
 
 
 def count_turns_over(trajectory: Trajectory) -> int:

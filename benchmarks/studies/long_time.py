@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,21 +45,13 @@ KINDS = {0.25: "bounded", 0.75: "random walk", 1.5: "linear", math.inf: "quadrat
 """Name of a growth, by the largest exponent."""
 
 
-@dataclass(frozen=True, eq=False)
-class Growth:
-    """Largest errors so far (n,) at times (n,), s, in the order of time, and the exponent of their growth; NaN if unknown."""
-
-    t: Array
-    error: Array
-
-    @property
-    def exponent(self) -> float:
-        """Slope of log(error) over log(t) over the last two decades before the error is `LOST`."""
-        t, error = (values[(self.error > 0) & (self.error < LOST)] for values in (self.t, self.error))
-        if len(t) < PER_DECADE:
-            return math.nan
-        last = t >= t[-1] / 100
-        return float(np.polyfit(np.log(t[last]), np.log(error[last]), 1)[0])
+def exponent(t: Array, error: Array) -> float:
+    """Return the slope of log(error) over log(t), each (n,), over the last two decades before the error is `LOST`, or NaN."""
+    t, error = (values[(error > 0) & (error < LOST)] for values in (t, error))
+    if len(t) < PER_DECADE:
+        return math.nan
+    last = t >= t[-1] / 100
+    return float(np.polyfit(np.log(t[last]), np.log(error[last]), 1)[0])
 
 
 def families(study: Study) -> tuple[Method, ...]:
@@ -103,16 +95,20 @@ def measure_growth(study: Study, scene: Scene, method: Method, budget: float) ->
     if not trajectories:
         return
     yield case.row(Value(Measure.TURNS, float(trajectories[-1].t[-1]) / turn))
-    for quantity, growth in errors(study, trajectories).items():
-        kind = next((name for limit, name in KINDS.items() if growth.exponent <= limit), "")
+    for quantity, (t, error) in errors(study, trajectories).items():
+        power = exponent(t, error)
+        kind = next((name for limit, name in KINDS.items() if power <= limit), "")
         measure = Measure.ATTITUDE_MAX if quantity == ATTITUDE else Measure.DRIFT_MAX
-        yield case.row(Value(measure, float(growth.error[-1]), quantity * (quantity != ATTITUDE)))
-        yield case.row(Value(Measure.GROWTH, growth.exponent, quantity), detail=kind)
-        yield case.samples(quantity, growth.t / turn, growth.error)
+        yield case.row(Value(measure, float(error[-1]), quantity * (quantity != ATTITUDE)))
+        yield case.row(Value(Measure.GROWTH, power, quantity), detail=kind)
+        yield case.samples(quantity, t / turn, error)
 
 
-def errors(study: Study, trajectories: list[Trajectory]) -> dict[str, Growth]:
-    """Return the growth of each error from runs of the same motion, short to long, at times with equal ratios."""
+def errors(study: Study, trajectories: list[Trajectory]) -> dict[str, tuple[Array, Array]]:
+    """Return times (n,), s, with equal ratios and the largest value so far (n,) of each error.
+
+    The trajectories are of the same motion, short to long.
+    """
     scene, found = trajectories[0].scene, dict[str, tuple[list[Array], list[Array]]]()
     for number, trajectory in enumerate(trajectories):
         values = {invariant.name: sizes(trajectory.drift(invariant)) for invariant in scene.invariants}
@@ -127,8 +123,7 @@ def errors(study: Study, trajectories: list[Trajectory]) -> dict[str, Growth]:
             t, error = found.setdefault(quantity, ([], []))
             t.append(trajectory.t[chosen])
             error.append(np.maximum.accumulate(value)[chosen])
-    joined = {quantity: [np.concatenate(part) for part in parts] for quantity, parts in found.items()}
-    return {quantity: Growth(t, np.maximum.accumulate(error)) for quantity, (t, error) in joined.items()}
+    return {name: (np.concatenate(t), np.maximum.accumulate(np.concatenate(error))) for name, (t, error) in found.items()}
 
 
 def grid_of(scene: Scene, duration: float) -> Grid:

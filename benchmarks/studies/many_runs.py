@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
@@ -129,16 +129,7 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
         return outcome_of_error(way.method, error, skip_missing)
 
 
-def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings of a family whose throughput is compared; none if it runs single bodies only."""
-    return method.settings_for("many")
-
-
-def families(methods: tuple[Method, ...], quick: bool = False) -> Iterator[Method]:
-    """Yield these settings of each family once.
-
-    If `quick`, each family has one setting: one without truncation error if there is one, otherwise the first.
-    """
-    for family in dict.fromkeys(type(method) for method in methods):
-        offered = settings(next(method for method in methods if type(method) is family))
-        yield from sorted(offered, key=takes_exact_steps, reverse=True)[:1] if quick else offered
+def family_settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
+    """Return one setting of each family that runs many bodies: without truncation error if there is one, else the first."""
+    families = {type(method): method.settings_for("many") for method in methods}.values()
+    return tuple(sorted(offered, key=takes_exact_steps, reverse=True)[0] for offered in families if offered)

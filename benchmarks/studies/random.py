@@ -127,11 +127,6 @@ class TimedSetting:
     error: float
     spent: float
 
-    @property
-    def side(self) -> str:
-        """The side of the setting: ours, or the name of an engine."""
-        return Role.OURS if self.case.method.role == Role.OURS else self.case.method.family
-
 
 Line = list[TimedSetting]
 """The points of one line, coarse to fine."""
@@ -200,7 +195,8 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     """
     sides: dict[str, list[Line]] = {}
     for line in filter(None, lines):
-        sides.setdefault(line[0].side, []).append(line)
+        method = line[0].case.method
+        sides.setdefault(Role.OURS if method.role == Role.OURS else method.family, []).append(line)
     chosen: dict[int, TimedSetting] = {}
     for side, error in itertools.product(sides.values(), DECADES):
         costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in side]

@@ -58,11 +58,6 @@ class TimedRun:
     done: Success
     first: Success
 
-    @property
-    def simulated(self) -> float:
-        """Simulated time of one timed call, s."""
-        return self.case.grid.dt * self.case.grid.n_steps
-
 
 def make_timed(study: Study, case: Case) -> TimedRun | Outcome:
     """Return a case that is ready to be timed, or the outcome of its failure.
@@ -131,16 +126,16 @@ def time_steps(study: Study, ready: Sequence[TimedRun]) -> Iterator[Measurement]
 
 def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
     """Yield the rows of one method."""
-    steps = timed.done.trajectory.counters.steps or math.nan
+    steps, simulated = timed.done.trajectory.counters.steps or math.nan, timed.case.grid.dt * timed.case.grid.n_steps
     values = (
         timing.minimum / steps,
         timing.median / steps,
-        timing.minimum / timed.simulated,
-        timing.median / timed.simulated,
+        timing.minimum / simulated,
+        timing.median / simulated,
         timed.first.cost.prepare,
         timed.first.cost.first_call,
     )
-    detail = f"{timing} of {timed.simulated:.4g} s, {steps} steps"
+    detail = f"{timing} of {simulated:.4g} s, {steps} steps"
     for measure, value in zip(MEASURES, values, strict=True):
         outcome = OK if not math.isnan(value) else UNCOUNTED if timing.outcome.ok else timing.outcome
         yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")

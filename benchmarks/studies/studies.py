@@ -91,11 +91,7 @@ def list_hard_studies(
     )
 
 
-def _silent(done: int, total: int, what: str) -> None:
-    """Report no progress."""
-
-
-def findings(study: Study, progress: Progress = _silent) -> Iterator[Finding]:
+def findings(study: Study, progress: Progress = lambda done, total, what: None) -> Iterator[Finding]:
     """Yield rows and samples of a study as they are measured.
 
     Raises
@@ -109,6 +105,6 @@ def findings(study: Study, progress: Progress = _silent) -> Iterator[Finding]:
     return MAKERS[study.name](study, progress)
 
 
-def rows(study: Study, progress: Progress = _silent) -> Iterator[Measurement]:
+def rows(study: Study) -> Iterator[Measurement]:
     """Yield only the rows of a study; see `findings`."""
-    return (finding for finding in findings(study, progress) if isinstance(finding, Measurement))
+    return (finding for finding in findings(study) if isinstance(finding, Measurement))

@@ -125,11 +125,6 @@ class Kind:
     measured: Array
     truth: Array
 
-    @property
-    def few(self) -> Batch:
-        """The bodies whose errors are measured."""
-        return self.bodies[self.measured]
-
 
 @dataclass(frozen=True, eq=False)
 class BatchSetting:
@@ -195,8 +190,11 @@ def _grid(n: int) -> Grid:
 
 
 def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[BatchSetting]]:
-    """Yield the errors of a line, coarse to fine, down to the last of `ERRORS` or to the time budget; return its points."""
-    study, n, line = kind.study, len(kind.few), list[BatchSetting]()
+    """Yield the errors of a line, coarse to fine, down to the last of `ERRORS` or to the time budget; return its points.
+
+    Errors are the median and the 95th percentile, rad, of the bodies; a failed body has an error of pi.
+    """
+    study, n, line = kind.study, len(kind.measured), list[BatchSetting]()
     exact, few = takes_exact_steps(way.method), FEW if study.quick else slice(None)
     one = _case(study, kind.bodies.scene, way.method, EXACT_STEPS if exact else SAMPLES)
     one = replace(one, bodies=n, way=way.text)
@@ -204,25 +202,20 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or line[-1].spent * n > 2 * study.longest_run):
             break
         chosen = replace(way, method=case.method)
-        done = attempt_many(chosen, kind.few, case.grid, study.hang_limit, study.skip_missing)
+        done = attempt_many(chosen, kind.bodies[kind.measured], case.grid, study.hang_limit, study.skip_missing)
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
             if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
                 break  # at any tolerance
             continue
-        errors = read_errors(done, kind.truth)
+        with np.errstate(all="ignore"):  # too long a step can overflow
+            off = angle_between(kind.truth, done.block.R_WB).max(axis=1)
+        off = np.where(done.block.finished & np.isfinite(off), off, math.pi)
+        errors = {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
         line.append(BatchSetting(chosen, case, errors, done.spent / n, done.prepare / n))
         values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
         yield from case.rows(values, detail=EXACT if exact else "")
     return line
-
-
-def read_errors(done: ManyDone, truth: Array) -> dict[str, float]:
-    """Return the median and the 95th percentile, rad, of the bodies' errors; a failed body has an error of pi."""
-    with np.errstate(all="ignore"):  # too long a step can overflow
-        off = angle_between(truth, done.block.R_WB).max(axis=1)
-    off = np.where(done.block.finished & np.isfinite(off), off, math.pi)
-    return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 
 
 def select_deciding(line: list[BatchSetting]) -> list[BatchSetting]:

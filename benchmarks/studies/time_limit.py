@@ -48,8 +48,10 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
             return attempt(case, skip_missing)
     if is_bounded(case.method):
         return attempt(case, skip_missing)
-    if known := _find_timeout(limit, case):
-        return known
+    before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
+    longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
+    if limit <= before and longer:  # at least as long, in steps and in time, as one that was stopped at this limit
+        return Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s")
     try:
         done = run_within(limit, partial(_attempt, case), (case.scene,))
     except (EngineTimeout, EngineCrashed) as failure:
@@ -87,15 +89,6 @@ def is_bounded(method: Method) -> bool:
 
 def _is_ours(method: Method) -> bool:
     return type(method).__module__.startswith("conservative.")
-
-
-def _find_timeout(limit: float, case: Case) -> Outcome | None:
-    """Return the outcome of a case that is at least as long, in steps and in time, as one that was stopped at this limit."""
-    before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
-    longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
-    if limit > before or not longer:
-        return None
-    return Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s")
 
 
 def _attempt(case: Case) -> Success | Outcome:

@@ -7,6 +7,7 @@ of an energy drift, and the error and the time within a factor. A change counts 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +15,7 @@ from enum import Enum
 from conservative.outcome import Outcome
 
 from ..measures.convergence_order import Order
-from ..measures.errors import DriftClass, classify
+from ..measures.errors import CONSERVED, SMALL
 from .engine import EngineComparison, Observation, Spread, StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
@@ -38,18 +39,9 @@ class Aspect(Enum):
 
 @dataclass(frozen=True)
 class Change:
-    """A conclusion that differs between two versions.
+    """A conclusion that differs between two versions; for times, `now` is the ratio.
 
-    Attributes
-    ----------
-    aspect
-        Subject.
-    was, now
-        Measurements; for times, `now` is the ratio.
-    quantity
-        Name of the invariant of a drift; else empty.
-    lost
-        True if the later version lost something: the end of a run, an order, an invariant.
+    `quantity` is the invariant of a drift. `lost` is true if the later version lost the end of a run, an order or an invariant.
     """
 
     aspect: Aspect
@@ -62,12 +54,7 @@ class Change:
 def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_times: StepTimes) -> tuple[Change, ...]:
     """Return the changes from one version to another, on one scene and with one setting, most important first.
 
-    Parameters
-    ----------
-    was, now
-        Observations of both.
-    was_times, now_times
-        Times of a step in both (n,), s; empty if not known.
+    `was_times` and `now_times` are the times of a step (n,), s; empty if not known.
     """
     if was.outcome.kind is not now.outcome.kind:
         return (Change(Aspect.OUTCOME, was.outcome, now.outcome, lost=was.outcome.ok),)
@@ -99,13 +86,14 @@ def _orders(was: Observation, now: Observation) -> Iterator[Change]:
 def _drifts(was: Observation, now: Observation) -> Iterator[Change]:
     for quantity in was.drifts:
         before, after = was.drifts[quantity], now.drifts[quantity]
-        grade, other = classify(before.value), classify(after.value)
-        if grade is None or other is None:
+        if math.isnan(before.value) or math.isnan(after.value):
             continue
-        if grade is other is DriftClass.LARGE:
+        limits = CONSERVED, SMALL  # up to which a quantity is conserved (grade 0) or drifts little (1)
+        grade, other = (bisect_left(limits, abs(drift.value)) for drift in (before, after))
+        if grade == other == len(limits):
             if before.high < 0 < after.low or after.high < 0 < before.low:
                 yield Change(Aspect.DRIFT, before, after, quantity)
-        elif grade is not other and direction(before, after):
+        elif grade != other and direction(before, after):
             yield Change(Aspect.DRIFT, before, after, quantity, lost=other > grade)
 
 

@@ -55,17 +55,7 @@ class Comparison(Generic[Result, Times]):
 def compare(
     sides: Sequence[Side[Result]], scenes: Sequence[str], tell: Tell = lambda share, what: None
 ) -> Comparison[Result, Times]:
-    """Return the comparison of versions, without times.
-
-    Parameters
-    ----------
-    sides
-        Two or more, in the order of comparison.
-    scenes
-        Registered names.
-    tell
-        Progress.
-    """
+    """Return the comparison of two or more versions, in their order, on registered scenes; without times."""
     lines: list[Line[Result, Times]] = []
     for number, scene in enumerate(scenes):
         by_version: list[dict[str, Result]] = []

@@ -91,16 +91,10 @@ class StepError:
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """Measurements of one version of an engine, with one setting, on one scene.
+    """Measurements of one version of an engine, with one setting, on one scene at the step dt, s.
 
     Attributes
     ----------
-    scene, setting, version, label
-        Names; setting and label belong to the method.
-    dt
-        Step, s, of everything but the orders.
-    outcome
-        Outcome of the run.
     points
         Errors at shorter and shorter steps; empty for a method whose accuracy does not depend on a step.
     attitude_order, rates_order
@@ -221,18 +215,10 @@ class EngineSide:
 def plan_versions(
     versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str], time_limit: float | None = None
 ) -> tuple[EngineSide, ...]:
-    """Return the sides of a comparison of versions of an engine.
+    """Return the sides of a comparison of two or more versions of an engine, in their order; for `time_limit` see `Study`.
 
-    Parameters
-    ----------
-    versions
-        Two or more of one engine, in the order of comparison.
-    settings
-        As in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as installed.
-    scene_names
-        By default those of a report that a setting supports.
-    time_limit
-        Time budget of a run, s; see `Study`.
+    Settings are as in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as
+    installed. Default scenes are those of a report that a setting supports.
 
     Raises
     ------

@@ -192,18 +192,9 @@ def compare_projects(
     processes: int = PROCESSES,
     tell: Tell = lambda share, what: None,
 ) -> ProjectComparison:
-    """Return the comparison of two versions of a project.
+    """Return the comparison of an earlier and a later version of a project, with a number of processes of each for times.
 
-    Parameters
-    ----------
-    base, head
-        The earlier and the later version.
-    scenes, methods
-        Registered names; by default the scenes of the suite, and all methods with the role `Role.OURS`.
-    processes
-        Number of processes of each version in a measurement of times.
-    tell
-        Progress.
+    Scenes and methods are registered names; by default the scenes of the suite, and all methods with the role `Role.OURS`.
 
     Raises
     ------

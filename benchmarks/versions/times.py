@@ -14,7 +14,7 @@ Bootstrap, 1993, chapter 13); samples of one process contain no information abou
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -153,26 +153,19 @@ class Clock:
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
         if row not in self._work:
-            base = self._sides[0]
-            n, run = last_a_sample(lambda n: base.timed(row.scene, row.method, row.dt, n))
-            spent = min(wall_time(run) for _ in range(5))
-            self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
+            n, spent = 16, 0.0
+            while True:  # to the number of steps that take as long as a sample, to several percent
+                run = self._sides[0].timed(row.scene, row.method, row.dt, n)
+                run()
+                spent = max(min(wall_time(run) for _ in range(5)), 1e-9)
+                if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
+                    break
+                n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / spent)))
+            self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / spent / 2)))
         steps, calls = self._work[row]
         runs = [[side.timed(row.scene, row.method, row.dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
         was, now = _sample(runs, calls, turn)
         return was / steps, now / steps
-
-
-def last_a_sample(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
-    """Return the number of steps that take as long as a sample, to several percent, and their run."""
-    n = 16
-    while True:
-        run = prepare(n)
-        run()
-        spent = min(wall_time(run) for _ in range(5))
-        if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
-            return n, run
-        n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / max(spent, 1e-9))))
 
 
 def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int) -> tuple[float, float]:

@@ -22,16 +22,10 @@ _ALLOWED = "a git ref of the project's repository, a wheel, or a folder with pyp
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a project or of an engine.
+    """A version of a project or of an engine, and the environment in which it runs.
 
-    Attributes
-    ----------
-    name
-        The ref, the release, or the name of the folder or of the wheel.
-    commit
-        Its commit, with "+changes" for a folder with changes that are not committed; "" for a wheel or a release.
-    environment
-        The environment in which it runs.
+    `name` is the ref, the release, or the name of the folder or of the wheel. `commit` has "+changes" for a folder with changes
+    that are not committed, and is "" for a wheel or a release.
     """
 
     name: str
@@ -59,10 +53,8 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
         A wheel, a folder of sources, or a ref of the git repository that the project is in.
     project
         Folder of the project, which need not be the top of its repository.
-    source
-        Source of packages.
-    requirements
-        Additional packages for its environment.
+    source, requirements
+        Source of packages, and additional ones for its environment.
 
     Raises
     ------

@@ -135,17 +135,13 @@ def read_mjcf(path: str, name: str) -> MassDistribution:
     mj.mj_kinematics(model, data)
     body = model.body(name).id
     origin, R_WB = data.xpos[body], data.xmat[body].reshape(3, 3)
-    parts = []
-    for part in np.flatnonzero(model.body_weldid == body):
-        R_BI = R_WB.T @ data.ximat[part].reshape(3, 3)
-        inertia = R_BI @ np.diag(model.body_inertia[part]) @ R_BI.T
-        parts.append((float(model.body_mass[part]), R_WB.T @ (data.xipos[part] - origin), inertia))
-    mass = sum(m for m, _, _ in parts)
-    com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
-    inertia = np.zeros((3, 3))
-    for m, c, J in parts:
-        d = c - com
-        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
+    welded = model.body_weldid == body
+    masses, R_BI = model.body_mass[welded], R_WB.T @ data.ximat[welded].reshape(-1, 3, 3)
+    mass, places = masses.sum(), (data.xipos[welded] - origin) @ R_WB
+    com = masses @ places / mass
+    d = places - com
+    inertia = ((R_BI * model.body_inertia[welded][:, None]) @ R_BI.swapaxes(1, 2)).sum(axis=0)
+    inertia += np.einsum("n,ni,ni", masses, d, d) * np.eye(3) - (d.T * masses) @ d
     fixed_point = _mujoco_fixed_point(mj, model, data, body)
     lever = np.zeros(3) if fixed_point is None else com - R_WB.T @ (fixed_point - origin)
     return MassDistribution(mass, lever, inertia)

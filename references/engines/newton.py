@@ -85,7 +85,9 @@ def prepare(given):
     for each in steps:
         each()
     steps = steps if given.solver == NOT_RECORDED else [record_warp(each) for each in steps]
-    return partial(_march, steps, [_views(state) for state in states], renew, given.steps)
+    # Views of the engine's own arrays: position and quaternion, scalar last; velocities in the world.
+    views = [(state.body_q.numpy()[0], state.body_qd.numpy()[0]) for state in states]
+    return partial(_march, steps, views, renew, given.steps)
 
 
 def _start(state, start):
@@ -107,11 +109,6 @@ def _march(steps, views, renew, counts):
     return {"q": q, "w_W": w}
 
 
-def _views(state):
-    """Return views of the engine's own arrays: position and quaternion, scalar last; velocities in the world."""
-    return state.body_q.numpy()[0], state.body_qd.numpy()[0]
-
-
 def _model(newton, warp, given):
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, -given.gravity))
     if given.solver == "Kamino":
@@ -126,14 +123,11 @@ def _model(newton, warp, given):
 
 def _add_body(builder, warp, given):
     """Add the body, on a free joint, or on a ball joint without armature, friction and damping; return its number."""
-    w, x, y, z = given.q_com.tolist()
-    axes = np.array(warp.quat_to_matrix(warp.quat(x, y, z, w)), float).reshape(3, 3)
     w, x, y, z = given.q0.tolist()
-    inertia = axes @ np.diag(given.moments_com) @ axes.T
     options = {
         "xform": warp.transform((0.0, 0.0, 0.0), (x, y, z, w)),
         "com": warp.vec3(*given.com.tolist()),
-        "inertia": warp.mat33(*inertia.ravel().tolist()),
+        "inertia": warp.mat33(*given.inertia_com.ravel().tolist()),
         "mass": given.mass,
     }
     if given.free:

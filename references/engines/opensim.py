@@ -73,16 +73,13 @@ def _build(opensim, given):
     joint = (opensim.FreeJoint if given.free else opensim.BallJoint)("joint", model.getGround(), body)
     model.addBody(body)
     model.addJoint(joint)
-    state = model.initSystem()
-    for i, (angle, rate) in enumerate(zip(_angles(given.R0), given.w0_W.tolist(), strict=True)):
+    state, R = model.initSystem(), given.R0
+    # Angles about body-fixed axes x, y and z.
+    angles = math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
+    for i, (angle, rate) in enumerate(zip(angles, given.w0_W.tolist(), strict=True)):
         joint.get_coordinates(i).setValue(state, angle, False)
         joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
     return model, body, state
-
-
-def _angles(R):
-    """Return the body-fixed angles about x, y and z."""
-    return math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
 
 
 def _manager(opensim, model, given):

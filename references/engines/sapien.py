@@ -50,7 +50,10 @@ def prepare(given):
     body.set_cmass_local_pose(sapien.Pose(given.com.astype(np.float32), given.q_com.astype(np.float32)))
     body.set_inertia(given.moments_com.astype(np.float32))
     if not given.as_installed:
-        _switch_off(body)
+        body.set_angular_damping(0)
+        body.set_linear_damping(0)
+        body.set_max_angular_velocity(1e6)
+        body.set_sleep_threshold(0)
     entity = sapien.Entity()
     entity.add_component(body)
     if not given.free:
@@ -76,10 +79,3 @@ def _hold(sapien, body):
     for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
         lock(0, 0)
     return joint
-
-
-def _switch_off(body):
-    body.set_angular_damping(0)
-    body.set_linear_damping(0)
-    body.set_max_angular_velocity(1e6)
-    body.set_sleep_threshold(0)

@@ -37,11 +37,6 @@ def cross(a: Vector, b: Vector) -> Vector:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def norm(a: Vector) -> Number:
-    """Return |a|."""
-    return mp.sqrt(sum(x * x for x in a))
-
-
 def halves_in_double(R: Matrix) -> tuple[complex, complex]:
     """Return `halves` in double precision."""
     alpha, beta = halves(R)

@@ -32,7 +32,6 @@ from .digits import (
     halves_in_double,
     mp,
     multiply,
-    norm,
     rotation_phase,
 )
 from .start import InitialState
@@ -57,7 +56,7 @@ class OrderedAxes:
     @property
     def size(self) -> Number:
         """|L|."""
-        return norm(self.L)
+        return mp.norm(self.L)
 
     @property
     def excess(self) -> Number:

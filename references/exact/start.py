@@ -11,7 +11,7 @@ import numpy as np
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .digits import Matrix, Phase, Vector, as_array, cross, from_halves, mp, norm, rotation_phase
+from .digits import Matrix, Phase, Vector, as_array, cross, from_halves, mp, rotation_phase
 
 _PARALLEL = mp.mpf(10) ** -130
 """Sine of an angle that is round-off: principal axes have 150 digits."""
@@ -62,7 +62,7 @@ class InitialState:
         moments, axes = self.principal
         w = self.rates(axes)
         L = [a * b for a, b in zip(moments, w, strict=True)]
-        return bool(norm(cross(w, L)) <= _PARALLEL * norm(w) * norm(L))
+        return bool(mp.norm(cross(w, L)) <= _PARALLEL * mp.norm(w) * mp.norm(L))
 
 
 class ClosedForm(Protocol):
@@ -104,6 +104,6 @@ class SteadyTurn:
 def steady_turn(start: InitialState) -> SteadyTurn:
     """Return the motion with the constant rates of a start."""
     w = start.rates(mp.eye(3))
-    speed = norm(w)
+    speed = mp.norm(w)
     axis = np.array([float(x / speed) for x in w]) if speed > 0 else np.array([0.0, 0.0, 1.0])
     return SteadyTurn(axis, rotation_phase(mp.mpf(0), speed / 2), as_array(start.attitude), start.w_WB_B0)

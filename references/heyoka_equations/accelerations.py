@@ -121,19 +121,11 @@ def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], E
     return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
 
 
-def _read_uniform(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
-    return FieldInAxes(axes, R_WD, uniform, _turning(axes, potential.moment_B @ axes.R_BF))
-
-
 def _read_spring(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
     if potential.rest_length == 0:
         moment = -potential.stiffness * np.linalg.norm(potential.anchor_W) * (potential.point_B @ axes.R_BF)
         return FieldInAxes(axes, R_WD, uniform, _turning(axes, moment))
     return _read_points(axes, R_WD, potential, (spring, potential.stiffness, potential.rest_length))
-
-
-def _read_attraction(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
-    return _read_points(axes, R_WD, potential, (attraction, potential.strength, 1.0))
 
 
 def _read_points(
@@ -160,9 +152,9 @@ def _read_gradient(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes
 
 
 READERS: dict[type[Potential], Callable[[EngineAxes, Array, Any], FieldInAxes]] = {
-    UniformGravity: _read_uniform,
+    UniformGravity: lambda axes, R_WD, field: FieldInAxes(axes, R_WD, uniform, _turning(axes, field.moment_B @ axes.R_BF)),
     LinearSpring: _read_spring,
-    PointAttraction: _read_attraction,
+    PointAttraction: lambda axes, R_WD, field: _read_points(axes, R_WD, field, (attraction, field.strength, 1.0)),
     GravityGradient: _read_gradient,
 }
 """Functions that express a potential, by its type."""

@@ -10,7 +10,7 @@ import pandas as pd
 
 from ..document.cells import tolerance
 from ..rows.names import MethodClass
-from .style import HEIGHT, PALETTE, SHAPES, WIDTH, apply_style, colours, families_of, look, power_axis
+from .style import HEIGHT, PALETTE, SHAPES, WIDTH, apply_style, colours, families_of, look, power_axis, scale
 
 FLOOR = 1e-17
 """Replaces an error of zero on a logarithmic axis; below any round-off of a relative error in double precision."""
@@ -79,9 +79,9 @@ def best_of_families(picture: pd.DataFrame) -> Any:
     def lines(part: pd.DataFrame, width: float, size: float) -> Any:
         mark = alt.Chart(part).mark_line(strokeWidth=width, point=alt.OverlayMarkDef(size=size, filled=True, opacity=1))
         return mark.encode(
-            color=alt.Color("name:N", scale=_scale(colours(families)), sort=list(families)),
-            shape=alt.Shape("class:N", scale=_scale(CLASS_SHAPES)),
-            strokeDash=alt.StrokeDash("class:N", scale=_scale(CLASS_DASHES)),
+            color=alt.Color("name:N", scale=scale(colours(families)), sort=list(families)),
+            shape=alt.Shape("class:N", scale=scale(CLASS_SHAPES)),
+            strokeDash=alt.StrokeDash("class:N", scale=scale(CLASS_DASHES)),
             detail="line:N",
             order=alt.Order("rank:Q"),
         )
@@ -90,10 +90,6 @@ def best_of_families(picture: pd.DataFrame) -> Any:
     thin, bold = lines(data[single], 0.8, 12).transform_filter(SINGLE), lines(data[~single], 2.2, 50)
     layers = (thin + bold).encode(x=x, y=y).properties(width=WIDTH, height=HEIGHT)
     return apply_style(layers.add_params(alt.param(name=SINGLE, value=False)))
-
-
-def _scale(looks: Mapping[str, Any]) -> alt.Scale:
-    return alt.Scale(domain=list(looks), range=list(looks.values()))
 
 
 def drift(drifts: pd.DataFrame, scene: str) -> Any:
@@ -159,7 +155,7 @@ def engines(points: pd.DataFrame, scene: str) -> Any:
         color=alt.Color("name:N", scale=colours, sort=list(looks), legend=legend),
         shape=alt.Shape("name:N", scale=marks, sort=list(looks), legend=legend),
     )
-    dash = alt.StrokeDash("kind:N", scale=_scale(_KINDS), legend=None)
+    dash = alt.StrokeDash("kind:N", scale=scale(_KINDS), legend=None)
     lines = base.mark_line(strokeWidth=1.6).encode(detail="setting:N", order="rank:Q", strokeDash=dash)
     lines = lines.transform_window(rank="row_number()")
     return apply_style(lines + base.mark_point(filled=True, size=48, opacity=1))

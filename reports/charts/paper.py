@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import altair as alt
@@ -13,7 +12,7 @@ from conservative.benchmarks.studies.paper_figures import ENERGY, MOMENTUM, PAPE
 from ..document.model import LegendEntry
 from ..rows.lines import ANALYTICAL
 from . import vega_embed
-from .style import HEIGHT, PALETTE, WIDTH, apply_style
+from .style import HEIGHT, PALETTE, WIDTH, apply_style, scale
 
 PANEL_HEIGHT = 260
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
@@ -29,7 +28,7 @@ Drawn = tuple[Any, list[vega_embed.Spec], list[LegendEntry]]
 def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Drawn:
     """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
     ends = rates.loc[rates.groupby("component")["t"].idxmax()]
-    colour = alt.Color("component:N", scale=_scale(_RATE_COLOURS), legend=None)
+    colour = alt.Color("component:N", scale=scale(_RATE_COLOURS), legend=None)
     title = "(a) Body rates of the brick, Δt = 0.01 s, ε = 1e-8"
     base = alt.Chart(rates, width=WIDTH, height=2 * HEIGHT - 80, title=title)
     lines = base.mark_line(strokeWidth=1.8).encode(x=_TIME, y=alt.Y("rate:Q", title="rate, rad/s, body axes"), color=colour)
@@ -50,7 +49,7 @@ def _errors(errors: pd.DataFrame, column: str, axis: str, title: str) -> Any:
     legend = alt.Legend(title=None, orient="bottom", symbolSize=300)
     y = alt.Y(f"{column}:Q", title=axis, axis=alt.Axis(format=".1e", tickCount=5, minExtent=55))
     chart = alt.Chart(errors, width=WIDTH, height=HEIGHT - 80, title=title).mark_line(strokeWidth=1.2)
-    return chart.encode(x=_TIME, y=y, color=alt.Color("method:N", scale=_scale(_MAP_COLOURS), legend=legend))
+    return chart.encode(x=_TIME, y=y, color=alt.Color("method:N", scale=scale(_MAP_COLOURS), legend=legend))
 
 
 def figure_2(positions: pd.DataFrame) -> Drawn:
@@ -73,7 +72,3 @@ def figure_2(positions: pd.DataFrame) -> Drawn:
     looks = zip(runs, _RUN_LOOKS, strict=False)
     entries = [LegendEntry(run, colour, "", " ".join(map(str, dash))) for run, (colour, dash) in looks]
     return picture, vega_embed.embed(picture, shown, PANEL_HEIGHT), entries
-
-
-def _scale(colours: Mapping[str, str]) -> alt.Scale:
-    return alt.Scale(domain=list(colours), range=list(colours.values()))

@@ -13,7 +13,7 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..rows.names import method_text, setting_text
 from .figures import log_channel
-from .style import HEIGHT, PALETTE, WIDTH, Families, apply_style, families_of, look, svg_text
+from .style import HEIGHT, PALETTE, WIDTH, Families, apply_style, families_of, look
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
@@ -54,11 +54,6 @@ def picture(recommendation: Recommendation) -> Any:
     title = f"{asked.scene.name}: {asked.error:g} rad over {asked.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return apply_style(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
-
-
-def svg(recommendation: Recommendation) -> str:
-    """Return the picture as SVG."""
-    return svg_text(picture(recommendation))
 
 
 def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> Any:

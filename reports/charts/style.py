@@ -98,17 +98,20 @@ def number_in_family(families: Families) -> dict[str, int]:
     return numbers
 
 
+def scale(looks: Mapping[str, Any]) -> alt.Scale:
+    """Return the scale that maps names to their colours, marks or dashes."""
+    return alt.Scale(domain=list(looks), range=list(looks.values()))
+
+
 def look(families: Families, second: str, **legend: Any) -> dict[str, Any]:
     """Return the channels of lines: the colour of the family, and the mark ("shape") or dash ("strokeDash") of the setting."""
     shown = alt.Legend(**({"columns": 1 + len(families) // 32, "symbolLimit": 0} | legend))  # 0: without a limit
     looks: Sequence[Any] = SHAPES if second == "shape" else DASHES
     of_settings = [looks[number % len(looks)] for number in number_in_family(families).values()]
-    ranges = {"color": list(colours(families).values()), second: of_settings}
-    lines = list(families)
+    looks_of = {"color": colours(families), second: dict(zip(families, of_settings, strict=True))}
     channels = {"color": alt.Color, "shape": alt.Shape, "strokeDash": alt.StrokeDash}
     return {
-        name: channels[name]("name:N", scale=alt.Scale(domain=lines, range=values), sort=lines, legend=shown)
-        for name, values in ranges.items()
+        name: channels[name]("name:N", scale=scale(each), sort=list(families), legend=shown) for name, each in looks_of.items()
     }
 
 

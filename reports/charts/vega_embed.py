@@ -73,16 +73,7 @@ def legend(families: Families, marks: bool) -> tuple[LegendEntry, ...]:
 def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
     """Return a picture as the page embeds it: one specification for each of its panels.
 
-    Parameters
-    ----------
-    chart
-        The picture.
-    shown
-        Contents of tooltips: keys of `SHOWN`, or fields with kind and title.
-    height
-        Height of a panel.
-    hidden
-        Lines that are hidden at first.
+    Tooltips contain `shown`: keys of `SHOWN`, or fields with kind and title. The lines `hidden` are not drawn at first.
     """
     tooltip = [SHOWN[each] if isinstance(each, str) else each for each in shown]
     whole: Spec = specification(chart)

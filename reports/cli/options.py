@@ -81,25 +81,9 @@ HEAD = 4096
 
 
 def require_replaceable(file: Path, mark: str, option: str, force: bool = False, inputs: Iterable[Path] = ()) -> None:
-    """Check that a file may be written.
+    """Raise `BadInput` for an option whose file must not be replaced: one without its mark, unless `force`, or an input.
 
-    Parameters
-    ----------
-    file
-        The file. One that does not exist, is empty, or is a pipe or a device passes.
-    mark
-        Text within the first `HEAD` characters of the files that the option writes.
-    option
-        Name of the option, for the message.
-    force
-        True if a file without the mark may be replaced.
-    inputs
-        Files that are never replaced.
-
-    Raises
-    ------
-    BadInput
-        The file must not be replaced.
+    A file that does not exist, is empty, or is a pipe or a device passes. The mark is within the first `HEAD` characters.
     """
     try:
         if not file.is_file() or not file.stat().st_size:

@@ -60,10 +60,11 @@ def recommend(
     from ..sections.recommendation import build
     from ..terminal.progress import progress
 
-    def picture() -> str:
-        from ..charts.recommendation import svg  # not needed without --out, and slow to import
+    def draw() -> str:
+        from ..charts.recommendation import picture  # not needed without --out, and slow to import
+        from ..charts.style import svg_text
 
-        return svg(recommendation)
+        return svg_text(picture(recommendation))
 
     with progress() as step:
         names = split_names("engine", engine) or None
@@ -71,5 +72,5 @@ def recommend(
         with output_files(out, FILES) as write:
             recommendation = answer(question, step)
             document = build(recommendation)
-            write(document, svg=picture)
+            write(document, svg=draw)
     show(document, as_json)

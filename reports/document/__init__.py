@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from .model import Document
 
 SVG_MARK = "<!-- Written by conservative -->"
@@ -10,18 +12,5 @@ SVG_MARK = "<!-- Written by conservative -->"
 
 def text(document: Document, kind: str) -> str:
     """Return a document as "markdown" or "md", "html", "junit" or "json" (its data); renderers are imported when used."""
-    if kind in ("markdown", "md"):
-        from . import markdown
-
-        return markdown.render(document)
-    if kind == "html":
-        from . import html
-
-        return html.render(document)
-    if kind == "junit":
-        from . import junit
-
-        return junit.render(document)
-    from . import json
-
-    return json.render(document.data)
+    renderer = import_module(f".{'markdown' if kind == 'md' else kind}", __package__)
+    return str(renderer.render(document.data if kind == "json" else document))

@@ -47,18 +47,13 @@ def write(folder: Path) -> Path:
 
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
     tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows imported names only
-    _name_aliases()
+    # The aliases in our imported modules become classes with only a name.
+    stand_ins = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
+    for module in [module for name, module in sys.modules.items() if name.partition(".")[0] == "conservative"]:
+        vars(module).update({name: stand_ins[name] for name in ALIASES if name in vars(module)})
     pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")
     pdoc.pdoc(*MODULES, output_directory=folder)
     return folder / "conservative.html"
-
-
-def _name_aliases() -> None:
-    """Replace the aliases in our imported modules by classes with only a name."""
-    stand_ins = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
-    ours = [module for name, module in sys.modules.items() if name.partition(".")[0] == "conservative"]
-    for module in ours:
-        vars(module).update({name: stand_ins[name] for name in ALIASES if name in vars(module)})
 
 
 def main() -> None:

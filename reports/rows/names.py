@@ -64,6 +64,8 @@ class MethodClass(StrEnum):
     ENGINE = "physics engines"
 
 
+ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
+"""Outcomes of runs that were not made."""
 OF_ENGINES = (MethodClass.SOLVER, MethodClass.ENGINE)
 """Classes of engines."""
 

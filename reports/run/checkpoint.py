@@ -31,13 +31,8 @@ _MOST_DIFFERENCES = 3
 """Largest number of differences in a message."""
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Origin of a study: command, start time and commit (see `Provenance`)."""
-
-    command: str
-    start: str
-    commit: str
+Origin = dict[str, str]
+"""A process: its `command`, `start` time and `commit` (see `Provenance`)."""
 
 
 @dataclass(frozen=True)
@@ -70,13 +65,13 @@ class Checkpoint:
         result = StudyResult(rows, lines, self.process)
         studies = {
             name: {
-                "by": vars(each.by),
+                "by": each.by,
                 "rows": list(map(measurement.flat, each.rows)),
                 "samples": list(map(measurement.flat_samples, each.samples)),
             }
             for name, each in {**self.results, name: result}.items()
         }
-        content = {"format": FORMAT, "command": self.process.command, "terms": self.terms, "studies": studies}
+        content = {"format": FORMAT, "command": self.process["command"], "terms": self.terms, "studies": studies}
         write_text(self.path, json.dumps(content, ensure_ascii=False), "out")  # floats are restored exactly, NaN as NaN
         self.results[name] = result
 
@@ -90,7 +85,7 @@ class Checkpoint:
         """The finished studies, their file, and the command that continues, in words."""
         if not self.results:
             return "no study was finished"
-        command = self.process.command
+        command = self.process["command"]
         again = command if "--resume" in shlex.split(command) else f"{command} --resume"
         done = f"{len(self.results)} of {len(self.names)} studies are finished ({', '.join(self.results)})"
         return f"{done} and stored in {str(self.path)!r}; continue with: {again}"
@@ -99,7 +94,7 @@ class Checkpoint:
         """Return a sentence for each other process that measured a part; empty if one process measured everything."""
         return tuple(
             f"{', '.join(name for name, _ in items)}: measured by an earlier process, which was interrupted; "
-            f"started {by.start} at commit {by.commit} with `{by.command}`"
+            f"started {by['start']} at commit {by['commit']} with `{by['command']}`"
             for by, items in groupby(self.results.items(), key=lambda item: item[1].by)
             if by != self.process
         )
@@ -141,7 +136,7 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
         There is nothing to resume, its terms differ or it is damaged; or the file was not written by a report.
     """
     path = find_unfinished(out)
-    process = Origin(source.command, source.date, source.commit)
+    process = {"command": source.command, "start": source.date, "commit": source.commit}
     fresh = Checkpoint(path_for(out), plan.names, terms(plan, source), process)
     if not resume:
         return fresh
@@ -172,7 +167,7 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
             name: StudyResult(
                 tuple(map(measurement.from_flat, record["rows"])),
                 tuple(map(measurement.samples_from_flat, record["samples"])),
-                Origin(**record["by"]),
+                {name: record["by"][name] for name in ("command", "start", "commit")},
             )
             for name, record in content["studies"].items()
         }

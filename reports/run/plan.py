@@ -23,16 +23,9 @@ BODIES, QUICK_BODIES = 3, 1
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of a report.
+    """The plan of a report: what is compared, and the studies in the order of measurement.
 
-    Attributes
-    ----------
-    scenes, methods, engines
-        What is compared. Engines have studies and a section of their own.
-    studies
-        The studies, in the order of measurement. Times of a full report are measured by several processes in turn.
-    bodies, seed
-        Number of random bodies in each field, and their seed.
+    Engines have studies and a section of their own. `bodies` is the number of random bodies in each field, `seed` their seed.
     """
 
     scenes: tuple[Scene, ...]
@@ -80,18 +73,14 @@ def plan_report(
         Names. Default: the paper's two scenes, `selection.main_methods` (all registered methods if `full`), no engine.
     full
         True if everything is measured: random bodies, many bodies, hard cases, stability and the paper's figures as well.
-    quick
-        Fewer steps and rounds. No study of hard cases or of many bodies.
-    skip_missing
-        Rows with the outcome "missing" instead of `MissingEngine`.
+    quick, skip_missing, time_limit
+        See `Study`. A quick report has no study of hard cases or of many bodies. The default limit is `MAIN_TIME_LIMIT` for the
+        scenes, unless `full`.
     png
         True if pictures are also written as PNG.
-    time_limit
-        Time budget of a run, s; see `Study`. Default: `MAIN_TIME_LIMIT` for the scenes, unless `full`.
-    bodies
-        Random bodies in each field. Default: none; if `full` and no scene is named `BODIES`, or `QUICK_BODIES` if `quick`.
-    seed
-        Seed of the random bodies.
+    bodies, seed
+        Random bodies in each field, and their seed. Default: none; if `full` and no scene is named `BODIES`, or `QUICK_BODIES`
+        if `quick`.
 
     Raises
     ------
@@ -128,7 +117,7 @@ def plan_report(
     if full and bodies and not quick:
         made += studies.cross_studies((studies.PRICE,), price.scenes(), compared, skip_missing=skip_missing)
     # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
-    if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *named), quick=True))):
+    if full and bodies and not quick and (many := many_runs.family_settings((*compared, *named))):
         more = {"skip_missing": skip_missing, "time_limit": time_limit, "processes": processes}
         made.append(throughput.throughput_study(many, quick=True, seed=seed, **more))
     return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed)

@@ -65,7 +65,7 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
     tracked = git(here.parent, "ls-files", "--error-unmatch", here.name)  # False inside another project's working tree
     return Provenance(
         shlex.join(["conservative", *words]),
-        machine().as_dict(),
+        machine(),
         f"{platform.python_implementation()} {platform.python_version()}",
         dict(sorted(packages.items(), key=lambda item: item[0].lower())),
         (commit(here.parent, mark_changes=True) if tracked else "") or "unknown",

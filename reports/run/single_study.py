@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from operator import methodcaller
 
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.processes import PROCESSES, QUICK_PROCESSES
 from conservative.benchmarks.studies import (
     engine_selection,
     hard_cases,
-    many_runs,
     on_cluster,
     price,
     random,
@@ -44,18 +44,8 @@ def plan_study(
 ) -> Study:
     """Return a study by name. Omitted scenes, methods and engines are the defaults of the study.
 
-    Parameters
-    ----------
-    name
-        One of `studies.MAKERS`.
-    scenes, methods, engines
-        Names.
-    sizes
-        Numbers of bodies of the study of throughput, such as `1e3`.
-    bodies, seed
-        Number and seed of random bodies.
-    quick, skip_missing, time_limit
-        See `Study`.
+    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are those of random bodies.
+    For the others see `Study`.
 
     Raises
     ------
@@ -69,7 +59,10 @@ def plan_study(
     if name in studies.ENGINES:
         compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
     else:
-        of_family = {studies.RANDOM: random.settings, studies.THROUGHPUT: many_runs.settings}
+        of_family: dict[str, selection.Settings] = {
+            studies.RANDOM: random.settings,
+            studies.THROUGHPUT: methodcaller("settings_for", "many"),
+        }
         named = selection.methods(methods or None, skip_missing, of_family.get(name, selection.all_variants))
         others = engine_selection.select_engines(engines, skip_missing) if engines else ()
         compared = tuple(dict.fromkeys((*named, *others)))

@@ -27,15 +27,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
     """Return one row per method that was run on a scene, in the order of measurement.
 
     Methods that differ only in tolerance are one row, with the drifts and errors of the default tolerance, which is the last.
-
-    Parameters
-    ----------
-    table
-        Measurements with names (see `names.with_names`).
-    points
-        Errors and times of the scene (see `rows.points`).
-    scene
-        Name of the scene.
+    The table is that of `names.with_names`; the points are those of the scene (see `rows.points`).
     """
     accuracy = of_study(table, "paper", scene)
     accuracy = accuracy[(accuracy["role"] != Role.TRUTH.value) & accuracy["value"].notna()]

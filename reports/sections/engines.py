@@ -21,7 +21,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
-from ..rows.names import of_measure, of_study, outcomes, with_outcome
+from ..rows.names import ABSENT, of_measure, of_study, outcomes, with_outcome
 from ..rows.points import points as points_over
 from .measured import Measured, of_scene
 from .provenance import lock_sections
@@ -34,7 +34,6 @@ ERROR = 1e-3
 MOMENTA = ("momentum", "vertical momentum")
 """Names of the conserved momentum in the world: of a free body, and about the axis of a field."""
 AT_ITS_BEST = "at its best"
-ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 FAR_FROM_ORDER = 0.5
 """Largest difference of an order below the expected one that is not marked."""
 
@@ -71,24 +70,12 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class EngineRow:
-    """One setting of one engine on one scene.
+    """One setting of one engine on one scene: such as `exudyn==1.13.6`, label `exudyn==1.13.6/RK44`, setting `RK44`.
 
-    Attributes
-    ----------
-    engine, label, setting
-        Such as `exudyn==1.13.6`, `exudyn==1.13.6/RK44` and `RK44`.
-    series
-        Name of its line of steps or tolerances.
-    outcome
-        Outcome of the run at the scene's step, or of its timing.
-    as_installed, best
-        True if only the step is set; true if no setting of the engine has a smaller error.
-    error
-        Largest attitude error at the scene's step, rad; NaN if it was not measured.
-    second_time
-        Wall time of a simulated second at an error of `ERROR`, s; NaN if it is not reached.
-    cells
-        The cells of `COLUMNS` by name, except "taken".
+    The outcome is that of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
+    `second_time` the wall time, s, of a simulated second at an error of `ERROR`; NaN if not measured or not reached. `series`
+    is its line of steps or tolerances. `as_installed` is true if only the step is set, `best` if no setting of the engine has
+    a smaller error. `cells` are those of `COLUMNS` by name, except "taken".
     """
 
     engine: str

@@ -11,9 +11,8 @@ from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, numeric, outcome_text
 from ..document.model import Paragraph, Section, Style, Table, filled
-from ..rows.names import of_study, outcomes, with_outcome, without_outcome
+from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outcome
 
-_ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 _ELSEWHERE = (*HARD, *ENGINES)
 """Studies with tables of their own."""
 
@@ -31,7 +30,7 @@ def section(table: pd.DataFrame) -> Section:
 
 def failures(table: pd.DataFrame) -> Table:
     """Return the runs that failed or were skipped."""
-    rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *_ABSENT)
+    rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *ABSENT)
     rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
     body = []
     for key, members in rows.groupby(["scene", "name", "text"], sort=False):
@@ -43,7 +42,7 @@ def failures(table: pd.DataFrame) -> Table:
 
 def unsupported(table: pd.DataFrame) -> Table:
     """Return the unsupported and missing methods, one row per reason."""
-    rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *_ABSENT)
+    rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *ABSENT)
     # A reason can contain numbers that differ from step to step: the first one stands for all of a method.
     rows = rows.assign(reason=rows.groupby(["scene", "outcome", "name"])["reason"].transform("first"))
     body = [
@@ -66,7 +65,7 @@ def truths(table: pd.DataFrame) -> Table:
 def failures_of_ours(table: pd.DataFrame) -> list[str]:
     """Return the failures of our methods at the steps of the paper, one line each."""
     rows = of_study(table, "paper")
-    rows = without_outcome(rows[rows["role"] == Role.OURS.value], OutcomeKind.OK, OutcomeKind.SKIPPED, *_ABSENT)
+    rows = without_outcome(rows[rows["role"] == Role.OURS.value], OutcomeKind.OK, OutcomeKind.SKIPPED, *ABSENT)
     lines = [
         f"{method} on {scene}, dt = {dt:g} s: {outcome}"
         for method, scene, dt, outcome in zip(rows["method"], rows["scene"], rows["dt"], outcomes(rows), strict=True)

@@ -20,17 +20,7 @@ from .report import SECTIONS, records
 
 
 def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:
-    """Return the document of a study: ratios of random bodies, costs of many bodies, or else its rows.
-
-    Parameters
-    ----------
-    name
-        Name of the study.
-    measured
-        Its rows and samples.
-    made
-        How, where and when it was measured.
-    """
+    """Return the document of a study, measured as `made` says: ratios of random bodies, costs of many bodies, or its rows."""
     data: dict[str, Any] = {"study": name, **made}
     named = with_names(measured.table)
     shown: list[Block]

@@ -54,17 +54,7 @@ CAVEAT = (
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """The summary of a scene or of random bodies.
-
-    Attributes
-    ----------
-    sentence
-        The verdict with its ratio.
-    points
-        Data of the chart (see `rows.points`).
-    classes
-        A row for each class of methods.
-    """
+    """The summary of a scene or of random bodies: sentence, data of the chart (see `rows.points`), and classes."""
 
     sentence: str
     points: pd.DataFrame
@@ -100,20 +90,10 @@ def classes_table(
     failures: Mapping[MethodClass, str],
     samples: Mapping[MethodClass, str] | None = None,
 ) -> Table:
-    """Return a row for each class of methods; costs are geometric means over the scenes of `points`.
+    """Return a row for each class of methods; costs are geometric means over the scenes of the points (see `rows.points`).
 
-    Parameters
-    ----------
-    points
-        Errors and times (see `rows.points`).
-    reached
-        Their costs (see `contest.costs`), at `ERRORS` at least.
-    drifts
-        Drifts of long runs (see `measured.long_run_drifts`).
-    failures
-        Failures of each class in words.
-    samples
-        Cost of a sample in each class, for a column of its own.
+    `reached` are their costs (see `contest.costs`) at `ERRORS` at least, and `drifts` those of long runs (see
+    `measured.long_run_drifts`). Failures are in words. The cost of a sample in each class has a column of its own.
     """
     engines = of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES)
     budget = engines.groupby("scene")["time"].min()

@@ -29,17 +29,7 @@ _WORDS = (
 
 
 def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, str] | None = None) -> Document:
-    """Return the document of a comparison.
-
-    Parameters
-    ----------
-    comparison
-        The measurements of all versions.
-    gated
-        True if a loss in the last version is a failure.
-    made
-        How and where it was measured.
-    """
+    """Return the document of a comparison, measured as `made` says; if `gated`, a loss in the last version is a failure."""
     made, transitions = made or {}, list_transitions(comparison)
     environments = [version.environment for version in comparison.versions]
     engine, names = environments[0].engine, [version.name for version in comparison.versions]
