@@ -10,7 +10,7 @@ import pytest
 from conservative import BadInput, MissingEngine, Reduced, Taylor, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
-from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
+from conservative.benchmarks.studies.engine_selection import list_installed, select_engines
 from conservative.benchmarks.studies.line import list_settings
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, methods, series, tolerance_setting
 from conservative.benchmarks.suite.points import Point
@@ -154,8 +154,7 @@ def test_a_name_that_is_no_engine_is_bad_input(name):
 
 
 def test_an_engine_without_the_declaration_has_no_setting_as_installed():
-    assert not any(is_as_installed(method) for method in select_engines(["scipy"]))
-    assert not is_as_installed(Missing("mujoco", error=MissingEngine("MuJoCo", "mujoco")))
+    assert not any(method in method.settings_for("as_installed") for method in select_engines(["scipy"]))
 
 
 @dataclass(frozen=True)

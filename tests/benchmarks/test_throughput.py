@@ -115,7 +115,7 @@ def test_a_body_whose_truths_disagree_is_dropped():
     assert kept.value < 1e-9
     kinds = []
     list(keep_result(throughput.find_truth(study, study.scenes[0]), kinds))
-    assert np.array_equal(kinds[0].few.w_WB_B0, bodies.w_WB_B0[[0, 2]])
+    assert np.array_equal(kinds[0].bodies[kinds[0].measured].w_WB_B0, bodies.w_WB_B0[[0, 2]])
     assert {row.process for row in of(found, "mujoco", Measure.TIME, bodies=2) if row.outcome.ok} == {0, 1}
 
 
