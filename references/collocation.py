@@ -58,7 +58,8 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
 def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
     """Return the derivative of quaternion and body momentum (7, n) at times (n,)."""
     J_inverse, potential = _inverse(scene), scene.potential
-    fixed: Any = None if potential is None else potential.kernel_field(np.eye(3))
+    # In double precision a field's products would be rounded, which some bodies amplify by 1,000.
+    fixed: Any = None if potential is None else potential.kernel_field(np.eye(3, dtype=np.longdouble))
 
     def slope(t: Reals, y: Reals) -> Reals:
         (a, b, c, d, L1, L2, L3), (x, y_, z), field = y, J_inverse @ y[4:], fixed
