@@ -17,7 +17,7 @@ from conservative.grid import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.engine import principal_axes
 from conservative.references.environments.engine_method import WorkerRun
-from conservative.references.environments.plain_numbers import describe, read_one
+from conservative.references.environments.plain_numbers import describe, describe_many, read_many, read_one
 from conservative.references.worker import program
 from conservative.references.worker.calls import python_worker
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, Worker
@@ -105,6 +105,16 @@ WRONG = {
 def test_a_program_that_does_not_speak_the_protocol_is_named(code, start):
     with pytest.raises(EngineCrashed, match=WRONG[code]):
         start(sys.executable, "-c", code).ask("check")
+
+
+def test_the_failure_of_a_program_is_that_of_its_trajectory_and_of_a_run_of_many_bodies(start):
+    worker = start(sys.executable, "-c", "raise SystemExit('no licence found')")
+    trajectory = run_of(worker, 0.01)()
+    assert (trajectory.outcome.kind, len(trajectory)) == (OutcomeKind.CRASHED, 0)
+    assert "no licence found" in trajectory.outcome.reason
+    axes, grid = [principal_axes(BRICK)], grid_for(BRICK, 0.01)
+    with pytest.raises(EngineCrashed, match="no licence found"):
+        WorkerRun(worker, {"adapter": "", "settings": {}, **describe_many(axes, grid)}, read_many(axes, grid))()
 
 
 def test_a_program_that_cannot_be_started_is_named(start):
