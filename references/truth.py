@@ -7,8 +7,8 @@
     random bodies (`confirm`)                       `Precise` (96 bits)     Gauss collocation, extended precision (`collocate`)
 
 The difference contains the error of the second solution: a few rounding units in the first line, about 1e-11 rad in the others,
-and more if a motion amplifies errors. For random bodies it is below 1.1e-15 rad on nine in ten, and at most 1e-13 rad (measured: on
-299 of 300 bodies of the seeds 7, 1001 and 1002; `confirm` refuses the other).
+and more if a motion amplifies errors. For random bodies it is below 1.1e-15 rad on nine in ten, and at most 1e-13 rad:
+`confirm` refuses others (1 of 300, of the seeds 7, 1001 and 1002).
 """
 
 from __future__ import annotations
