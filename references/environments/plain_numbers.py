@@ -91,13 +91,16 @@ def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
     return {**shared, **rows, "rows": list(rows)}
 
 
-def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
+def read_states(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
     """Return the samples of n bodies, shape (n, s), or of one, (s,). Raise `EngineCrashed` if an answer has other shapes."""
     kind, name, each = (QUATERNION, "q", (4,)) if "q" in answer else (MATRIX, "R", (3, 3))
-    attitudes, rates = np.asarray(answer[name]), np.asarray(answer["w" if "w" in answer else "w_W"])
+    try:
+        attitudes, rates = (np.asarray(answer[each], float) for each in (name, "w" if "w" in answer else "w_W"))
+    except (TypeError, ValueError):
+        raise EngineCrashed("its samples are not arrays of numbers") from None
     if attitudes.shape != (*shape, *each) or rates.shape != (*shape, 3):
         raise EngineCrashed(f"it returned attitudes {attitudes.shape} and rates {rates.shape}, not {shape} samples")
-    values = np.concatenate([attitudes.reshape(*shape, -1), rates], axis=-1, dtype=float)
+    values = np.concatenate([attitudes.reshape(*shape, -1), rates], axis=-1)
     return States(kind, values.reshape(-1, *values.shape[-2:]), rates_in_world="w" not in answer)
 
 
@@ -112,7 +115,7 @@ def read_many(axes: Sequence[EngineAxes], grid: Grid) -> Callable[[Answer], Bloc
     def read(answer: Answer) -> Block:
         if isinstance(answer, IntegrationFailed):
             raise answer
-        R_WB, w_WB_B, finite = to_body_axes(grid.t, _read(answer, (len(R_BF), grid.n_samples)), R_BF)
+        R_WB, w_WB_B, finite = to_body_axes(grid.t, read_states(answer, (len(R_BF), grid.n_samples)), R_BF)
         return Block(R_WB, w_WB_B, finite == grid.n_samples)
 
     return read
@@ -126,6 +129,6 @@ def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Tra
             return Trajectory(axes.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
         work = Counters(answer.get("steps", grid.n_steps), evaluations=answer.get("evaluations"))
         reason = answer.get("reason") or "the state is not finite"
-        return axes.trajectory(grid, label, _read(answer, (grid.n_samples,)), work, reason)
+        return axes.trajectory(grid, label, read_states(answer, (grid.n_samples,)), work, reason)
 
     return read

@@ -27,9 +27,6 @@ from .engine_method import EngineMethod
 from .environment import MEMORY, Environment, temporary_folder, worker_of
 from .plain_numbers import FIELDS
 
-DESCRIBED = ("settings", "order", "orders", "choices", "tolerance", "precision", "fields", "variants")
-"""What a program may describe in the field `engine` of its answer to `hello`; see `EngineData` and `Card`."""
-
 
 class UnusableProgram(MissingEngine):
     """A registered program cannot be used. The message names its file and what to do."""
@@ -88,14 +85,8 @@ def program_class(program: Program) -> type[EngineMethod]:
         remedy = f"Run: conservative engines check {shlex.quote(shlex.join(words))}"
         raise UnusableProgram(program, str(failure.outcome), remedy) from None
     try:
-        described = dict(greeting.get("engine", {}))
-        card = {"variants": tuple(described.pop("variants", ("",)))}
-        choices = {name: tuple(values) for name, values in described.get("choices", {}).items()}
-        fields = tuple(described.get("fields", (kind.__name__ for kind in FIELDS)))
-        fixed = {"package": program.name, "module": "", "card": card, "choices": choices, "fields": fields}
-        if unknown := set(described).difference(DESCRIBED):
-            raise KeyError(*unknown)
-        module.ENGINE = {**described, **fixed}  # type: ignore[attr-defined]
+        every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
+        module.ENGINE = {**every, **greeting.get("engine", {})}  # type: ignore[attr-defined]
         module.environment = replace(environment, version=str(greeting["version"]))  # type: ignore[attr-defined]
         module.program, module.__file__ = program, words[0]  # type: ignore[attr-defined]
         made = method_class(module, ProgramMethod)
@@ -104,28 +95,13 @@ def program_class(program: Program) -> type[EngineMethod]:
         return made
     except Exception as error:  # a description can be wrong in any way
         problem = f"its answer to `hello` cannot be used ({type(error).__name__}: {error})"
-        remedy = f"Let it have `version` and, if `engine`, an object with some of {', '.join(DESCRIBED)}"
-        raise UnusableProgram(program, problem, remedy) from None
+        raise UnusableProgram(program, problem, "PROTOCOL.md describes `version` and `engine`") from None
 
 
-def add(text: str, name: str = "", project: bool = False) -> Program:
-    """Register a program for the user, or in the file of the project.
+def read_program(text: str, name: str = "", project: bool = False) -> Program:
+    """Return the program of an executable or a command line; its name is by default that of the last file in it.
 
-    Parameters
-    ----------
-    text
-        Path of an executable, or a command line.
-    name
-        Its name, by default that of the last file in the command line.
-    project
-        True for the file of the project, `conservative.toml`.
-
-    Raises
-    ------
-    BadInput
-        The name cannot be used, or the file cannot be changed.
-    UnusableProgram
-        The program does not speak the protocol.
+    Its file is the user's, or the project's, to which its paths are relative. Raise `BadInput` if the name cannot be used.
     """
     file = project_file() if project else user_file()
     words = [text] if Path(text).is_file() else shlex.split(text)
@@ -137,15 +113,18 @@ def add(text: str, name: str = "", project: bool = False) -> Program:
         inside = project and path.is_relative_to(file.parent)
         return (f"./{path.relative_to(file.parent)}" if inside else str(path)) if path.is_file() else word
 
-    command = shlex.join(map(place, words))
-    files = [word for word in words if Path(word).is_file()] or words[:1]
-    name = name or re.sub(r"\W", "_", Path(files[-1]).stem)
+    last = [word for word in words if Path(word).is_file()] or words
+    name = name or re.sub(r"\W", "_", Path(last[-1]).stem)
     taken = {*registry.list_methods(), *registry.list_engines()}.difference(list_programs())
     if not re.fullmatch(r"[A-Za-z]\w*", name) or name in taken:
         raise BadInput("name", repr(name), "letters, digits and '_', and not the name of a method or an engine")
-    program = Program(name, file, command)
+    return Program(name, file, shlex.join(map(place, words)))
+
+
+def add(program: Program) -> Program:
+    """Register a program. Raise `UnusableProgram` if it does not start, or `BadInput` if its file cannot be changed."""
     program_class(program)
-    _edit(program, [f"{name} = {json.dumps(command)}"])
+    _edit(program, [f"{program.name} = {json.dumps(program.command)}"])
     return program
 
 

@@ -20,7 +20,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock
 from time import monotonic
-from typing import IO, Any
+from typing import IO, Any, NoReturn
 
 from conservative.errors import IntegrationFailed
 from conservative.outcome import Outcome, OutcomeKind
@@ -56,6 +56,13 @@ class EngineTimeout(IntegrationFailed):
         self.limit = limit
         self.outcome = Outcome(OutcomeKind.TIMEOUT, f"after {limit:g} s")
         super().__init__(f"The engine did not answer within {limit:g} s. Use a shorter run or a longer time limit")
+
+
+class Answer(dict[str, Any]):
+    """An answer; one without a field that is read is a failure of its engine."""
+
+    def __missing__(self, name: str) -> NoReturn:
+        raise EngineCrashed(f"its answer has no `{name}`")
 
 
 @contextmanager
@@ -132,7 +139,7 @@ class Worker:
             raise NotImplementedError(answer["message"])
         if "error" in answer:
             raise EngineCrashed(f"{answer['error']}: {answer['message']}")
-        return answer
+        return Answer(answer)
 
     def greet(self) -> dict[str, Any]:
         """Return the answer of the program to `hello`. Raise as `ask`."""

@@ -84,11 +84,25 @@ def add(command: str, name: str, project: bool) -> None:
     Its name then works like that of any engine. `engines remove NAME` takes it back.
     """
     require_extra("conservative engines", "environments")
-    from conservative.references.environments.programs import add
+    from conservative.references.environments.programs import add, read_program
 
     from ..sections.environments import program_line
 
-    click.echo(f"{program_line(add(command, name, project))}: added")
+    click.echo(f"{program_line(add(read_program(command, name, project)))}: added")
+
+
+@engines.command(short_help="Test a program.", epilog=epilog("conservative engines check ./my_engine"))
+@click.argument("command")
+@json_option
+def check(command: str, as_json: bool) -> None:
+    """Test whether COMMAND, an executable, a command line or the name of a program, follows references/PROTOCOL.md.
+
+    Mistakes are named, with what to change. The exit code is 1 if there are any.
+    """
+    require_extra("conservative engines", "environments")
+    from ..sections.environments import build_check
+
+    show(build_check(command), as_json)
 
 
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))

@@ -1,0 +1,94 @@
+"""`conservative engines check`: a right program passes whatever its order, and planted mistakes are named."""
+
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from conservative.references.environments import conformance
+from conservative.references.environments.conformance import check
+from conservative.references.environments.programs import read_program
+from conservative.references.worker.client import close_workers
+from conservative.reports.cli.main import main
+
+PLANTED = Path(__file__).parent / "programs" / "planted.py"
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    for name in ("CONFIG", "CACHE"):
+        monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name))
+    monkeypatch.setattr(conformance, "PACE", 0.05)
+    yield
+    close_workers()
+
+
+def results(*arguments):
+    return list(check(read_program(shlex.join([sys.executable, "-I", str(PLANTED), *arguments]), "planted")))
+
+
+def failures(*arguments):
+    return [text for passed, text in results(*arguments) if not passed]
+
+
+@pytest.mark.parametrize("method", ["rk4", "euler"])
+def test_a_right_program_passes(method):
+    """Measured errors at dt = 0.0025: 4e-13 and 6e-13 of RK4, 7e-4 and 1e-3 of the method of order 1."""
+    assert [(passed, text.partition(":")[0]) for passed, text in results(method)] == [
+        (True, name) for name in ("hello", "free body", "free body", "heavy body", "heavy body", "time")
+    ]
+
+
+NAMED = {
+    "x, y, z, w": "free body: `q` is x, y, z, w: the scalar comes first",
+    "reads x, y, z, w": "free body: It reads `q0` as x, y, z, w",
+    "w in world": "free body: Rates in W are named `w`",
+    "reads w0 in world": "free body: It reads `w0` in world axes",
+    "w in deg": "free body: Rates are in deg/s: answer in rad/s",
+    "R transposed": "free body: The attitudes are transposed: v_W = R v_F",
+    "half a step late": "free body: Samples are half a step late",
+    "rates late": "free body: Rates are half a step late",
+    "inertia inverted": "free body: Its inertia is inverted",
+    "no gyroscopic torque": "free body: It has no gyroscopic torque",
+    "dt in ms": "free body: It reads `dt` in ms: it is in s",
+    "gravity up": "heavy body: Gravity points up",
+    "no gravity": "heavy body: It ignores gravity",
+    "inertia about com": "heavy body: Its inertia is about the centre of mass",
+    "time in ms": "`seconds` is in s, and only of the calls",
+    "less time": "`seconds` is the wall time of all calls together",
+    "one call": "`time` has to make `calls` runs",
+    "random": "free body: a second run has other samples: start from `q0` and `w0`",
+    "few samples": "free body: crashed (it returned attitudes (4, 4) and rates (5, 3), not (5,) samples)",
+    "texts": "free body: crashed (its samples are not arrays of numbers)",
+    "no rates": "free body: crashed (its answer has no `w_W`)",
+    "no number": "free body: crashed (its answer has no `run`)",
+    "nan": "free body: error inf at dt = 0.01 s, inf at 0.0025 s: it does not fall with dt, and no known mistake explains it",
+    "only tops": "free body: unsupported (only tops)",
+}
+
+
+@pytest.mark.parametrize("mistake", NAMED)
+def test_a_mistake_is_named(mistake):
+    """In a method of order 1, whose error is close to that of a delay."""
+    found = failures("euler", mistake)
+    assert len(found) == 1 + (mistake == "random")  # on both bodies
+    assert NAMED[mistake] in found[0]
+
+
+def test_a_delay_of_an_accurate_method_is_named():
+    assert [NAMED["half a step late"] in text for text in failures("rk4", "half a step late")] == [True]
+
+
+def test_two_mistakes_are_named():
+    found = failures("euler", "reads x, y, z, w", "x, y, z, w", "w in deg")
+    assert [text.partition(":")[2][:12] for text in found] == [" It reads `q", " `q` is x, y", " Rates are i"]
+
+
+def test_the_command_ends_with_exit_code_1_if_something_has_to_change():
+    words = shlex.join([sys.executable, "-I", str(PLANTED), "rk4"])
+    done = CliRunner().invoke(main, ["engines", "check", f"{words} 'gravity up'"])
+    assert (done.exit_code, "free body: error" in done.output) == (1, True)
+    assert "Error: heavy body: Gravity points up: it is along minus the third axis of W" in done.output
+    assert CliRunner().invoke(main, ["engines", "check", words]).exit_code == 0
