@@ -78,7 +78,7 @@ def program_class(program: Program) -> type[EngineMethod]:
     if shutil.which(words[0]) is None:
         remedy = f"Build it, or run: conservative engines remove {program.name}"
         raise UnusableProgram(program, f"{words[0]} does not exist or cannot be executed", remedy)
-    environment = ProgramEnvironment(program.name, "", program.file.parent / program.name, "", (), words=words)
+    environment = ProgramEnvironment(program.name, "", Path(shlex.join(words)), "", (), words=words)
     try:
         greeting = worker_of(environment).greet()
     except (EngineCrashed, EngineTimeout) as failure:
