@@ -34,7 +34,7 @@ ENGINE = {
     "tolerance": "accuracy",
     "fields": ("UniformGravity",),
     "card": {
-        "variants": ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-12", "RungeKuttaFeldberg,accuracy=1e-12"),
+        "variants": ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-14", "RungeKuttaFeldberg,accuracy=1e-15"),
         "as_installed": ("RungeKuttaMerson,accuracy=1e-3",),
     },
 }
