@@ -32,8 +32,8 @@ class Splitting(Method):
     and the axial momentum of a top are conserved to round-off. The energy is not, but at short steps its
     error is bounded and does not drift.
 
-    Use it where the map has to be symplectic: at the same error it takes three to six times as long as `Projected`, because
-    each free rotation costs about 110 ns. Fields may depend on time: the torque is that at the time of the kick.
+    Use it where the map has to be symplectic: at errors of 1e-3 to 1e-9 rad it takes 1.8 to 3.7 times as long as `Projected`,
+    because each free rotation costs about 120 ns. Fields may depend on time: the torque is that at the time of the kick.
 
     Parameters
     ----------

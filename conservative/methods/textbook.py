@@ -47,7 +47,7 @@ class Textbook(Method):
         IV.8.2). "crouch_grossman": order 4 with five stages (IV.8.1; Jackiewicz, Marthinsen & Owren 2000).
         "generalized_alpha": order 2, implicit (Brüls & Cardona 2010). "buss": order 3, one rotation a step (Buss 2000, for a
         free body; the torque is integrated by Radau's rule of order 3). "gyroscopic": order 1, the explicit gyroscopic torque
-        and semi-implicit Euler step of Bullet and ODE.
+        (an option of Bullet, and ODE before it became implicit) in a semi-implicit Euler step.
     rho
         Spectral radius of generalised-alpha at infinite frequency, 0 to 1: 1 has no numerical damping.
 
