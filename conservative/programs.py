@@ -4,9 +4,8 @@
     my_engine = "build/my_engine"   # relative to this file
     other_engine = "node engine.js --fast"
 
-The project's file is `conservative.toml` in the working directory, or in the nearest folder above it that has one. The variable
-CONSERVATIVE_PROJECT names another folder to start from. The user's file is in the configuration folder of platformdirs. A name
-in the project's file takes precedence. `conservative.references.environments.programs` runs the programs.
+The project's file is in the working directory, or in the nearest folder above it; CONSERVATIVE_PROJECT names another folder to
+start from. The user's file is in the configuration folder of platformdirs. A name in the project's file takes precedence.
 """
 
 from __future__ import annotations

@@ -53,7 +53,10 @@ class EngineMethod(AdapterMethod):
     @property
     def environment(self) -> Environment:
         """The environment. Raises `MissingEnvironment` if it is not installed."""
-        return find_environment(self.family.partition("@")[0], self.version)
+        own: Environment | None = getattr(self.adapter, "environment", None)  # of a program
+        return (
+            own if own and self.version in ("", own.version) else find_environment(self.family.partition("@")[0], self.version)
+        )
 
     @property
     def maker(self) -> Maker:

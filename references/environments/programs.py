@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
-import shutil
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from conservative import registry
 from conservative.deferred_imports import list_entries
@@ -21,47 +22,30 @@ from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
 from conservative.scene_files.toml_reader import key_lines
 
-from ..worker.client import EngineCrashed, EngineTimeout, Worker
-from .adapter import method_class
-from .engine_method import EngineMethod
+from ..worker.client import Worker
+from .engine_method import EngineMethod, engine_class
 from .environment import MEMORY, Environment, temporary_folder, worker_of
 from .plain_numbers import FIELDS
 
 
 class UnusableProgram(MissingEngine):
-    """A registered program cannot be used. The message names its file and what to do."""
+    """A program does not start, does not speak the protocol, or describes itself in another way than PROTOCOL.md does."""
 
-    def __init__(self, program: Program, problem: str, remedy: str) -> None:
+    def __init__(self, program: Program, error: Exception) -> None:
         self.engine = self.package = program.name
+        problem = getattr(error, "outcome", f"its answer to `hello` cannot be used ({type(error).__name__}: {error})")
+        remedy = f"Build it or change it as PROTOCOL.md describes, or run: conservative engines remove {program.name}"
         ImportError.__init__(self, f"{program.name}, a program of {program.file}: {problem}. {remedy}")
 
 
 @dataclass(frozen=True)
 class ProgramEnvironment(Environment):
-    """The environment of a program: that of the user. `words` is the command line."""
+    """The environment of a program, with the variables of this process. `words` is the command line."""
 
     words: tuple[str, ...] = ()
 
-    @property
-    def command(self) -> tuple[str | Path, ...]:
-        return self.words
-
-    def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = 0) -> Worker:
-        """Return a new worker, which has the variables of this process."""
-        return Worker(self.command, temporary_folder(), memory=memory or MEMORY)
-
-
-class ProgramMethod(EngineMethod):
-    """A program as a method. Its settings are those that it describes."""
-
-    @property
-    def environment(self) -> Environment:
-        """The environment. Raises `UnusableProgram` if another version is asked for."""
-        environment: Environment = self.adapter.environment
-        if self.version not in ("", environment.version):
-            problem = f"its version is {environment.version}, not {self.version}"
-            raise UnusableProgram(self.adapter.program, problem, "Name it without a version")
-        return environment
+    def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = MEMORY) -> Worker:
+        return Worker(self.words, temporary_folder(), memory=memory)
 
 
 def __getattr__(name: str) -> type[EngineMethod]:
@@ -73,29 +57,20 @@ def __getattr__(name: str) -> type[EngineMethod]:
 @cache
 def program_class(program: Program) -> type[EngineMethod]:
     """Return the class of a program, which is started for its description. Raise `UnusableProgram` if that fails."""
-    module = ModuleType(program.name, f"{program.name}, a program.")
-    words = program.words
-    if shutil.which(words[0]) is None:
-        remedy = f"Build it, or run: conservative engines remove {program.name}"
-        raise UnusableProgram(program, f"{words[0]} does not exist or cannot be executed", remedy)
-    environment = ProgramEnvironment(program.name, "", Path(shlex.join(words)), "", (), words=words)
+    module: Any = ModuleType(program.name, f"{program.name}, a program.")
+    environment = ProgramEnvironment(program.name, "", Path(shlex.join(program.words)), "", (), words=program.words)
+    every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet()
-    except (EngineCrashed, EngineTimeout) as failure:
-        remedy = f"Run: conservative engines check {shlex.quote(shlex.join(words))}"
-        raise UnusableProgram(program, str(failure.outcome), remedy) from None
-    try:
-        every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
-        module.ENGINE = {**every, **greeting.get("engine", {})}  # type: ignore[attr-defined]
-        module.environment = replace(environment, version=str(greeting["version"]))  # type: ignore[attr-defined]
-        module.program, module.__file__ = program, words[0]  # type: ignore[attr-defined]
-        made = method_class(module, ProgramMethod)
+        module.ENGINE = {**every, **greeting.get("engine", {})}
+        module.environment = replace(environment, version=str(greeting["version"]))
+        module.__file__ = program.words[0]
+        made = engine_class(module)
         for method in made.settings_for("variants"):
             method.order  # noqa: B018 - for its exception
-        return made
-    except Exception as error:  # a description can be wrong in any way
-        problem = f"its answer to `hello` cannot be used ({type(error).__name__}: {error})"
-        raise UnusableProgram(program, problem, "PROTOCOL.md describes `version` and `engine`") from None
+    except Exception as error:  # of the program, or of its description, which can be wrong in any way
+        raise UnusableProgram(program, error) from None
+    return made
 
 
 def read_program(text: str, name: str = "", project: bool = False) -> Program:
@@ -105,37 +80,28 @@ def read_program(text: str, name: str = "", project: bool = False) -> Program:
     """
     file = project_file() if project else user_file()
     words = [text] if Path(text).is_file() else shlex.split(text)
-    if not words:
-        raise BadInput("command", repr(text), "the path of an executable, or a command line")
-
-    def place(word: str) -> str:
-        path = Path(word).absolute()
-        inside = project and path.is_relative_to(file.parent)
-        return (f"./{path.relative_to(file.parent)}" if inside else str(path)) if path.is_file() else word
-
-    last = [word for word in words if Path(word).is_file()] or words
-    name = name or re.sub(r"\W", "_", Path(last[-1]).stem)
+    files = [word for word in words if Path(word).is_file()]
+    here = [word for word in files if not Path(word).is_absolute()]
+    places = {word: f"./{os.path.relpath(word, file.parent)}" if project else str(Path(word).absolute()) for word in here}
+    name = name or re.sub(r"\W", "_", Path((files or words or [""])[-1]).stem)
     taken = {*registry.list_methods(), *registry.list_engines()}.difference(list_programs())
     if not re.fullmatch(r"[A-Za-z]\w*", name) or name in taken:
         raise BadInput("name", repr(name), "letters, digits and '_', and not the name of a method or an engine")
-    return Program(name, file, shlex.join(map(place, words)))
+    return Program(name, file, shlex.join(places.get(word, word) for word in words))
 
 
 def add(program: Program) -> Program:
-    """Register a program. Raise `UnusableProgram` if it does not start, or `BadInput` if its file cannot be changed."""
+    """Register a program. Raise `UnusableProgram` if it cannot be used, or `BadInput` if its file cannot be changed."""
     program_class(program)
-    _edit(program, [f"{program.name} = {json.dumps(program.command)}"])
-    return program
+    return _edit(program, [f"{program.name} = {json.dumps(program.command)}"])
 
 
 def remove(name: str) -> Program:
-    """Take a program out of the file that it is registered in. Raise `BadInput` if the file cannot be changed."""
-    program = list_programs()[name]
-    _edit(program, [])
-    return program
+    """Take a program out of its file, and return it. Raise `BadInput` if the file cannot be changed."""
+    return _edit(list_programs()[name], [])
 
 
-def _edit(program: Program, new: list[str]) -> None:
+def _edit(program: Program, new: list[str]) -> Program:
     """Replace the line of a program in its file; all other lines stay."""
     file, name = program.file, program.name
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
@@ -152,5 +118,5 @@ def _edit(program: Program, new: list[str]) -> None:
             make_folder(file.parent, "engines")
             write_text(file, text, "engines")
             list_entries.cache_clear()
-            return
+            return program
     raise BadInput("engines", str(file), f"a table [engines] with {name} on a line of its own, or none")

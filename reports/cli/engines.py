@@ -70,19 +70,14 @@ def install(
 @engines.command(
     short_help="Register a program as an engine.",
     epilog=epilog(
-        "conservative engines add ./my_engine",
-        "conservative engines add 'node engine.js' --name my_engine --project",
-        "conservative run brick_flip --method my_engine",
+        "conservative engines add ./my_engine", "conservative engines add 'node engine.js' --name my_engine --project"
     ),
 )
 @click.argument("command")
 @click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
 @click.option("--project", is_flag=True, help="Register it in conservative.toml of this project, not for the user.")
 def add(command: str, name: str, project: bool) -> None:
-    """Register COMMAND, an executable or a command line, that speaks the protocol of references/PROTOCOL.md.
-
-    Its name then works like that of any engine. `engines remove NAME` takes it back.
-    """
+    """Register COMMAND, an executable or a command line that speaks the protocol of references/PROTOCOL.md, as an engine."""
     require_extra("conservative engines", "environments")
     from conservative.references.environments.programs import add, read_program
 
@@ -94,15 +89,17 @@ def add(command: str, name: str, project: bool) -> None:
 @engines.command(short_help="Test a program.", epilog=epilog("conservative engines check ./my_engine"))
 @click.argument("command")
 @json_option
-def check(command: str, as_json: bool) -> None:
-    """Test whether COMMAND, an executable, a command line or the name of a program, follows references/PROTOCOL.md.
-
-    Mistakes are named, with what to change. The exit code is 1 if there are any.
-    """
+@click.pass_context
+def check(ctx: click.Context, command: str, as_json: bool) -> None:
+    """Test COMMAND, or the program of that name. Mistakes are named, with what to change; the exit code is then 1."""
     require_extra("conservative engines", "environments")
-    from ..sections.environments import build_check
+    from conservative.programs import list_programs
+    from conservative.references.environments.conformance import check
+    from conservative.references.environments.programs import read_program
 
-    show(build_check(command), as_json)
+    program = list_programs().get(command) or read_program(command, "program")
+    results = _show(check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json)
+    ctx.exit(int(not all(right for right, _ in results)))
 
 
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))

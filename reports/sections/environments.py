@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from conservative import registry
 from conservative.programs import Program, list_programs
-from conservative.references.environments.conformance import check
 from conservative.references.environments.environment import Environment, list_environments
 from conservative.references.environments.install import Installation
-from conservative.references.environments.programs import read_program
 
 from ..document.model import Document, Paragraph
 
@@ -21,14 +19,6 @@ def build() -> Document:
         lines += [_line(environment) for environment in mine] or [f"{engine}: no environment"]
     data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}
     return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)
-
-
-def build_check(command: str) -> Document:
-    """Return the results of the conformance test of a program, given by its name or its command line."""
-    results = list(check(list_programs().get(command) or read_program(command)))
-    data = {"results": [{"passed": passed, "text": text} for passed, text in results]}
-    texts, failures = [Paragraph(text) for passed, text in results if passed], [text for passed, text in results if not passed]
-    return Document("conservative engines", "Conformance test", texts, data=data, failures=failures)
 
 
 def _line(environment: Environment) -> str:

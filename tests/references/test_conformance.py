@@ -89,6 +89,6 @@ def test_two_mistakes_are_named():
 def test_the_command_ends_with_exit_code_1_if_something_has_to_change():
     words = shlex.join([sys.executable, "-I", str(PLANTED), "rk4"])
     done = CliRunner().invoke(main, ["engines", "check", f"{words} 'gravity up'"])
-    assert (done.exit_code, "free body: error" in done.output) == (1, True)
-    assert "Error: heavy body: Gravity points up: it is along minus the third axis of W" in done.output
+    assert (done.exit_code, "right  free body: error" in done.output) == (1, True)
+    assert "WRONG  heavy body: Gravity points up: it is along minus the third axis of W" in done.output
     assert CliRunner().invoke(main, ["engines", "check", words]).exit_code == 0
