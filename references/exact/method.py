@@ -67,9 +67,7 @@ def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLik
     Jacobi's solution as in van Zon & Schofield, J. Comput. Phys. 225 (2007) 145, with a theta function instead of the elliptic
     integral of the third kind; formulas in `conservative.references.exact.free_body`.
     """
-    start, times = _start(body, R_WB0, w_WB_B0), _times(t)
-    with MP_LOCK:
-        return _evaluate(_free_motion(start), times)
+    return _evaluate(body, None, R_WB0, w_WB_B0, t)
 
 
 def lagrange_top(
@@ -99,14 +97,25 @@ def lagrange_top(
     -----
     Klein & Sommerfeld, Theorie des Kreisels, VI; formulas in `conservative.references.exact.lagrange_top`.
     """
-    start, times = _start(body, R_WB0, w_WB_B0), _times(t)
     if not isinstance(potential, UniformGravity):
         raise BadInput("potential", describe(potential), "a UniformGravity")
-    reason = _reason(body, potential)
-    if reason:
+    return _evaluate(body, potential, R_WB0, w_WB_B0, t)
+
+
+def _evaluate(
+    body: RigidBody, potential: UniformGravity | None, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike
+) -> tuple[Array, Array]:
+    if not isinstance(body, RigidBody):
+        raise BadInput("body", describe(body), "a RigidBody")
+    if reason := _reason(body, potential):
         raise Unsupported("potential", f"{potential!r} with {body!r}", f"a motion in closed form ({reason})")
+    rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
+    start, array = InitialState(body, rotation("R_WB0", R_WB0), rates), real_array(t)
+    # The array is None if t is not one of numbers, which the next line reports.
+    times = finite_array("t", t, (() if array is None else array.shape,), "finite times (n,), s")
     with MP_LOCK:
-        return _evaluate(_motion(start, potential), times)
+        R_WB, w_WB_B = in_blocks(_motion(start, potential), times.ravel())
+    return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)
 
 
 @dataclass(frozen=True)
@@ -170,31 +179,9 @@ def _reason(body: RigidBody, potential: AnyPotential | None) -> str | None:
     return None
 
 
-def _start(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike) -> InitialState:
-    if not isinstance(body, RigidBody):
-        raise BadInput("body", describe(body), "a RigidBody")
-    return InitialState(
-        body, rotation("R_WB0", R_WB0), finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
-    )
-
-
-def _free_motion(start: InitialState) -> ClosedForm:
-    return steady_turn(start) if start.steady else free_motion(start)
-
-
 def _motion(start: InitialState, potential: AnyPotential | None) -> ClosedForm:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
-        return _free_motion(start)
+        return steady_turn(start) if start.steady else free_motion(start)
     initial = top(start, potential.moment_B, axis)
     return steady_turn(start) if initial.upright else top_motion(initial)
-
-
-def _times(t: ArrayLike) -> Array:
-    array = real_array(t)  # None if t is not an array of numbers, which the next line reports
-    return finite_array("t", t, (() if array is None else array.shape,), "finite times (n,), s")
-
-
-def _evaluate(motion: ClosedForm, times: Array) -> tuple[Array, Array]:
-    R_WB, w_WB_B = in_blocks(motion, times.ravel())
-    return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)
