@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .attitude import Array, to_quaternion
-from .body import RigidBody
-from .check import build_unchecked
+from .check import replace_unchecked
+from .potentials.field import into_axes
 from .potentials.potential import AnyPotential
 from .potentials.turning import Turning, static_part
 from .potentials.varied import OneByOne, Varied
@@ -67,8 +67,7 @@ class Batch:
 
     def take(self, i: int) -> Scene:
         """Return the scene of body i."""
-        inertia = None if self.inertia is None else self.inertia[i]
-        body = self.scene.body if inertia is None else build_unchecked(RigidBody, inertia=inertia)
+        body = self.scene.body if self.inertia is None else replace_unchecked(self.scene.body, inertia=self.inertia[i])
         potential = self.take_potential(i)
         return replace_unchecked(self.scene, body=body, potential=potential, R_WB0=self.R_WB0[i], w_WB_B0=self.w_WB_B0[i])
 
@@ -125,7 +124,7 @@ class Batch:
     def L_P0(self) -> Array:
         """Initial angular momenta (n, 3), kg m^2/s, principal axes."""
         moments, R_BP = self.principal
-        return np.asarray((self.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * moments)
+        return into_axes(self.w_WB_B0, R_BP) * moments
 
 
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
@@ -136,9 +135,3 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     axes[:, :, 2] *= np.sign(np.linalg.det(axes))[:, None]
     moments[plain], axes[plain] = diagonal[plain], np.eye(3)
     return moments, axes
-
-
-def replace_unchecked(scene: Scene, **changes: Any) -> Scene:
-    """Return a copy of the scene with other fields, unchecked, and an empty cache."""
-    kept = ("name", "t_end", "dt", "extra_invariants", "group", "source")
-    return build_unchecked(Scene, **{name: getattr(scene, name) for name in kept}, **changes)

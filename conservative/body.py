@@ -46,7 +46,16 @@ class RigidBody:
     def __init__(self, inertia: ArrayLike) -> None:
         value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
         tensor = np.diag(value) if value.ndim == 1 else value
-        _check_tensor(tensor)
+        asymmetry = np.abs(tensor - tensor.T).max()
+        if asymmetry > 1e-12 * np.abs(tensor).max():
+            raise BadInput("inertia", f"a matrix that is not symmetric (off by {asymmetry:.3g})", _ALLOWED)
+        is_diagonal = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
+        moments = np.sort(np.diag(tensor)) if is_diagonal else np.linalg.eigvalsh(tensor)
+        if moments[0] <= 0:
+            raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _ALLOWED)
+        condition = LARGEST if is_diagonal else TENSOR_CONDITION
+        if moments[-1] > condition * moments[0]:
+            raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")
         set_fields(self, inertia=read_only((tensor + tensor.T) / 2))
 
     @cached_property
@@ -99,16 +108,3 @@ class RigidBody:
     def __repr__(self) -> str:
         diagonal = np.array_equal(self.inertia, np.diag(np.diag(self.inertia)))
         return f"RigidBody(inertia={(np.diag(self.inertia) if diagonal else self.inertia).tolist()})"
-
-
-def _check_tensor(tensor: Array) -> None:
-    asymmetry = np.abs(tensor - tensor.T).max()
-    if asymmetry > 1e-12 * np.abs(tensor).max():
-        raise BadInput("inertia", f"a matrix that is not symmetric (off by {asymmetry:.3g})", _ALLOWED)
-    is_diagonal = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
-    moments = np.sort(np.diag(tensor)) if is_diagonal else np.linalg.eigvalsh(tensor)
-    if moments[0] <= 0:
-        raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _ALLOWED)
-    condition = LARGEST if is_diagonal else TENSOR_CONDITION
-    if moments[-1] > condition * moments[0]:
-        raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")

@@ -184,33 +184,27 @@ def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
         A setting is unknown or has a wrong value.
     """
     settings = [item.strip() for item in text.split(",") if item.strip()]
-    arguments = _read_arguments(argument, target, settings)
-    try:
-        return target(**arguments)
-    except BadInput:
-        raise
-    except (ArithmeticError, TypeError, ValueError) as error:
-        raise BadInput(argument, describe(",".join(settings)), f"settings that it accepts ({error})") from error
-
-
-def _read_arguments(argument: str, target: Callable[..., object], settings: list[str]) -> dict[str, Any]:
-    defaults = _defaults(target)
+    defaults, arguments = _defaults(target), dict[str, Any]()
     names = list(defaults)
-    arguments: dict[str, Any] = {}
     for position, item in enumerate(settings):
-        name, equals, text = item.partition("=")
+        name, equals, setting = item.partition("=")
         if not equals:
-            name, text = names[position] if position < len(names) else item, item
+            name, setting = names[position] if position < len(names) else item, item
         if name not in defaults:
             raise BadInput(argument, describe(item), f"settings {nearest(name, names)}" if names else "no settings")
-        value, default = _read_value(text), defaults[name]
+        value, default = _read_value(setting), defaults[name]
         if isinstance(default, bool):
             if not isinstance(value, bool):
                 raise BadInput(argument, describe(item), f"{name}=true or {name}=false")
         elif isinstance(default, int | float) and real_number(value) is None:
             raise BadInput(argument, describe(item), f"{name}=a number, such as {default!r}, its default")
         arguments[name] = value
-    return arguments
+    try:
+        return target(**arguments)
+    except BadInput:
+        raise
+    except (ArithmeticError, TypeError, ValueError) as error:
+        raise BadInput(argument, describe(",".join(settings)), f"settings that it accepts ({error})") from error
 
 
 @lru_cache(maxsize=256)

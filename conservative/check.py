@@ -8,6 +8,7 @@ A frozen dataclass that converts its arguments has its own `__init__`, which che
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from decimal import Decimal
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -26,6 +27,8 @@ SMALLEST, LARGEST = 1e-30, 1e30
 The product of three such numbers does not overflow or underflow, so energies and momenta do not either.
 """
 _RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
+_UNIT = 4 * np.finfo(float).eps
+"""A vector whose length is 1 to this is not changed, so that a second normalization changes nothing."""
 
 
 def describe(value: object) -> str:
@@ -134,6 +137,15 @@ def printable_text(argument: str, value: object, allowed: str) -> str:
     return value
 
 
+def unit_vector(argument: str, value: ArrayLike, allowed: str = "three finite numbers (3,), not all 0", size: int = 3) -> Array:
+    """Return the unit vector (size,) along a vector (size,) of any length above 0."""
+    direction = finite_array(argument, value, ((size,),), allowed)
+    length = float(np.linalg.norm(direction))
+    if length == 0:
+        raise BadInput(argument, describe(value), allowed)
+    return read_only(direction / length) if abs(length - 1) > _UNIT else direction
+
+
 def rotation(argument: str, value: object) -> Array:
     """Return a matrix (3, 3) or a SciPy `Rotation` as a rotation matrix."""
     allowed = f"a rotation matrix (3, 3), orthonormal to {ROTATION_TOLERANCE:g} with determinant +1, or a SciPy Rotation"
@@ -158,13 +170,19 @@ def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
         raise BadInput(argument, describe(value), "one of " + ", ".join(repr(o) for o in options))
 
 
-def set_fields(value: object, **fields: Any) -> None:
+def set_fields(value: object, **values: Any) -> None:
     """Set the fields of a frozen dataclass in its constructor, where assignments fail."""
-    vars(value).update(fields)
+    vars(value).update(values)
 
 
-def build_unchecked(kind: type[T], **fields: Any) -> T:
+def replace_unchecked(value: T, **changes: Any) -> T:
+    """Return a copy of a frozen dataclass with other fields, without the checks of its constructor and with an empty cache."""
+    frozen: Any = value
+    return build_unchecked(type(value), **{field.name: getattr(frozen, field.name) for field in fields(frozen)} | changes)
+
+
+def build_unchecked(kind: type[T], **values: Any) -> T:
     """Return a frozen dataclass without the checks of its constructor: internal units can have numbers of any size."""
     instance = object.__new__(kind)
-    vars(instance).update(fields)
+    vars(instance).update(values)
     return instance

@@ -76,7 +76,11 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
 
     rows = np.zeros((len(bodies), 10, 3))
     rows[:, :3] = scene.body.inertia if bodies.inertia is None else bodies.inertia
-    rows[:, 3:6] = find_axes(bodies) / momentum[:, None, None]
+    # Unit vectors, row by row, along which momentum is conserved; otherwise 0.
+    if potential is None:
+        rows[:, 3:6] = np.eye(3) / momentum[:, None, None]
+    elif potential.axis_W is not None:
+        rows[:, 3] = (bodies.varied.axes_W() if bodies.parameters else potential.axis_W) / momentum[:, None]
     L_W = np.einsum("nij,nj->ni", bodies.R_WB0, L_B)
     rows[:, 6] = np.einsum("nij,nj->ni", rows[:, 3:6], L_W)
     if scene.symmetry_axis_B is not None:
@@ -129,17 +133,6 @@ def momenta_of(bodies: Batch) -> Array:
     if bodies.inertia is None:
         return np.asarray(bodies.w_WB_B0 @ bodies.scene.body.inertia)
     return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
-
-
-def find_axes(bodies: Batch) -> Array:
-    """Return unit vectors (n, 3, 3), or (1, 3, 3) for all, row by row, along which momentum is conserved; otherwise 0."""
-    if bodies.scene.potential is None:
-        return np.eye(3)[None]
-    axis_W = bodies.scene.potential.axis_W
-    if axis_W is None:
-        return np.zeros((1, 3, 3))
-    first = bodies.varied.axes_W() if bodies.parameters else axis_W[None]
-    return np.stack([first, np.zeros_like(first), np.zeros_like(first)], axis=1)
 
 
 def field_scales(bodies: Batch) -> Array | float:

@@ -98,8 +98,9 @@ class IntegrationFailed(_Error, ArithmeticError):
     outcome: Outcome
 
     def at_times(self, unit: float) -> Self:
-        """Return this failure with its time converted from units of `unit` s to s."""
-        return self
+        """Return this failure with its time, if it has one, converted from units of `unit` s to s."""
+        values = {name: value for name, value in vars(self).items() if name != "outcome"}
+        return type(self)(**values | {"time": values["time"] * unit}) if "time" in values else self
 
 
 class NotConverged(IntegrationFailed):
@@ -116,9 +117,6 @@ class NotConverged(IntegrationFailed):
         self.outcome = Outcome(self.kind, reason, step, time, residual)
         super().__init__(f"The run ended: {self.outcome}. Use a shorter step, or keep the valid samples: on_failure='return'")
 
-    def at_times(self, unit: float) -> Self:
-        return type(self)(self.step, self.time * unit, self.residual, self.reason)
-
 
 class WrongBranch(NotConverged):
     """The solver converged to a solution of a step's equations that does not continue the motion."""
@@ -133,9 +131,6 @@ class Diverged(IntegrationFailed):
         self.time, self.reason = time, reason
         self.outcome = Outcome(OutcomeKind.DIVERGED, reason, time=time)
         super().__init__(f"The run ended: {self.outcome}. {_SHORTER_STEP}")
-
-    def at_times(self, unit: float) -> Self:
-        return type(self)(self.time * unit, self.reason)
 
 
 class NotConserved(IntegrationFailed):

@@ -79,7 +79,12 @@ def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, 
     Leftovers are removed first. An `OSError` is not converted.
     """
     remove_leftovers(place)
-    fresh, handle = _make_locked(place, make)
+    while True:
+        fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
+        handle = make(fresh)
+        if try_lock(handle) and _is_at(handle, fresh):
+            break
+        os.close(handle)  # another process removed it as a leftover before it was locked
     try:
         yield fresh, handle
     finally:
@@ -95,17 +100,12 @@ def remove_leftovers(place: Path) -> None:
 
 def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
     """Yield the temporaries of processes that have ended. Each is locked until the next one."""
-    for path in _temporaries(place, suffix):
-        if (handle := lock(path)) is not None:
-            yield path
-            release(handle)
-
-
-def _temporaries(place: Path, suffix: str = "") -> list[Path]:
     pattern = re.compile(rf"\.{re.escape(place.name)}-[0-9a-f]{{12}}{suffix}")
     with suppress(OSError):  # in a folder that cannot be read, nothing can be removed
-        return [path for path in place.parent.iterdir() if pattern.fullmatch(path.name)]
-    return []
+        for path in list(place.parent.iterdir()):
+            if pattern.fullmatch(path.name) and (handle := lock(path)) is not None:
+                yield path
+                release(handle)
 
 
 def lock(path: Path) -> int | None:
@@ -175,14 +175,22 @@ class _RawFile(io.FileIO):
 
 @contextmanager
 def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
-    """Yield a raw file that replaces `target` when the block succeeds."""
+    """Yield a raw file that replaces `target`, and has its permissions, when the block succeeds; or a device or pipe itself."""
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
     with ExitStack() as stack:
         with _errors(target, argument):
-            is_file = target.is_file() or not target.exists()
-            place = Path(os.path.realpath(target)) if is_file else target  # a link stays a link
-            fresh, handle = stack.enter_context(_open_target(place))
+            place = Path(os.path.realpath(target))  # a link stays a link
+            if target.exists() and not os.access(target, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            if is_file := target.is_file() or not target.exists():
+                fresh, handle = stack.enter_context(temporary(place, lambda path: os.open(path, flags, 0o666)))
+                if place.exists():
+                    fresh.chmod(stat.S_IMODE(place.stat().st_mode))
+            else:
+                handle = os.open(target, os.O_WRONLY)  # of a folder, an error
+                stack.callback(os.close, handle)
         yield _RawFile(handle, target, argument)
-        if fresh != place:
+        if is_file:
             with _errors(target, argument):
                 os.fsync(handle)  # before the renaming, because a crash of the machine could otherwise leave an empty file
                 fresh.replace(place)
@@ -195,33 +203,6 @@ def _errors(target: Path, argument: str) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:  # a ValueError: a NUL in the name
         raise NotWritten(argument, target, error) from None
-
-
-@contextmanager
-def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
-    """Yield the file to write: a temporary with the permissions of the target, or the target if it is a device or pipe."""
-    if place.exists() and not os.access(place, os.W_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    if place.exists() and not place.is_file():
-        with ExitStack() as stack:
-            handle = os.open(place, os.O_WRONLY)  # of a folder, an error
-            stack.callback(os.close, handle)
-            yield place, handle
-        return
-    with temporary(place, lambda path: os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)) as (fresh, handle):
-        if place.exists():
-            fresh.chmod(stat.S_IMODE(place.stat().st_mode))
-        yield fresh, handle
-
-
-def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:
-    """Return a new temporary and its handle, locked. Retry if another process removed it as a leftover before it was locked."""
-    while True:
-        fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
-        handle = make(fresh)
-        if try_lock(handle) and _is_at(handle, fresh):
-            return fresh, handle
-        os.close(handle)
 
 
 def _is_at(handle: int, path: Path) -> bool:

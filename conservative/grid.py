@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
@@ -84,11 +84,8 @@ class Grid:
 def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: object = 1) -> Grid:
     """Return the checked grid of a run of steps dt up to t_end, both in s; the duration is by default the scene's.
 
-    Raises
-    ------
-    BadInput
-        dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1 or more, or
-        the samples would not fit in memory.
+    Raise `BadInput` if dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1
+    or more, or the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     if type(dt) is float and SMALLEST <= dt <= end:
@@ -104,13 +101,11 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
-    return _recall_grid(step, n_steps, every)
+    return _recall_grid(dt=step, n_steps=n_steps, every=every)
 
 
-@lru_cache(maxsize=16)
-def _recall_grid(dt: float, n_steps: int, every: int) -> Grid:
-    """Return a checked grid: the same one for runs of several scenes, so that its times are computed once."""
-    return build_unchecked(Grid, dt=dt, n_steps=n_steps, every=every)
+_recall_grid = lru_cache(maxsize=16)(partial(build_unchecked, Grid))
+"""Returns a checked grid: the same one for runs of several scenes, so that its times are computed once."""
 
 
 @lru_cache(maxsize=1)

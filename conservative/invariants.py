@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from .attitude import Array
 from .body import RigidBody
 from .check import describe, printable_text, real_number
-from .errors import BadInput, nearest
+from .errors import BadInput
 from .potentials.potential import AnyPotential, depends_on_time, energy_at
 from .potentials.turning import Turning
 from .potentials.uniform_gravity import UniformGravity
@@ -59,22 +59,6 @@ def sizes(drift: Array) -> Array:
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
 
 
-def find_invariant(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
-    """Return an invariant, which can be given by its name.
-
-    Raises
-    ------
-    BadInput
-        No known invariant has this name.
-    """
-    if not isinstance(invariant, str):
-        return invariant
-    by_name = {each.name: each for each in known}
-    if invariant not in by_name:
-        raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
-    return by_name[invariant]
-
-
 def kinetic_energy(body: RigidBody, w_WB_B: Array) -> Array:
     """Return the kinetic energy (...), J, at rates (..., 3), rad/s, body axes."""
     return np.asarray(np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2)
@@ -119,7 +103,16 @@ def invariants_of(
     axis
         Unit vector (3,), body axes, about which body and field are symmetric, or None (`axial_direction`).
     """
-    conserved = list(_energies(body, potential, energy_scale))
+    conserved = []
+    if isinstance(potential, Turning):
+        field, orbit = potential.potential, potential.orbit
+
+        def jacobi_integral(R_OB: Array, w: Array) -> Array:
+            return kinetic_energy(body, w) + field.energy(R_OB) - orbit.rate * (momentum_W(body, R_OB, w) @ orbit.normal_W)
+
+        conserved.append(Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), jacobi_integral))
+    elif not depends_on_time(potential):
+        conserved.append(Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w, np.zeros(()))))
     # A scene that starts at rest has no momentum. The momentum that gravity can produce is the scale instead.
     scale = float(np.linalg.norm(body.momentum(w_WB_B0))) or math.sqrt(float(body.moments.max()) * energy_scale)
     if potential is None:
@@ -130,19 +123,6 @@ def invariants_of(
     if axis is not None:
         conserved.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(conserved)
-
-
-def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: float) -> Iterator[Invariant]:
-    """Yield the energy, the Jacobi integral in a turning field, or nothing in another field that depends on time."""
-    if isinstance(potential, Turning):
-        field, orbit = potential.potential, potential.orbit
-
-        def jacobi_integral(R_OB: Array, w: Array) -> Array:
-            return kinetic_energy(body, w) + field.energy(R_OB) - orbit.rate * (momentum_W(body, R_OB, w) @ orbit.normal_W)
-
-        yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), jacobi_integral)
-    elif not depends_on_time(potential):
-        yield Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w, np.zeros(())))
 
 
 def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:

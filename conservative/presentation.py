@@ -89,29 +89,24 @@ def picture(trajectory: Any) -> altair.VConcatChart:
 def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
     """Return a chart that a notebook shows without a network.
 
-    A notebook that renders Vega-Lite itself, such as JupyterLab, gets the specification, others an SVG. Altair's default is a
-    page that loads scripts from a server.
+    A notebook that renders Vega-Lite itself, such as JupyterLab, gets the specification, others an SVG if `vl-convert` is
+    installed. Altair's default is a page that loads scripts from a server.
     """
     import altair as alt
 
     class Offline(alt.VConcatChart):
         def _repr_mimebundle_(self, *args: object, **kwds: object) -> dict[str, Any]:
-            return _mimebundle(self)
+            specification = self.to_dict()
+            version = str(specification["$schema"]).rpartition("/")[2].partition(".")[0]
+            name = "chart of body rates and drifts"
+            shown: dict[str, Any] = {f"application/vnd.vegalite.{version}+json": specification, "text/plain": name}
+            with suppress(ImportError):
+                import vl_convert
+
+                shown["image/svg+xml"] = vl_convert.vegalite_to_svg(specification)
+            return shown
 
     return Offline.from_dict(chart.to_dict(), validate=False)
-
-
-def _mimebundle(chart: altair.VConcatChart) -> dict[str, Any]:
-    """Return the specification of a chart, and an SVG if `vl-convert` is installed."""
-    specification = chart.to_dict()
-    version = str(specification["$schema"]).rpartition("/")[2].partition(".")[0]
-    name = "chart of body rates and drifts"
-    shown: dict[str, Any] = {f"application/vnd.vegalite.{version}+json": specification, "text/plain": name}
-    with suppress(ImportError):
-        import vl_convert
-
-        shown["image/svg+xml"] = vl_convert.vegalite_to_svg(specification)
-    return shown
 
 
 def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
@@ -157,5 +152,10 @@ def card(trajectory: Any) -> str:
             for i in trajectory.scene.invariants
         ),
     ]
+    return html_table("Trajectory", rows)
+
+
+def html_table(caption: str, rows: list[tuple[str, str]]) -> str:
+    """Return an HTML table with a row for each pair of a heading and a text."""
     body = "".join(f'<tr><th scope="row" style="text-align:left">{escape(k)}</th><td>{escape(v)}</td></tr>' for k, v in rows)
-    return f"<table><caption>Trajectory</caption>{body}</table>"
+    return f"<table><caption>{caption}</caption>{body}</table>"

@@ -91,26 +91,20 @@ def method(text: str) -> Method:
         The engine is not installed.
     """
     name, _, settings = printable_text("method", text, _NAME).partition(":")
-    family = _load_method(name)
+    base, at, version = name.partition("@")
+    methods, engines = list_entries(METHODS), list_entries(ENGINES)
+    known = set(engines) if at else {*engines, *methods}
+    if base not in known or bool(at) != bool(version):
+        allowed = nearest(base, known, "conservative list, and conservative engines list")
+        raise BadInput("method", repr(name), allowed + (", with @ and a version" if at else ""))
+    # The class that runs in this process, or in an environment if a version is named or there is no other.
+    family: type[Method] = (
+        engine(base).at_version(version) if at else load_entry(METHODS if name in methods else ENGINES, "method", name)
+    )
     if getattr(family, "family", None) != name:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
     return family.configure(settings)
-
-
-def _load_method(name: str) -> type[Method]:
-    """Return the class that runs in this process, or in an environment if a version is named or there is no other."""
-    base, at, version = name.partition("@")
-    engines = list_entries(ENGINES)
-    known = set(engines) if at else {*engines, *list_entries(METHODS)}
-    if base not in known or bool(at) != bool(version):
-        allowed = nearest(base, known, "conservative list, and conservative engines list")
-        raise BadInput("method", repr(name), allowed + (", with @ and a version" if at else ""))
-    if at:
-        versioned: type[Method] = engine(base).at_version(version)
-        return versioned
-    family: type[Method] = load_entry(METHODS if name in list_entries(METHODS) else ENGINES, "method", name)
-    return family
 
 
 def list_families() -> dict[str, type[Method]]:

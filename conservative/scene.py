@@ -96,6 +96,15 @@ class Scene:
             raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
+        try:
+            given: tuple[Any, ...] = tuple(extra_invariants)
+        except Exception:  # not an iterable, or one that fails
+            given = (extra_invariants,)
+        if not all(isinstance(each, Invariant) for each in given):
+            raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
+        if dt is None:
+            speed = float(np.linalg.norm(rates))
+            dt = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
         set_fields(
             self,
             name=name,
@@ -104,8 +113,8 @@ class Scene:
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
-            dt=_usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s"),
-            extra_invariants=_invariants(extra_invariants),
+            dt=positive_number("dt", dt, "a finite step above 0, s"),
+            extra_invariants=given,
             group=printable_text("group", group, "a text"),
             source=printable_text("source", source, "a text"),
         )
@@ -188,20 +197,3 @@ class Scene:
     def __repr__(self) -> str:
         start = f"R_WB0={self.R_WB0.tolist()}, w_WB_B0={self.w_WB_B0.tolist()}"
         return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r})"
-
-
-def _invariants(value: object) -> tuple[Invariant, ...]:
-    """Return invariants as a tuple. Raise `BadInput` for anything else."""
-    try:
-        given: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
-    except Exception:  # not an iterable, or one that fails
-        given = (value,)
-    if not all(isinstance(each, Invariant) for each in given):
-        raise BadInput("extra_invariants", describe(value), "Invariants, in a tuple or a list")
-    return given
-
-
-def _usual_step(w_WB_B0: Array, t_end: float) -> float:
-    """Return the time, s, of a rotation by 0.05 rad, or a hundredth of the duration if that is shorter."""
-    speed = float(np.linalg.norm(w_WB_B0))
-    return max(SMALLEST, min(t_end / 100, 0.05 / speed) if speed > 0 else t_end / 100)

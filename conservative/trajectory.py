@@ -10,7 +10,8 @@ import numpy as np
 
 from . import invariants, presentation
 from .attitude import Array, orthonormality
-from .errors import Diverged, IntegrationFailed, NotConserved
+from .check import describe
+from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest
 from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
@@ -88,7 +89,11 @@ class Trajectory:
         BadInput
             The scene has no such invariant.
         """
-        invariant = invariants.find_invariant(invariant, self.scene.invariants)
+        if isinstance(invariant, str):
+            by_name = {each.name: each for each in self.scene.invariants}
+            if invariant not in by_name:
+                raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
+            invariant = by_name[invariant]
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
         R = self.scene.in_field_axes(self.R_WB, self.t)
         return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)
@@ -185,7 +190,9 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
     is cut contains the failure.
     """
     with np.errstate(all="ignore"):
-        n = finite_prefix(result.R_WB, result.w_WB_B)
+        n = len(result)
+        if not (np.isfinite(result.R_WB).all() and np.isfinite(result.w_WB_B).all()):  # this alone is three times as fast
+            n = int(np.argmin(np.isfinite(result.R_WB).all(axis=(1, 2)) & np.isfinite(result.w_WB_B).all(axis=1)))
         if n < len(result):
             return _cut(result, n, result.failure or Diverged(float(result.t[max(n - 1, 0)])))
         if result.failure is not None:
@@ -212,11 +219,3 @@ def _count_within(values: Array, bound: float) -> int:
 
 def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
     return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], failure=failure)
-
-
-def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
-    """Return how many leading samples of attitudes (n, 3, 3) and rates (n, 3), rad/s, are finite."""
-    if np.isfinite(R_WB).all() and np.isfinite(w_WB_B).all():  # the usual case, three times as fast
-        return len(R_WB)
-    finite = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
-    return int(np.argmin(finite))

@@ -53,27 +53,21 @@ def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = No
     The relative error is a quarter of a percent, or 1e-9 rad. Bodies that are not finite are left out; without bodies the
     result is nan.
     """
-    counts = np.zeros((len(centre), _BINS + 1), dtype=np.int64)
+    counts = np.zeros((len(centre), _BINS + 1), dtype=np.int64)  # the first bin has the angles below `_LEAST`
     for block in blocks(R_WB, samples):
-        counts += _count_angles(block, centre)
+        off = block - centre
+        square = np.einsum("nsij,nsij->ns", off, off)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            angle = 2 * np.arcsin(np.sqrt(np.minimum(square / 8, 1.0)))
+            bins = np.ceil(np.log(angle / _LEAST) / _WIDTH)
+        sample, finite = np.broadcast_to(np.arange(len(centre)), bins.shape), ~np.isnan(bins)
+        places = sample[finite] * (_BINS + 1) + np.clip(bins[finite], 0, _BINS).astype(np.int64)
+        counts += np.bincount(places, minlength=counts.size).reshape(counts.shape)
     reached = counts.cumsum(axis=1)
     ranks = np.array(QUANTILES) * reached[:, -1:]
     bins = (reached[:, None, :] < np.maximum(ranks, 0.5)[:, :, None]).sum(axis=2)
     angles = np.where(bins == 0, 0.0, np.minimum(_LEAST * np.exp(_WIDTH * (bins - 0.5)), math.pi))
     return np.where(reached[:, -1:] > 0, angles, math.nan)
-
-
-def _count_angles(R_WB: Array, centre: Array) -> Any:
-    """Return the number of angles in each bin, (m, bins). The first bin has those below `_LEAST`."""
-    off = R_WB - centre
-    square = np.einsum("nsij,nsij->ns", off, off)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angle = 2 * np.arcsin(np.sqrt(np.minimum(square / 8, 1.0)))
-        bins = np.ceil(np.log(angle / _LEAST) / _WIDTH)
-    sample = np.broadcast_to(np.arange(len(centre)), bins.shape)
-    finite = ~np.isnan(bins)
-    places = sample[finite] * (_BINS + 1) + np.clip(bins[finite], 0, _BINS).astype(np.int64)
-    return np.bincount(places, minlength=len(centre) * (_BINS + 1)).reshape(len(centre), -1)
 
 
 def directions(R_WB: Any, axis_B: Array, samples: Sequence[int]) -> Array:

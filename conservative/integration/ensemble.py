@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -20,7 +19,7 @@ from ..drifts import arrange_drifts, list_drifts, scene_reference
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
 from ..outcome import OK, Choice, Counters, Outcome
-from ..presentation import COLUMNS
+from ..presentation import COLUMNS, html_table
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -151,9 +150,7 @@ class Ensemble:
         for name, values in self.drifts.items():
             worst = -1 if np.isnan(values).all() else int(np.nanargmax(values))
             rows.append((f"drift of {name}", "none" if worst < 0 else f"{values[worst]:.2e} at most (relative, body {worst})"))
-        cell = '<tr><th scope="row" style="text-align:left">'
-        body = "".join(f"{cell}{escape(key)}</th><td>{escape(value)}</td></tr>" for key, value in rows)
-        return f"<table><caption>Ensemble</caption>{body}</table>"
+        return html_table("Ensemble", rows)
 
     def _describe_outcomes(self) -> str:
         """Return the number of runs of each outcome, and the numbers of some bodies that failed, as text."""

@@ -30,10 +30,7 @@ def read_bodies(
 ) -> Batch:
     """Return n bodies from the arguments of `integrate_many`, with the values of the scene for everything that is None.
 
-    Raises
-    ------
-    BadInput
-        An argument has the wrong shape, or `Scene` or one of its parts rejects a body.
+    Raise `BadInput` if an argument has the wrong shape, or `Scene` or one of its parts rejects a body.
     """
     with suppress(Exception):  # not a Rotation: the checks below report the error
         R_WB0 = R_WB0.as_matrix()
@@ -121,7 +118,7 @@ def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> 
         key = f"parameters[{name!r}]"
         values[name] = _read(key, value, (known[name],), given)
         given.setdefault(key, values[name])
-    return _check_potentials(scene, values) if values else {}
+    return _convert_parameters(scene, values) if values else {}
 
 
 def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
@@ -133,7 +130,7 @@ def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
     return {name: array.shape for name, array in arrays.items() if array.dtype == np.float64}
 
 
-def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
+def _convert_parameters(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
     """Return parameters (n, ...) as the constructor of the potential converts them. Raise `BadInput` for the first bad one."""
     n = len(next(iter(parameters.values())))
     bodies = Batch(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)

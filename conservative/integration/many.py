@@ -126,10 +126,15 @@ def integrate_many(
             return ensemble
         blocks = list_blocks(len(bodies), grid)
         if path is None:
-            whole = _allocate(bodies, grid)
+            n, m, most = len(bodies), grid.n_samples, most_samples() * SAMPLE_BYTES // STORED_BYTES
+            if n * m > most:
+                allowed = f"more steps between samples, or a path: {most:.3g} samples of {STORED_BYTES} bytes fit in memory"
+                raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
+            names = list_drifts(bodies)
+            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {})
             with start_workers(client, threads, len(blocks)) as workers:
                 run_blocks(chosen, bodies, grid, workers, blocks, lambda i, _, part: whole.put(i, part), progress)
-            drifts = dict(zip(list_drifts(bodies), whole.drifts.T, strict=True))
+            drifts = dict(zip(names, whole.drifts.T, strict=True))
             return Ensemble(bodies, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice)
         stored = write_store(path, chosen.label, bodies, grid, resume)
         with start_workers(client, threads, len(blocks)) as workers, stored as store:
@@ -169,12 +174,3 @@ def _require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
                 method.prepare(scene, grid)
         except BadInput as refusal:
             raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None
-
-
-def _allocate(bodies: Batch, grid: Grid) -> BlockResult:
-    """Return a result with room for all bodies. Raise `BadInput` if the samples do not fit in memory."""
-    n, m, most = len(bodies), grid.n_samples, most_samples() * SAMPLE_BYTES // STORED_BYTES
-    if n * m > most:
-        allowed = f"more steps between samples, or a path: {most:.3g} samples of {STORED_BYTES} bytes fit in memory"
-        raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
-    return BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(list_drifts(bodies)))), {})

@@ -35,21 +35,13 @@ def require_support(method: Method, scene: Scene) -> None:
 _REDUCED = Reduced()
 
 
-def default_method(scene: Scene) -> Method:
-    """Return the default method for a scene."""
-    return _REDUCED if _REDUCED.unsupported(scene) is None else (*candidates(scene), _REDUCED)[0]
-
-
 def read_method(method: object, scene: Scene) -> Method:
     """Return a method given as a `Method`, by its name, or as None for the default method of the scene.
 
-    Raises
-    ------
-    BadInput
-        The argument is something else, or the name is unknown.
+    Raise `BadInput` if the argument is something else, or the name is unknown.
     """
     if method is None:
-        return default_method(scene)
+        return _REDUCED if _REDUCED.unsupported(scene) is None else (*candidates(scene), _REDUCED)[0]
     if isinstance(method, str):
         method = registry.method(method)
     if not isinstance(method, Method):
@@ -171,10 +163,7 @@ def read_target(
 ) -> tuple[float, SampleTimes]:
     """Return the duration, s, and the samples of a run with a target error, rad; `at` are the times of the samples, s.
 
-    Raises
-    ------
-    BadInput
-        An argument is invalid, or given together with an error that determines it.
+    Raise `BadInput` if an argument is invalid, or given together with an error that determines it.
     """
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:

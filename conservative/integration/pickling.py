@@ -90,26 +90,19 @@ def _pickler() -> Any:
         def persistent_id(self, value: object) -> int | None:
             return self.places.get(id(value))
 
-        def reducer_override(self, value: object) -> Any:
-            reduced = _reduce(value)
-            return super().reducer_override(value) if reduced is NotImplemented else reduced
+        def reducer_override(self, value: Any) -> Any:
+            """Return how pickle restores a value."""
+            if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
+                return read_only, (value.copy(order="K"),)
+            if isinstance(value, BaseException):  # whatever arguments its constructor takes
+                return restore, (type(value), value.args, vars(value))
+            kind: Any = type(value)
+            cached = _cached_names(kind)
+            if not cached.isdisjoint(getattr(value, "__dict__", ())):
+                return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
+            return super().reducer_override(value)
 
     return Pickler
-
-
-def _reduce(value: Any) -> Any:
-    """Return how pickle restores a value; NotImplemented if pickle's own way is right."""
-    if isinstance(value, type):
-        return NotImplemented
-    if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
-        return read_only, (value.copy(order="K"),)
-    if isinstance(value, BaseException):  # whatever arguments its constructor takes
-        return restore, (type(value), value.args, vars(value))
-    kind: Any = type(value)
-    cached = _cached_names(kind)
-    if not cached.isdisjoint(getattr(value, "__dict__", ())):
-        return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
-    return NotImplemented
 
 
 @cache

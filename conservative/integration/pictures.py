@@ -7,7 +7,7 @@ drawn on a disc in J. H. Lambert's equal-area projection (1772).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import altair as alt
@@ -16,8 +16,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import finite_array
-from ..errors import BadInput
+from ..check import unit_vector
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
@@ -40,8 +39,11 @@ _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
 
 def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcatChart:
     """Return the chart of an `Ensemble`; see `Ensemble.plot`."""
-    axis, m = _read_axis(ensemble, axis_B), len(ensemble.t)
-    along = np.flatnonzero(axis == 1)
+    if axis_B is not None:
+        axis = unit_vector("axis_B", axis_B, "a direction of three finite numbers (3,), body axes, not all 0")
+    elif (axis := ensemble.bodies.take(0).symmetry_axis_B) is None:
+        axis = np.array([0.0, 0.0, 1.0])
+    along, m = np.flatnonzero(axis == 1), len(ensemble.t)
     named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis)})"
     ends, shown = sorted({0, m - 1}), np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
     discs = [
@@ -55,17 +57,6 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
     title = alt.Title(ensemble.bodies.scene.name, subtitle=[f"{len(ensemble):,} bodies{failed}", ensemble.label])
     chart: alt.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
     return chart
-
-
-def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
-    if axis_B is None:
-        symmetry_axis_B = ensemble.bodies.take(0).symmetry_axis_B
-        return np.array([0.0, 0.0, 1.0]) if symmetry_axis_B is None else symmetry_axis_B
-    allowed = "a direction of three finite numbers (3,), body axes, not all 0"
-    axis = finite_array("axis_B", axis_B, ((3,),), allowed)
-    if not axis.any():
-        raise BadInput("axis_B", axis.tolist(), allowed)
-    return axis / np.linalg.norm(axis)
 
 
 def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
@@ -88,8 +79,16 @@ def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
 
 def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
     """Return a histogram of the largest drifts (n,), relative, by the names of the invariants; both axes are logarithmic."""
-    edges = _edges(drifts.values())
-    data = pd.concat([_drift_rows(name, values, edges) for name, values in drifts.items()])
+    finite = {name: np.maximum(values[np.isfinite(values)], LEAST_DRAWN) for name, values in drifts.items()}
+    least = min((values.min() for values in finite.values() if len(values)), default=LEAST_DRAWN)
+    most = max((values.max() for values in finite.values() if len(values)), default=LEAST_DRAWN)
+    first = math.floor(math.log10(least))
+    last = max(math.floor(math.log10(most)) + 1, first + 1)
+    edges = np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
+    counts = {name: np.histogram(np.clip(values, edges[0], edges[-1]), edges)[0] for name, values in finite.items()}
+    # An empty bin gets half a body, which is below the axis.
+    rows = ({"of": name, "drift": edges, "bodies": np.maximum([*each, 0], 0.5)} for name, each in counts.items())
+    data = pd.concat(list(map(pd.DataFrame, rows)))
     x = alt.X(
         "drift:Q",
         title="largest drift, relative",
@@ -110,23 +109,6 @@ def _power_axis(low: float, high: float, form: str) -> Any:
     """Return a logarithmic axis with a label at each power of ten, or fewer labels on a long axis."""
     first, last = math.floor(math.log10(low) + 1e-9), math.floor(math.log10(high) + 1e-9)
     return alt.Axis(format=form, values=[10.0**k for k in range(first, last + 1, 1 + (last - first) // 12)])
-
-
-def _edges(drifts: Iterable[Array]) -> Array:
-    """Return the edges of bins, `_PER_DECADE` per decade, over the decades of all drifts (n,)."""
-    finite = [np.maximum(values[np.isfinite(values)], LEAST_DRAWN) for values in drifts]
-    least = min((values.min() for values in finite if len(values)), default=LEAST_DRAWN)
-    most = max((values.max() for values in finite if len(values)), default=LEAST_DRAWN)
-    first = math.floor(math.log10(least))
-    last = max(math.floor(math.log10(most)) + 1, first + 1)
-    return np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
-
-
-def _drift_rows(name: str, values: Array, edges: Array) -> pd.DataFrame:
-    """Return the number of bodies in each bin. An empty bin gets half a body, which is below the axis."""
-    finite = np.clip(values[np.isfinite(values)], edges[0], edges[-1])
-    counts, _ = np.histogram(finite, edges)
-    return pd.DataFrame({"of": name, "drift": edges, "bodies": np.maximum([*counts, 0], 0.5)})
 
 
 def draw_pointing(directions_W: Array, title: str) -> Any:

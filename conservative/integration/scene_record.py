@@ -28,10 +28,8 @@ _NOT_OF_MOTION = ("t_end", "dt", "group", "source")
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     """Return `scene` if the record describes it; if it is None, restore the scene from the record.
 
-    Raises
-    ------
-    BadInput
-        The record describes another scene; or `scene` is None, and the record contains digests or cannot be restored.
+    Raise `BadInput` if the record describes another scene; or if `scene` is None, and the record contains digests or cannot be
+    restored.
     """
     if scene is None:
         try:

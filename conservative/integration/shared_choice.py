@@ -40,12 +40,8 @@ LONGEST = 0.8
 def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTimes) -> ChoiceForMany:
     """Return a method and a step for all bodies, for an attitude error, rad, of a run to t_end, s, with these samples.
 
-    The warning `AccuracyNotReached` is given if a body that was tried has a larger error.
-
-    Raises
-    ------
-    BadInput
-        The error needs more steps than the automatic choice takes.
+    Warn with `AccuracyNotReached` if a body that was tried has a larger error. Raise `BadInput` if the error needs more steps
+    than the automatic choice takes.
     """
     numbers = pick(bodies)
     chosen, verified = numbers[: HARDEST + RANDOM], numbers[HARDEST + RANDOM :]

@@ -110,8 +110,12 @@ def spread(
     starts = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
-        starts["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
-        varied |= _follow_inertia(scene, starts["inertia"])
+        drawn = starts["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
+        if hasattr(scene.potential, "inertia"):  # tensors, because that of the field is one
+            varied["inertia"] = drawn if drawn.ndim == 3 else drawn[:, :, None] * np.eye(3)
+        elif hasattr(static_part(scene.potential), "inertia"):
+            got = "a spread in a turning field with the inertia of the scene's body"
+            raise BadInput("inertia", got, "none: all bodies of such a field have the scene's inertia")
     if varied:
         starts["parameters"] = varied
     return starts
@@ -211,16 +215,6 @@ def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
     return drawn if np.array_equal(R_BP, np.eye(3)) else (R_BP * drawn[:, None, :]) @ R_BP.T
 
 
-def _follow_inertia(scene: Scene, inertia: Array) -> dict[str, Array]:
-    """Return the inertia, as tensors (n, 3, 3), kg m^2, by its name if it is also a number of the potential."""
-    if scene.potential is not static_part(scene.potential) and hasattr(static_part(scene.potential), "inertia"):
-        got = "a spread in a turning field with the inertia of the scene's body"
-        raise BadInput("inertia", got, "none: all bodies of such a field have the scene's inertia")
-    if not hasattr(scene.potential, "inertia"):
-        return {}
-    return {"inertia": inertia if inertia.ndim == 3 else inertia[:, :, None] * np.eye(3)}
-
-
 def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -> Array:
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
     argument, known = f"potential.{name}", list_parameters(scene)
@@ -234,11 +228,7 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
         if not centre.ndim:
             return np.asarray(centre * _draw_shares(seed, argument, (n,), _read_share(argument, value)))
     numbers = centre + deviation * _stream(seed, argument).standard_normal((n, *centre.shape))
-    return numbers / np.linalg.norm(numbers, axis=1, keepdims=True) if _is_direction(scene, name) else numbers
-
-
-def _is_direction(scene: Scene, name: str) -> bool:
-    """Return whether the potential normalizes this vector."""
     potential: Any = scene.potential
-    value = getattr(potential, name)
-    return np.ndim(value) == 1 and np.allclose(getattr(replace(potential, **{name: 2 * value}), name), value, rtol=1e-12)
+    if centre.ndim and np.allclose(getattr(replace(potential, **{name: 2 * centre}), name), centre, rtol=1e-12):
+        numbers /= np.linalg.norm(numbers, axis=1, keepdims=True)  # a direction, which the potential normalizes
+    return numbers

@@ -118,29 +118,24 @@ class Store:
     def write(self, first: int, bodies: Batch, result: BlockResult) -> None:
         """Write the result for `bodies`, the block that begins with body number `first`.
 
-        Raises
-        ------
-        NotWritten
-            The disk is full, or the folder cannot be written any more. Finished blocks stay there.
+        Raise `NotWritten` if the disk is full, or the folder cannot be written any more. Finished blocks stay there.
         """
         kinds, failures = np.full(len(result), _KINDS.index(OutcomeKind.OK), np.uint8), np.full(len(result), "", object)
         for i, failure in result.failures.items():
-            kinds[i], failures[i] = _KINDS.index(failure.outcome.kind), _record_failure(failure)
+            # The arguments of its class, or the outcome of a class of the user's.
+            name, known = type(failure).__name__, _FAILURES.get(type(failure).__name__) is type(failure)
+            values = {key: value for key, value in vars(failure if known else failure.outcome).items() if key != "outcome"}
+            text = json.dumps({"type": name if known else "", **values}, default=lambda number: number.item())
+            kinds[i], failures[i] = _KINDS.index(failure.outcome.kind), text
         columns = {"R_WB": result.R_WB, "w_WB_B": result.w_WB_B, "drifts": result.drifts, "outcome": kinds, "failure": failures}
         try:
-            for name, values in (columns | list_inputs(bodies)).items():
-                self.arrays[name][first : first + len(result)] = values
+            for name, column in (columns | list_inputs(bodies)).items():
+                self.arrays[name][first : first + len(result)] = column
         except OSError as error:
             raise NotWritten("path", self.place, error, _ROOM) from None
 
     def read_results(self) -> tuple[dict[str, Array], dict[int, IntegrationFailed]]:
-        """Return the drifts (n,) by name, and the failures by the numbers of the bodies.
-
-        Raises
-        ------
-        BadInput
-            A block is damaged.
-        """
+        """Return the drifts (n,) by name, and the failures by number of body. Raise `BadInput` if a block is damaged."""
         try:
             drifts, kinds = self.arrays["drifts"][:], self.arrays["outcome"][:]
             failed = np.flatnonzero(kinds != _KINDS.index(OutcomeKind.OK)).tolist()
@@ -151,12 +146,9 @@ class Store:
         return dict(zip(names, drifts.T, strict=True)), {i: _restore_failure(texts[i]) for i in failed}
 
     def read_bodies(self, scene: Scene | None) -> Batch:
-        """Return the bodies. Their initial states and parameters stay on the disk. See `open_ensemble` for the scene.
+        """Return the bodies. Their initial states and parameters stay on the disk.
 
-        Raises
-        ------
-        BadInput
-            The scene is missing, or another one.
+        Raise `BadInput` if the scene is missing, or another one (`open_ensemble`).
         """
         inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
         for name in self.record["digests"]:
@@ -166,14 +158,6 @@ class Store:
         R_WB0 = start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
         w_WB_B0 = start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
         return Batch(scene, R_WB0, w_WB_B0, start.get("inertia"), inputs["parameters"])
-
-
-def _record_failure(failure: IntegrationFailed) -> str:
-    """Return a failure as JSON: the arguments of its class, or the outcome of a class of the user's."""
-    name = type(failure).__name__
-    known = _FAILURES.get(name) is type(failure)
-    values = {key: value for key, value in vars(failure if known else failure.outcome).items() if key != "outcome"}
-    return json.dumps({"type": name if known else "", **values}, default=lambda number: number.item())
 
 
 def _restore_failure(text: str) -> IntegrationFailed:
@@ -190,17 +174,8 @@ def _restore_failure(text: str) -> IntegrationFailed:
 def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
     """Yield the store of a run, which no other process can write to in the block.
 
-    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method.
-
-    Raises
-    ------
-    BadInput
-        The folder contains something else, another run, or an ensemble although `resume` is False; or another process writes
-        to it.
-    NotWritten
-        The folder cannot be created or written.
-    MissingExtra
-        Zarr, of the extra `ensembles`, is not installed.
+    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method. Raise
+    `BadInput` if the folder contains another run or another process writes to it; for other errors see `find_ensemble`.
     """
     place, record, stored = Path(path).absolute(), describe_run(label, bodies, grid), find_ensemble(path, resume)
     if stored is None:
@@ -215,9 +190,17 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
                 fresh.rename(place)
         except OSError as error:
             raise NotWritten("path", place, error, NEW_FOLDER) from None
-    elif differences := _list_differences(stored, record):
-        got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differences)}"
-        raise BadInput("path", got, "an ensemble of the same run")
+    else:
+        plain = ("version", "method", "dt", "n_steps", "sample_every", "bodies", "block")
+        values = ((name, stored.get(name), record[name]) for name in plain)
+        differences = [f"{name} {before!r} there, {now!r} here" for name, before, now in values if before != now]
+        if not is_same_motion(stored["scene"], record["scene"]):
+            differences.append("another scene")
+        before, now = stored["digests"], record["digests"]
+        differences += [f"another {name.partition('/')[2]}" for name in before | now if before.get(name) != now.get(name)]
+        if differences:
+            got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differences)}"
+            raise BadInput("path", got, "an ensemble of the same run")
     handle = os.open(place, os.O_RDONLY)
     try:
         if not files.try_lock(handle):
@@ -232,14 +215,8 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
 def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
     """Return the attributes of the ensemble in a folder to write to; None if the folder is empty or does not exist.
 
-    Raises
-    ------
-    BadInput
-        The folder contains an ensemble and `resume` is False, or something else.
-    NotWritten
-        The folder cannot be created.
-    MissingExtra
-        Zarr, of the extra `ensembles`, is not installed.
+    Raise `BadInput` if it contains something else, or an ensemble although `resume` is False; `NotWritten` if it cannot be
+    created; and `MissingExtra` without Zarr, of the extra `ensembles`.
     """
     require_extra("path", "ensembles")
     place = Path(path).absolute()
@@ -312,25 +289,8 @@ def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
     }
 
 
-def _list_differences(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """Return the differences between the attributes of a stored ensemble and of a run, in words."""
-    plain = ("version", "method", "dt", "n_steps", "sample_every", "bodies", "block")
-    values = ((name, stored.get(name), wanted[name]) for name in plain)
-    differences = [f"{name} {before!r} there, {now!r} here" for name, before, now in values if before != now]
-    if not is_same_motion(stored["scene"], wanted["scene"]):
-        differences.append("another scene")
-    before, now = stored["digests"], wanted["digests"]
-    return differences + [f"another {name.partition('/')[2]}" for name in before | now if before.get(name) != now.get(name)]
-
-
 def read_record(place: Path, allowed: str = NEW_FOLDER) -> dict[str, Any]:
-    """Return the attributes of a stored ensemble.
-
-    Raises
-    ------
-    BadInput
-        The folder contains no ensemble, or one in another version of the format.
-    """
+    """Return the attributes of a stored ensemble. Raise `BadInput` for another folder, or another version of the format."""
     import zarr
 
     try:

@@ -166,11 +166,6 @@ if COMPILED:
     def _pick(builder, a, b, at):
         return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, len(at)), list(at)))
 
-    def _fours(builder, number):
-        """Return the floats of a number in registers of four."""
-        parts = range(0, number.width // len(number.registers), FOUR)
-        return [_pick(builder, each, each, range(i, i + FOUR)) for each in number.registers for i in parts]
-
     def _transpose(builder, numbers):
         """Return four registers, one per lane, from up to four registers of four, one per number."""
         pick, nothing = partial(_pick, builder), ir.Constant(ir.VectorType(DOUBLE, FOUR), ir.Undefined)
@@ -185,9 +180,11 @@ if COMPILED:
 
         def build(context, builder, sig, args):
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
+            parts = range(0, numbers[0].width // len(numbers[0].registers), FOUR)
+            fours = [[_pick(builder, x, x, range(i, i + FOUR)) for x in each.registers for i in parts] for each in numbers]
             for first in range(0, len(numbers), FOUR):
-                four, at = numbers[first : first + FOUR], _move(builder, args[1], first)
-                for registers in zip(*(_fours(builder, number) for number in four), strict=True):
+                four, at = fours[first : first + FOUR], _move(builder, args[1], first)
+                for registers in zip(*four, strict=True):
                     for lane in _transpose(builder, registers):
                         part = _pick(builder, lane, lane, range(len(four)))
                         builder.store(part, _place(context, builder, (sig.args[0], args[0]), at, part.type), align=8)

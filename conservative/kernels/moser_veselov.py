@@ -27,8 +27,7 @@ import numpy as np
 
 from . import brief, entry, kernel, small
 from .elliptic import find_means, jacobi, sine_and_cosine
-from .lanes import WIDTH, load_rows, save, save_rows
-from .lanes_samples import store_sample
+from .lanes import WIDTH, load_rows, save, save_columns, save_rows
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .vector import choose, dot, fill_like, fuse, product
@@ -366,13 +365,6 @@ def advance(k, at):
 
 
 @small
-def rescale(at):
-    """Return the same attitude with |z| = 1."""
-    n = 1.0 / math.sqrt(fuse(at.z_re, at.z_re, at.z_im * at.z_im))
-    return State(at.s, at.c, at.d, at.z_re * n, at.z_im * n)
-
-
-@small
 def take_steps(k, at, done, last):
     """Return the state after `last` steps from the state after `done` steps."""
     while done < last:
@@ -381,7 +373,8 @@ def take_steps(k, at, done, last):
             at = advance(k, at)
         done = end
         if done % RESCALE == 0:
-            at = rescale(at)
+            n = 1.0 / math.sqrt(fuse(at.z_re, at.z_re, at.z_im * at.z_im))
+            at = State(at.s, at.c, at.d, at.z_re * n, at.z_im * n)
     return at
 
 
@@ -522,14 +515,6 @@ def step_of_order(p, h, order, room):
     return Step(*load_rows(room, 0, WIDTH, 7, WIDTH))
 
 
-@kernel
-def has_step(p, step, h, w, longest, longest_shift, smallest_cn):
-    """Return whether there is a step h below the limits whose squares stay in the range of floats."""
-    angle = math.sqrt(dot(w, w)) * h
-    known = (angle == 0.0) | ((angle > SLOWEST) & (angle < longest))
-    return known & (abs(p.nu) * h < longest_shift) & (smallest_cn < step.C) & (step.r0 - step.r0 == 0.0)
-
-
 @entry
 def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table, states):
     """Fill `table` (ROWS, columns) and `states` (STATE_ROWS, columns) for steps dt of an order, 0 for the exact one.
@@ -554,7 +539,11 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
         at, left = start(k, p, quaternion(turn(A, x), turn(A, y), turn(A, z)))
         rates = (p.A1 / (p.J1 * time), p.A2 / (p.J2 * time), p.A3 / (p.J3 * time))
         axes = (x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4])
-        finished = choose(has_step(p, step, h, w, limits[0], limits[1], limits[2]), 1.0, 0.0 * h)
+        # There is a step below the limits whose squares stay in the range of floats.
+        angle = math.sqrt(dot(w, w)) * h
+        known = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
+        known = known & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
+        finished = choose(known, 1.0, 0.0 * h)
         save_rows(flat, first + SHIFT * columns, columns, k)
         save_rows(states.reshape(-1), first, columns, at)
         save_rows(flat, first + LEFT * columns, columns, left)
@@ -565,12 +554,21 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
 
 @small
 def store_state(flat, columns, k, at, first, row, R_WB, w_WB_B):
-    """Write sample number `row` of the bodies of a number."""
-    q = product(load_rows(flat, first + LEFT * columns, columns, 4, WIDTH), own_quaternion(k, at))
-    a = load_rows(flat, first + RATES * columns, columns, 3, WIDTH)
-    axes, samples = load_rows(flat, first + AXES * columns, columns, 9, WIDTH), R_WB.shape[1]
-    rates = (a[0] * at.c, a[1] * at.s, a[2] * at.d)
-    store_sample(q, rates, axes, first * samples + row, samples, R_WB.reshape(-1), w_WB_B.reshape(-1))
+    """Write sample number `row` of the bodies of a number, in body axes."""
+    w, x, y, z = product(load_rows(flat, first + LEFT * columns, columns, 4, WIDTH), own_quaternion(k, at))
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    r0 = (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y))
+    r1 = (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x))
+    r2 = (s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y))
+    axes = load_rows(flat, first + AXES * columns, columns, 9, WIDTH)
+    amplitudes = load_rows(flat, first + RATES * columns, columns, 3, WIDTH)
+    a, b, c = axes[0:3], axes[3:6], axes[6:9]
+    rates = (amplitudes[0] * at.c, amplitudes[1] * at.s, amplitudes[2] * at.d)
+    rows = (dot(r0, a), dot(r0, b), dot(r0, c), dot(r1, a), dot(r1, b), dot(r1, c), dot(r2, a), dot(r2, b), dot(r2, c))
+    samples = R_WB.shape[1]
+    place = first * samples + row
+    save_columns(R_WB.reshape(-1), 9 * place, 9 * samples, rows)
+    save_columns(w_WB_B.reshape(-1), 3 * place, 3 * samples, (dot(rates, a), dot(rates, b), dot(rates, c)))
 
 
 @entry

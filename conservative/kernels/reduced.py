@@ -198,7 +198,7 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
         new_rows, new_over = invert(tangent(h, J, field, q, a))
         correction = apply(new_rows, residual(h, J, field, q, L, a))
         a = choose(enough, a, subtract(a, correction))
-        rows = choose_rows(enough, rows, new_rows)
+        rows = choose(enough, rows, new_rows)
         over = choose(enough, over, new_over)
         square = dot(correction, correction)
         aa, away = dot(a, a) + REST, subtract(a, guess)
@@ -207,12 +207,6 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
         iterations += 1
     a, gain = final_correction(h, J, field, q, L, carry, rows, a)
     return a, gain, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
-
-
-@small
-def choose_rows(mask, a, b):
-    """Return the rows of one matrix or the other for each lane."""
-    return choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2])
 
 
 @kernel
@@ -391,13 +385,6 @@ def turn_attitude(a, q, carry):
 
 
 @small
-def load_past(ring, place, newest):
-    """Return the last six solutions, newest first: `newest`, and five from a place of the ring."""
-    past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
-    return newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]
-
-
-@small
 def push(ring, place, a):
     """Store a as the newest solution and return its place. Two copies keep five successive solutions contiguous."""
     place = place - 1 if place > 0 else PAST - 1
@@ -470,7 +457,8 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
             for stage in range(stages):
                 h = lengths[stage]
                 enough = known >= 6.0
-                a = guess_ahead(load_past(ring, place, newest))
+                past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
+                a = guess_ahead((newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]))
                 if not every(enough):
                     a = choose(enough, a, explicit_guess(h, J_inverse, field, q, L))
                 a, gain, _, _, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)

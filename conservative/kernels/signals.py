@@ -31,11 +31,7 @@ def _check_compiled(typingctx):
     return types.none(), code
 
 
-def _check_plain():
-    """Nothing: between the lines of plain Python handlers are called anyway."""
-
-
-_check = _check_compiled if COMPILED else _check_plain
+_check = _check_compiled if COMPILED else lambda: None  # between the lines of plain Python handlers are called anyway
 
 
 @kernel

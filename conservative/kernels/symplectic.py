@@ -177,16 +177,6 @@ def rotate_about_axis(axis, h, k, q, L):
 
 
 @small
-def rotate_about_axes(h, k, q, L):
-    """Return attitude and momentum after rotations about the axes 3, 2, 1, 2, 3, the outer ones for half of h."""
-    q, L = rotate_about_axis(2, 0.5 * h, k, q, L)
-    q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
-    q, L = rotate_about_axis(0, h, k, q, L)
-    q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
-    return rotate_about_axis(2, 0.5 * h, k, q, L)
-
-
-@small
 def correct(h, J, l, c):  # noqa: E741
     """Return the correction of c by Newton's method for a fixed l, and one over the determinant."""
     Jc, one = times(J, c), 1.0 + dot(c, c)
@@ -227,7 +217,11 @@ def solve(h, t, J, J_inverse, field, middle, q, L):
 def rotate(kind, h, t, J, k, field, q, q_carry, L, L_carry):
     """Return attitude and momentum after a rotation from time t, s; corrections, size of the last, and whether it exists."""
     if kind == AXES:
-        q, L = rotate_about_axes(h, k, q, L)
+        q, L = rotate_about_axis(2, 0.5 * h, k, q, L)
+        q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
+        q, L = rotate_about_axis(0, h, k, q, L)
+        q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
+        q, L = rotate_about_axis(2, 0.5 * h, k, q, L)
         return q, q_carry, L, L_carry, 0, 0.0, True
     if kind == EXACT:
         w, (g1, g2, g3) = times(k, L), (k[2] - k[1], k[0] - k[2], k[1] - k[0])

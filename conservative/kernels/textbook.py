@@ -125,13 +125,6 @@ def buss_step(h, t, J_inverse, field, q, L):
 
 
 @kernel
-def gyroscopic_step(h, t, J_inverse, field, q, L):
-    """Return the state after a step of a game engine: first the rates, then the attitude with the new rates."""
-    L = add(L, scale(h, add(cross(L, times(J_inverse, L)), torque(field, t, q))))
-    return product(q, exponential(scale(h, times(J_inverse, L)))), L
-
-
-@kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`)."""
     J, J_inverse, field, q, L = model
@@ -154,8 +147,9 @@ def march(model, coefficients, workspace):
                     return Result(step - 1, step - 1, corrections, None, math.sqrt(size), False)
             elif scheme == BUSS:
                 q, L = buss_step(h, t, J_inverse, field, q, L)
-            else:
-                q, L = gyroscopic_step(h, t, J_inverse, field, q, L)
+            else:  # as game engines do: first the rates, then the attitude with the new rates
+                L = add(L, scale(h, add(cross(L, times(J_inverse, L)), torque(field, t, q))))
+                q = product(q, exponential(scale(h, times(J_inverse, L))))
             until_sample -= 1
             if until_sample == 0 or step == n_steps:
                 until_sample = every

@@ -122,56 +122,33 @@ else:
 
             return self.emit(operation, *numbers)
 
-        def _float(self, name, *numbers):
-            return self.emit(lambda *registers: getattr(self.builder, name)(*registers, flags=self.flags), *numbers)
+        @staticmethod
+        def _arithmetic(name):
+            """Return the methods of an operation for a number that is its left and its right operand."""
 
-        def _compare(self, sign, other):
-            return self.emit(lambda a, b: self.builder.fcmp_ordered(sign, a, b), self, other)
+            def left(self, other):
+                return self.emit(lambda a, b: getattr(self.builder, name)(a, b, flags=self.flags), self, other)
 
-        def __add__(self, other):
-            return self._float("fadd", self, other)
+            def right(self, other):
+                return self.emit(lambda a, b: getattr(self.builder, name)(b, a, flags=self.flags), self, other)
 
-        def __radd__(self, other):
-            return self._float("fadd", other, self)
+            return left, right
 
-        def __sub__(self, other):
-            return self._float("fsub", self, other)
+        @staticmethod
+        def _comparison(sign):
+            return lambda self, other: self.emit(lambda a, b: self.builder.fcmp_ordered(sign, a, b), self, other)
 
-        def __rsub__(self, other):
-            return self._float("fsub", other, self)
-
-        def __mul__(self, other):
-            return self._float("fmul", self, other)
-
-        def __rmul__(self, other):
-            return self._float("fmul", other, self)
-
-        def __truediv__(self, other):
-            return self._float("fdiv", self, other)
-
-        def __rtruediv__(self, other):
-            return self._float("fdiv", other, self)
+        __add__, __radd__ = _arithmetic("fadd")
+        __sub__, __rsub__ = _arithmetic("fsub")
+        __mul__, __rmul__ = _arithmetic("fmul")
+        __truediv__, __rtruediv__ = _arithmetic("fdiv")
+        __gt__, __ge__, __lt__, __le__, __eq__ = map(_comparison, (">", ">=", "<", "<=", "=="))
 
         def __neg__(self):
             return self.emit(self.builder.fneg, self)
 
         def __abs__(self):
             return self.call("fabs", self)
-
-        def __gt__(self, other):
-            return self._compare(">", other)
-
-        def __ge__(self, other):
-            return self._compare(">=", other)
-
-        def __lt__(self, other):
-            return self._compare("<", other)
-
-        def __le__(self, other):
-            return self._compare("<=", other)
-
-        def __eq__(self, other):
-            return self._compare("==", other)
 
         def __and__(self, other):
             return self.emit(self.builder.and_, self, other)

@@ -37,12 +37,7 @@ def integrate_to_error(
 ) -> Trajectory:
     """Return the trajectory with the cheapest method and step for an attitude error, rad, up to t_end, s; see its `choice`.
 
-    `progress` is called as `integrate` describes.
-
-    Raises
-    ------
-    BadInput
-        The error needs more than `MOST_STEPS` steps.
+    `progress` is called as `integrate` describes. Raise `BadInput` if the error needs more than `MOST_STEPS` steps.
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
@@ -75,6 +70,8 @@ def cut_step(
 ) -> tuple[tuple[float, float], ...]:
     """Cut a step until the estimated error is small enough, or shorter steps do not help.
 
+    Raise `BadInput` if the first step makes more steps or samples than are possible.
+
     Parameters
     ----------
     method, dt, error
@@ -85,11 +82,6 @@ def cut_step(
     Returns
     -------
     The steps tried, s, and the estimated total error of each, rad.
-
-    Raises
-    ------
-    BadInput
-        The first step makes more steps or samples than are possible.
     """
     grid = grid_with(dt)
     attempts: tuple[tuple[float, float], ...] = ()
@@ -111,10 +103,7 @@ def cut_step(
 def grid_of(dt: float, t_end: float, samples: SampleTimes) -> Grid:
     """Return a grid of an even number of steps of at most dt to t_end, both in s, that contains the samples.
 
-    Raises
-    ------
-    BadInput
-        There are more than `MOST_STEPS` steps, or the samples do not fit in memory.
+    Raise `BadInput` if there are more than `MOST_STEPS` steps, or the samples do not fit in memory.
     """
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"one that takes {t_end / dt:.3g} steps", f"one that takes at most {MOST_STEPS:g} steps")

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from numbers import Integral
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from ..trajectory import Trajectory, cut_at_failure
 from .coefficients.explicit import DORMAND_PRINCE_8
-from .principal_axes import PrincipalStart, invariant_scales, principal_start
+from .principal_axes import invariant_scales, principal_start
 from .units import bound_rate, convert_scene, find_units
 
 SAME = 1e-9
@@ -60,10 +59,8 @@ class SampleTimes:
 def read_times(value: object, t_end: float) -> Array:
     """Return the times of samples (n,), s. An integer `value` is the number of times, evenly spaced from 0 to t_end, s.
 
-    Raises
-    ------
-    BadInput
-        The times are not numbers, not finite, not increasing, not within 0 to t_end, or empty, or they do not fit in memory.
+    Raise `BadInput` if the times are not numbers, not finite, not increasing, not within 0 to t_end, or empty, or do not fit in
+    memory.
     """
     allowed = f"times (n,), s, in increasing order from 0 to t_end = {t_end:g}, or their number, 2 or more"
     if not isinstance(value, bool) and isinstance(value, Integral):
@@ -134,36 +131,19 @@ def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tup
     States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. If a state cannot be moved, the later ones are not moved
     either. States with a gap of 0 do not change.
     """
-    far = np.flatnonzero(gaps)
-    R, w = R_WB.copy(), w_WB_B.copy()
-    moved = 0
-    if len(far):
-        units = find_units(scene, scene.dt)
-        of_order_one = scene.derive(convert_scene, units)
-        R[far], w[far], moved = _move(of_order_one, t[far] / units.time, gaps[far] / units.time, R[far], w[far] * units.time)
-        w[far] /= units.time
+    far, R, w = np.flatnonzero(gaps), R_WB.copy(), w_WB_B.copy()
+    if not len(far):
+        return R, w, len(t)
+    units = find_units(scene, scene.dt)
+    scene = scene.derive(convert_scene, units)
+    body, start = scene.body, scene.derive(principal_start)
+    q = np.ascontiguousarray(to_quaternion(R[far] @ body.R_BP))
+    L = np.ascontiguousarray((w[far] * units.time @ body.R_BP) * body.moments)
+    field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
+    table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
+    limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
+    moved = kernels("between").move(start.J_inverse, field, *table, *limits, times, gaps[far] / units.time, q, L)
+    moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
+    kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)
+    R[far[:moved]], w[far[:moved]] = moved_R, moved_w / units.time
     return R, w, len(t) if moved == len(far) else int(far[moved])
-
-
-def _move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
-    """Move states as `move` does, in a scene of order one, by gaps that are not 0."""
-    start, tableau = scene.derive(principal_start), DORMAND_PRINCE_8
-    q, L = into_principal_axes(scene, start, R_WB, w_WB_B)
-    longest, size = RADIANS / bound_rate(scene), invariant_scales(scene)[1]
-    table = (*tableau.packed, np.array(tableau.c))
-    moved = kernels("between").move(start.J_inverse, field_of(start), *table, size, longest, t, gaps, q, L)
-    R, w = np.empty((moved, 3, 3)), np.empty((moved, 3))
-    kernels("samples").to_body_axes(t, q, L, start.J_inverse, None, start.R_BP, R, w)
-    R_WB[:moved], w_WB_B[:moved] = R, w
-    return R_WB, w_WB_B, moved
-
-
-def into_principal_axes(scene: Scene, start: PrincipalStart, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array]:
-    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes, from attitudes (n, 3, 3) and rates (n, 3)."""
-    R_BP = scene.body.R_BP
-    return np.ascontiguousarray(to_quaternion(R_WB @ R_BP)), np.ascontiguousarray((w_WB_B @ R_BP) * scene.body.moments)
-
-
-def field_of(start: PrincipalStart) -> Any:
-    """Return the field of a start; of a free body one of no weight, for which there is code anyway."""
-    return UniformField(0.0, 0.0, 0.0) if start.field is None else start.field

@@ -17,6 +17,7 @@ from ..attitude import Array
 from ..batch import Batch
 from ..deferred_imports import kernels
 from ..grid import Grid
+from ..potentials.field import into_axes
 from ..potentials.uniform_gravity import UniformGravity
 from .many import Block, pause
 
@@ -63,8 +64,7 @@ def moments_of_gravity(bodies: Batch, R_BP: Array) -> Array:
     """Return weight times centre of mass (n, 3), N m, of bodies in `UniformGravity`, in the axes `R_BP` (n, 3, 3)."""
     potential: Any = bodies.scene.potential
     weight, com_B = (np.asarray(bodies.parameters.get(name, getattr(potential, name))) for name in ("weight", "com_B"))
-    moment_B = np.broadcast_to(weight[..., None] * com_B, (len(bodies), 3))
-    return np.asarray((moment_B[:, None, :] @ R_BP)[:, 0, :])
+    return into_axes(np.broadcast_to(weight[..., None] * com_B, (len(bodies), 3)), R_BP)
 
 
 def in_gravity_or_free(bodies: Batch) -> bool:

@@ -67,9 +67,14 @@ class Convected(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         q0 = scene.R_WB0.T.flatten()  # a copy, because kernels are compiled separately for read-only arrays
-        u0 = np.concatenate([q0, kernels("convected").conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
-        J_inverse = np.ascontiguousarray(scene.body.inverse)
-        linearise = _linearise(scene, grid.dt, J_inverse)
+        kernel, J_inverse = kernels("convected"), np.ascontiguousarray(scene.body.inverse)
+        u0 = np.concatenate([q0, kernel.conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
+        field = None if scene.potential is None else scene.potential.kernel_field(np.eye(3))
+
+        def linearise(u0: Array, u1: Array) -> tuple[Array, Array]:
+            """Return the residual (27) and tangent (29) of the state at both ends of a step."""
+            V_star, dV_star = (None, None) if field is None else kernel.finite_gradient(field, u0[:9], u1[:9])
+            return kernel.residual_and_tangent(grid.dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
 
         def run() -> Trajectory:
             with np.errstate(all="ignore"):  # a step that overflows fails
@@ -83,20 +88,6 @@ class Convected(Method):
             return Trajectory(scene, grid.t[: len(u)], R_WB, L @ J_inverse, self.label, work, failure)
 
         return run
-
-
-def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
-    """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
-    residual_and_tangent, finite_gradient = kernels("convected").residual_and_tangent, kernels("convected").finite_gradient
-    if scene.potential is None:
-        return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
-    field = scene.potential.kernel_field(np.eye(3))
-
-    def linearise_in_field(u0: Array, u1: Array) -> tuple[Array, Array]:
-        V_star, dV_star = finite_gradient(field, u0[:9], u1[:9])
-        return residual_and_tangent(dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
-
-    return linearise_in_field
 
 
 def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:

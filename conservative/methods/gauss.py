@@ -103,7 +103,25 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
-    return replace(method, frame=frame).label, start, closed_system(start)
+    R_WP, L, size = from_quaternion(start.q), np.array(start.L), math.hypot(*start.L)
+    # For a free body, the direction of the momentum replaces the vertical.
+    falls = start.field is not None or size == 0
+    R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
+    moment = np.zeros(3) if start.field is None else np.array(start.field)
+    # A power of two, so that scaling does not round. For a body at rest, the momentum that its field can produce.
+    largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
+    unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
+    model = kernels("gauss").Model(
+        unit,
+        triple(unit * np.array(start.J_inverse)),
+        triple(moment / unit),
+        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # the momentum about the axis of symmetry does not change
+        triple(L / unit),
+        triple(R_WP[2] if falls else L / size),
+        quadruple(R_WV.T @ R_WP),
+        quadruple(R_WV),
+    )
+    return replace(method, frame=frame).label, start, model
 
 
 @lru_cache(maxsize=256)
@@ -119,25 +137,3 @@ def pad_tableau(stages: int) -> tuple[Array, ...]:
     extra = (0, -len(table.b) % kernels("lanes").FOUR)
     rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
     return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
-
-
-def closed_system(start: PrincipalStart) -> Any:
-    """Return the kernel's model of an initial state. For a free body, the direction of the momentum replaces the vertical."""
-    R_WP, L = from_quaternion(start.q), np.array(start.L)
-    size = math.hypot(*start.L)
-    falls = start.field is not None or size == 0
-    R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
-    moment = np.zeros(3) if start.field is None else np.array(start.field)
-    # A power of two, so that scaling does not round. For a body at rest, the momentum that its field can produce.
-    largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
-    unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
-    return kernels("gauss").Model(
-        unit,
-        triple(unit * np.array(start.J_inverse)),
-        triple(moment / unit),
-        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # the momentum about the axis of symmetry does not change
-        triple(L / unit),
-        triple(R_WP[2] if falls else L / size),
-        quadruple(R_WV.T @ R_WP),
-        quadruple(R_WV),
-    )

@@ -43,6 +43,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..potentials.field import into_axes
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .bounds import within_round_off
@@ -99,13 +100,7 @@ class Lame(Method):
         return MOST_RADIANS / bound_rate(scene)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Return the run of a scene, as `Method.prepare` does.
-
-        Raises
-        ------
-        BadInput
-            The step is longer than `longest_step`, s.
-        """
+        """Return the run of a scene. Raise `BadInput` if the step is longer than `longest_step`, s."""
         longest = self.longest_step(scene)
         if grid.dt > longest:
             raise BadInput("dt", f"{grid.dt:g}", f"a turn of {MOST_RADIANS:g} rad at most: up to {longest:g} s")
@@ -192,16 +187,8 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     kernel.prepare_lanes(tops.J1, tops.kappa, tops.q, tops.L, h, table)
     # Tops with equal numbers of parts per step are neighbours, so that few lanes wait.
     order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
-    tops, table[:, : len(order)] = tops[order], table[:, order]
-    return march_tops(tops, table, grid, n)
-
-
-def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
-    """Return the run of tops in a batch of n bodies. Moments are in each body's unit, times in the unit of the step.
-
-    `table` (32, m) is the kernel's prepared table, dimensionless.
-    """
-    kernel, s, m, k, time = kernels("lame"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
+    k, m, s = len(order), table.shape[1], grid.n_samples
+    tops, table[:, :k] = tops[order], table[:, order]
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L
     turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
@@ -219,31 +206,22 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
 
 def find_tops(method: Lame, bodies: Batch) -> Tops | None:
     """Return the tops that the method supports; None if there are none."""
-    if has_one_axis(bodies):
-        return find_alike(method, bodies)
+    weights, n = bodies.parameters.get("weight", np.ones(1)), len(bodies)
+    one_sign = bool((weights > 0).all() or (weights < 0).all())
+    if bodies.inertia is None and "com_B" not in bodies.parameters and one_sign:  # all have the same axis of symmetry
+        scene = bodies.take(0)
+        if method.unsupported(scene) is not None:
+            return None
+        axes, J1, J3 = slow_axes(scene)
+        R_BP = np.tile(axes, (n, 1, 1))
+        kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
+        q, L = to_quaternion(bodies.R_WB0 @ R_BP), into_axes(bodies.w_WB_B0, R_BP) * (J1, J1, J3)
+        return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)
     found = []
-    for i in range(len(bodies)):
+    for i in range(n):
         scene = bodies.take(i)
         if method.unsupported(scene) is None:
             axes, J1, J3 = slow_axes(scene)
             start = start_along(scene, axes, np.array((J1, J1, J3)))
             found.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
     return Tops(*(np.array(column) for column in zip(*found, strict=True))) if found else None
-
-
-def has_one_axis(bodies: Batch) -> bool:
-    """Return whether all bodies surely have the same axis of symmetry: inertia and direction of the moment are shared."""
-    weights = bodies.parameters.get("weight", np.ones(1))
-    return bodies.inertia is None and "com_B" not in bodies.parameters and bool((weights > 0).all() or (weights < 0).all())
-
-
-def find_alike(method: Lame, bodies: Batch) -> Tops | None:
-    """Return the tops, as `find_tops` does, if all bodies have the same axis."""
-    scene, n = bodies.take(0), len(bodies)
-    if method.unsupported(scene) is not None:
-        return None
-    axes, J1, J3 = slow_axes(scene)
-    R_BP = np.tile(axes, (n, 1, 1))
-    kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
-    q, L = to_quaternion(bodies.R_WB0 @ R_BP), (bodies.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * (J1, J1, J3)
-    return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)

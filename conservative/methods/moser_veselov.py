@@ -97,7 +97,15 @@ class MoserVeselov(Method):
         return 0.99 * step_limit(scene, exact=self.order is None)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        require_short_step(scene, grid.dt, exact=self.order is None)
+        exact = self.order is None
+        if grid.dt >= (bound := step_limit(scene, exact)):
+            turn = float(np.linalg.norm(scene.w_WB_B0)) * grid.dt
+            rule = (
+                f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode"
+                if exact
+                else f"|w| dt < {LONGEST:g}"
+            )
+            raise BadInput("dt", f"{grid.dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
         try:
             return self._prepare(scene, grid)
         except BadInput:  # in units of our own
@@ -115,10 +123,7 @@ class MoserVeselov(Method):
 def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, PrincipalStart, Any, Any]:
     """Return the label of a run, its initial state along `polhode_axes`, the kernel's model, and coefficients of a step dt, s.
 
-    Raises
-    ------
-    BadInput
-        The quaternion form has no step of this length.
+    Raise `BadInput` if the quaternion form has no step of this length.
     """
     kernel, (start, polhode) = kernels("moser_veselov"), scene.derive(find_polhode)
     step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
@@ -135,8 +140,13 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
     limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
     columns = -(-n // kernel.WIDTH) * kernel.WIDTH
     table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
+    body = bodies.scene.body  # one row of moments and axes if all bodies share them
+    moments, R_BP = (body.moments[None], body.R_BP[None]) if bodies.inertia is None else bodies.principal
+    # Kernels are compiled for contiguous and writable arrays.
+    given = (np.require(each, np.float64, ("C", "W")) for each in (R_BP, bodies.R_WB0, bodies.w_WB_B0))
+    moments = moments / find_units_of_moments(moments)[:, None]
     try:
-        kernel.prepare_lanes(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
+        kernel.prepare_lanes(moments, *given, time, grid.dt / time, method.order or 0, limits, table, start)
     except (ArithmeticError, ValueError):  # without compilation only; compiled code returns nan for a body without a step
         return None
     finished = table[kernel.FINISHED, :n] == 1
@@ -151,31 +161,6 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
         return Block(R_WB[:n], w_WB_B[:n], finished)
 
     return run
-
-
-def find_given(bodies: Batch) -> tuple[Array, Array, Array, Array]:
-    """Return moments (n, 3) and R_BP (n, 3, 3), one row if all bodies share them; R_WB0 (n, 3, 3) and w_WB_B0 (n, 3), rad/s.
-
-    Moments are in units in which the largest of each body is of order one.
-    """
-    body = bodies.scene.body
-    moments, R_BP = (body.moments[None], body.R_BP[None]) if bodies.inertia is None else bodies.principal
-    moments = moments / find_units_of_moments(moments)[:, None]
-    return moments, writable(R_BP), writable(bodies.R_WB0), writable(bodies.w_WB_B0)
-
-
-def writable(values: Array) -> Array:
-    """Return an array in the layout that kernels are compiled for: float64, contiguous and writable; a copy if necessary."""
-    return np.require(values, np.float64, ("C", "W"))
-
-
-def require_short_step(scene: Scene, dt: float, exact: bool) -> None:
-    """Raise `BadInput` unless dt, s, is below `step_limit`."""
-    bound = step_limit(scene, exact)
-    if dt >= bound:
-        turn = float(np.linalg.norm(scene.w_WB_B0)) * dt
-        rule = f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"|w| dt < {LONGEST:g}"
-        raise BadInput("dt", f"{dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
 
 
 def step_limit(scene: Scene, exact: bool) -> float:

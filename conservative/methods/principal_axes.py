@@ -52,13 +52,7 @@ class PrincipalStart:
 
 
 def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
-    """Return the initial state of a scene in principal axes, or in the non-spinning frame.
-
-    Raises
-    ------
-    BadInput
-        frame is "non_spinning", and body and field are not symmetric about one axis.
-    """
+    """Return the initial state of a scene in principal axes, or in the non-spinning frame. Raise `BadInput` as `slow_axes`."""
     if frame == "body":
         return start_along(scene, scene.body.R_BP, scene.body.moments)
     axes, J1, J3 = slow_axes(scene)
@@ -71,10 +65,7 @@ def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
 def slow_axes(scene: Scene) -> tuple[Array, float, float]:
     """Return the axes (3, 3) of the non-spinning frame, body components, and the moments across and along the third, kg m^2.
 
-    Raises
-    ------
-    BadInput
-        Body and field are not symmetric about one axis.
+    Raise `BadInput` if body and field are not symmetric about one axis.
     """
     axis_B = scene.symmetry_axis_B
     if axis_B is None:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Triple, triple
+from ..attitude import triple
 from ..card import Card, Cost, Structure
 from ..deferred_imports import kernels
 from ..grid import Grid
@@ -72,13 +72,7 @@ class Projected(Method):
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its initial state in principal axes, and the kernel's model."""
-    start = principal_start(scene)
-    axis, turn, scales = field_axis(scene), field_turn(scene), invariant_scales(scene)
-    model = kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L)
-    return method.label, start, model
-
-
-def field_turn(scene: Scene) -> Triple | None:
-    """Return the angular velocity of the axes of a turning field, three floats in rad/s, world axes; None for other fields."""
-    potential = scene.potential
-    return triple(potential.orbit.rate * potential.orbit.normal_W) if isinstance(potential, Turning) else None
+    start, field = principal_start(scene), scene.potential
+    axis, scales = field_axis(scene), invariant_scales(scene)
+    turn = triple(field.orbit.rate * field.orbit.normal_W) if isinstance(field, Turning) else None
+    return method.label, start, kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import partial
 from threading import get_ident, main_thread
 from typing import Any
 
 import numpy as np
 
-from ..attitude import Array
 from ..deferred_imports import kernels
 from ..errors import Diverged, IntegrationFailed, NotConverged, WrongBranch
 from ..grid import Grid
@@ -36,11 +34,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     def run() -> Trajectory:
         nonlocal counts, counters
-        try:
-            done, stages, corrections, evaluations, size, elsewhere = enter(kernel.PAUSE if in_main_thread() else 0, q, L)
-        except np.linalg.LinAlgError:  # compiled code cannot catch it: the equations are singular or not finite
-            done, size, elsewhere = count_steps(enter, q, L, grid), np.inf, False
-            stages, corrections, evaluations = 0, 0, None
+        done, stages, corrections, evaluations, size, elsewhere = enter(kernel.PAUSE if in_main_thread() else 0, q, L)
         # Runs share their counters, which are frozen and rarely change: 0.3 us.
         if (done, stages, corrections, evaluations) != counts:
             counts = done, stages, corrections, evaluations
@@ -50,51 +44,22 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
             # The constructor takes three times as long.
             trajectory = object.__new__(Trajectory)
             trajectory.__dict__.update(
-                scene=scene,
-                t=t.copy(),
-                R_WB=R_WB,
-                w_WB_B=w_WB_B,
-                label=label,
-                counters=counters,
-                failure=None,
-                choice=None,
+                scene=scene, t=t.copy(), R_WB=R_WB, w_WB_B=w_WB_B, label=label, counters=counters, failure=None, choice=None
             )
             return trajectory
         n_good = n if done == n_steps else grid.count_samples(done)
-        t_good, R_WB, w_WB_B, failure = turn_back(start, grid, n_good, q, L)
-        if failure is None:
-            kind = WrongBranch if elsewhere else NotConverged
-            failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
-        return Trajectory(scene, t_good, R_WB, w_WB_B, label, counters, failure)
+        R_WB, w_WB_B = np.empty((n_good, 3, 3)), np.empty((n_good, 3))
+        finite = to_body_axes(t, q, L, *turn, R_WB, w_WB_B)
+        if finite < n_good:
+            failure: IntegrationFailed = Diverged(float(t[max(finite - 1, 0)]))
+        else:
+            failure = (WrongBranch if elsewhere else NotConverged)(done + 1, done * grid.dt, size, kernel.FAILURE)
+        return Trajectory(scene, t[:finite].copy(), R_WB[:finite], w_WB_B[:finite], label, counters, failure)
 
     run.__dict__["own_loop"] = partial(enter, 0, q, L)
     return run
 
 
-def count_steps(enter: Any, q: Array, L: Array, grid: Grid) -> int:
-    """Return a lower bound of the steps before a run raises, from the samples that it fills: q (n, 4), L (n, 3), kg m^2/s."""
-    q.fill(np.nan)
-    with suppress(np.linalg.LinAlgError):
-        enter(0, q, L)
-    return (max(1, int(np.isfinite(q).all(axis=1).sum())) - 1) * grid.every
-
-
 def in_main_thread() -> bool:
     """Return whether this is the main thread, in which Python runs signal handlers."""
     return get_ident() == main_thread().ident
-
-
-def turn_back(
-    start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
-) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure if a sample is not finite.
-
-    The first n samples q (., 4) and L (., 3), kg m^2/s, principal axes, are converted, up to the first that is not finite. The
-    quaternion is normalised here; its length has no meaning, because the kernels' products are homogeneous in it.
-    """
-    t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))
-    finite = kernels("samples").to_body_axes(t, q, L, start.J_inverse, start.spin, start.R_BP, R_WB, w_WB_B)
-    if finite == len(t):
-        return t, R_WB, w_WB_B, None
-    failure = None if finite == n else Diverged(float(t[max(finite - 1, 0)]))
-    return t[:finite], R_WB[:finite], w_WB_B[:finite], failure

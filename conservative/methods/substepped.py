@@ -85,12 +85,8 @@ class Substepped(Method):
                     runs[parts] = inner.prepare(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * parts))
                 found = runs[parts]()
                 if 2 * parts > self.most or not isinstance(found.failure, NotConverged):
-                    return self._relabel(found, grid, parts)
+                    label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
+                    return replace(found, t=grid.t[: len(found)], label=label)
                 parts *= 2
 
         return run
-
-    def _relabel(self, found: Trajectory, grid: Grid, parts: int) -> Trajectory:
-        """Return the trajectory at the times of the grid itself, with the number of parts per step in the label."""
-        label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
-        return replace(found, t=grid.t[: len(found)], label=label)

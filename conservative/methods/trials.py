@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..attitude import Array, angle_between
+from ..attitude import angle_between
 from ..body import RigidBody
 from ..errors import IntegrationFailed, MissingEngine, Unsupported
 from ..grid import Grid
@@ -94,8 +94,13 @@ class Trials:
         error, fine, coarse = run_twice(method, self.scene, grid)
         cost, counters = method.card.cost(method), fine.counters
         work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
-        # If the run at twice the step failed, the step is too long to measure the sensitivity.
-        moved = None if not sensitivity else 0.0 if coarse is None else find_sensitivity(method, coarse, coarse_grid(grid))
+        moved = 0.0 if sensitivity else None
+        if sensitivity and coarse is not None:  # otherwise the step is too long to measure the sensitivity
+            scene = nearby_scene(self.scene)
+            if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
+                scene = scene.rename(scene.name, body=self.scene.body)
+            nearby = _solve(method, scene, coarse_grid(grid))
+            moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max())
         estimate = Estimate(error, work, moved)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
@@ -156,8 +161,12 @@ def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajecto
     coarse = _solve(method, scene, coarse_grid(grid))
     if not fine.ok or coarse is None:
         return math.inf, fine, None
-    difference = float(angle_between(_every(1 + grid.every % 2, fine.R_WB), coarse.R_WB).max())
-    estimate = difference / convergence_factor(method) + rounding_error(fine)
+    R_WB, stride = fine.R_WB, 1 + grid.every % 2
+    same = R_WB[::stride] if (len(R_WB) - 1) % stride == 0 else np.concatenate([R_WB[::stride], R_WB[-1:]])
+    difference = float(angle_between(same, coarse.R_WB).max())
+    # Rounding of the angular velocity, which a comparison of two runs cannot show.
+    rounding = ROUNDED / 2 * float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * fine.t[-1]
+    estimate = difference / convergence_factor(method) + float(rounding)
     return (estimate if difference < ASYMPTOTIC else math.inf), fine, coarse
 
 
@@ -172,15 +181,6 @@ def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
     except (IntegrationFailed, MissingEngine, Unsupported):
         return None
     return trajectory if trajectory.ok else None
-
-
-def find_sensitivity(method: Method, trajectory: Trajectory, grid: Grid) -> float:
-    """Return the distance of a run from the run of `nearby_scene`, rad; inf if the latter fails."""
-    scene = nearby_scene(trajectory.scene)
-    if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
-        scene = scene.rename(scene.name, body=trajectory.scene.body)
-    nearby = _solve(method, scene, grid)
-    return math.inf if nearby is None else float(angle_between(trajectory.R_WB, nearby.R_WB).max())
 
 
 def nearby_scene(scene: Scene) -> Scene:
@@ -201,19 +201,6 @@ def nearby_scene(scene: Scene) -> Scene:
     )
 
 
-def _every(stride: int, R_WB: Array) -> Array:
-    """Return every `stride`-th attitude of (n, 3, 3), and the last."""
-    return R_WB[::stride] if (len(R_WB) - 1) % stride == 0 else np.concatenate([R_WB[::stride], R_WB[-1:]])
-
-
 def convergence_factor(method: Method) -> float:
     """Return the difference of two runs divided by the error of the finer one."""
     return 1.0 if method.order is None else min(2.0**method.order - 1, LARGEST_FACTOR)
-
-
-def rounding_error(trajectory: Trajectory) -> float:
-    """Return the rotation by rounding of the angular velocity, rad, which a comparison of two runs cannot show."""
-    if not len(trajectory):
-        return math.inf
-    speed = float(np.linalg.norm(trajectory.w_WB_B, axis=1).max())
-    return float(np.finfo(float).eps / 2 * speed * trajectory.t[-1])

@@ -15,10 +15,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from ..body import RigidBody
-from ..check import build_unchecked, read_only
+from ..check import read_only, replace_unchecked
 from ..grid import Grid
 from ..method import Method, Run
 from ..potentials.potential import depends_on_time
@@ -44,16 +43,17 @@ class Units:
 
     def convert(self, scene: Scene) -> Scene:
         """Return the scene in these units. Its numbers may be outside the range that constructors allow."""
-        energy = self.moment / self.time / self.time
-        return build_unchecked(
-            Scene,
-            name=scene.name,
-            body=build_unchecked(RigidBody, inertia=read_only(scene.body.inertia / self.moment)),
-            R_WB0=scene.R_WB0,
+        energy, potential = self.moment / self.time / self.time, cast(Any, scene.potential)
+        if potential is not None:
+            potential = potential.in_units(energy, self.time) if depends_on_time(potential) else potential.in_units(energy)
+        return replace_unchecked(
+            scene,
+            body=replace_unchecked(scene.body, inertia=read_only(scene.body.inertia / self.moment)),
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
             t_end=scene.t_end / self.time,
-            potential=_convert_potential(scene.potential, energy, self.time),
+            potential=potential,
             dt=scene.dt / self.time,
+            extra_invariants=(),
         )
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
@@ -64,13 +64,6 @@ class Units:
 
 
 SI = Units(1.0, 1.0)
-
-
-def _convert_potential(potential: Any, energy: float, time: float) -> Any:
-    """Return a potential in other units of energy, J, and time, s; None for a free body."""
-    if potential is None:
-        return None
-    return potential.in_units(energy, time) if depends_on_time(potential) else potential.in_units(energy)
 
 
 def find_units(scene: Scene, dt: float) -> Units:

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from ..arithmetic import add, apply, cross, dot, fuse, halfway, in_body, scale, times
 from ..attitude import Array
 from ..body import RigidBody
-from ..check import build_unchecked, positive_number, set_fields
-from .direction import unit_vector
+from ..check import positive_number, replace_unchecked, set_fields, unit_vector
 from .field import FieldPotential
 
 
@@ -157,5 +156,4 @@ class GravityGradient(FieldPotential):
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        inertia = self.inertia / energy
-        return build_unchecked(GravityGradient, rate=self.rate, inertia=inertia, direction_W=self.direction_W)
+        return replace_unchecked(self, inertia=self.inertia / energy)

@@ -10,16 +10,17 @@ torque is that of uniform gravity, with A for the vertical and 2 F' b for the mo
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, root, scale, subtract
 from ..attitude import Array
-from ..check import build_unchecked, finite_array, finite_number, positive_number, set_fields
+from ..check import finite_array, finite_number, positive_number, replace_unchecked, set_fields
 from ..errors import BadInput
 from .field import FieldPotential, into_axes, lengths, turned_moment
 
@@ -29,7 +30,7 @@ _STRENGTH = "a finite number other than 0, J m"
 
 
 class PointField:
-    """The law of both fields: V = F(s), J, of a point b of the body, in its axes, and a point A of the world, m."""
+    """The law of both fields (`conservative.potentials.field`): V = F(s), J, of a point b of the body and A of the world."""
 
     b: Any
     A: Any
@@ -134,17 +135,8 @@ class PointField:
         return self.A
 
 
-class SpringNumbers(NamedTuple):
-    """Numbers of `SpringField`: points, m, and stiffness, N/m, and rest length, m."""
-
-    b: Any
-    A: Any
-    stiffness: Any
-    rest: Any
-
-
-class SpringField(SpringNumbers, PointField):
-    """F = stiffness/2 (sqrt(s) - rest)^2 with b in body and A in world axes, m (`conservative.potentials.field`)."""
+class SpringField(namedtuple("SpringNumbers", "b A stiffness rest"), PointField):
+    """F = stiffness/2 (sqrt(s) - rest)^2, stiffness in N/m, rest in m, b in body and A in world axes, m."""
 
     def value(self, s: Any) -> Any:
         """Return F in J."""
@@ -179,16 +171,8 @@ class SpringField(SpringNumbers, PointField):
         return self.stiffness / 2 * np.maximum(lengths(self.b) + lengths(self.A), self.rest) ** 2
 
 
-class AttractionNumbers(NamedTuple):
-    """Numbers of `AttractionField`: points, m, and strength, J m."""
-
-    b: Any
-    A: Any
-    strength: Any
-
-
-class AttractionField(AttractionNumbers, PointField):
-    """F = -strength / sqrt(s) with b in body and A in world axes, m (`conservative.potentials.field`)."""
+class AttractionField(namedtuple("AttractionNumbers", "b A strength"), PointField):
+    """F = -strength / sqrt(s), strength in J m, b in body and A in world axes, m."""
 
     def value(self, s: Any) -> Any:
         """Return F in J."""
@@ -293,8 +277,7 @@ class LinearSpring(PointPotential):
 
     def in_units(self, energy: float) -> LinearSpring:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        points = {"point_B": self.point_B, "anchor_W": self.anchor_W}
-        return build_unchecked(LinearSpring, stiffness=self.stiffness / energy, rest_length=self.rest_length, **points)
+        return replace_unchecked(self, stiffness=self.stiffness / energy)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -347,5 +330,4 @@ class PointAttraction(PointPotential):
 
     def in_units(self, energy: float) -> PointAttraction:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        strength = self.strength / energy
-        return build_unchecked(PointAttraction, strength=strength, point_B=self.point_B, anchor_W=self.anchor_W)
+        return replace_unchecked(self, strength=self.strength / energy)

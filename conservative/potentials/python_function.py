@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, hat, rotation_about, triple
-from ..check import build_unchecked, describe, finite_array, positive_number, set_fields
+from ..check import describe, finite_array, positive_number, replace_unchecked, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, PotentialFailed
 from .callback import Callback, moment
@@ -131,8 +131,7 @@ class FunctionPotential:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
         V = Energy(Product(self.energy.at, 1 / energy, time), self.time_dependent)
         G = Gradient(Product(self.gradient.at, 1 / energy, time), self.time_dependent)
-        others = {"scale": Size(self.scale() / energy), "axis_W": self.axis_W, "time_dependent": self.time_dependent}
-        return build_unchecked(FunctionPotential, energy=V, gradient=G, **others)
+        return replace_unchecked(self, energy=V, gradient=G, scale=Size(self.scale() / energy))
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""

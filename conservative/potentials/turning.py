@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 
 from ..arithmetic import cosine, product, scale, sine
 from ..attitude import Array, from_quaternion, triple
-from ..check import build_unchecked, describe, positive_number, set_fields
+from ..check import describe, positive_number, replace_unchecked, set_fields, unit_vector
 from ..errors import BadInput
-from .direction import unit_vector
 from .gravity_gradient import GravityGradient
 from .potential import Potential, depends_on_time
 
@@ -165,8 +164,9 @@ class Turning:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
         convert = getattr(self.potential, "in_units", None)
         assert convert is not None  # `conservative.methods.units.find_units` has looked
-        orbit = build_unchecked(Orbit, rate=self.orbit.rate * time, normal_W=self.orbit.normal_W)
-        return build_unchecked(Turning, potential=convert(energy), orbit=orbit)
+        return replace_unchecked(
+            self, potential=convert(energy), orbit=replace_unchecked(self.orbit, rate=self.orbit.rate * time)
+        )
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and O."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arithmetic import cross, dot, fuse, halfway, vertical
 from ..attitude import Array
-from ..check import build_unchecked, finite_array, finite_number, set_fields
+from ..check import finite_array, finite_number, replace_unchecked, set_fields
 from .field import FieldPotential, into_axes, lengths, turned_moment
 
 ZERO = (0.0, 0.0, 0.0)
@@ -132,7 +132,7 @@ class UniformGravity(FieldPotential):
 
     def in_units(self, energy: float) -> UniformGravity:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        return build_unchecked(UniformGravity, weight=self.weight / energy, com_B=self.com_B)
+        return replace_unchecked(self, weight=self.weight / energy)
 
     @staticmethod
     def suspects(parameters: Mapping[str, Array]) -> bool:

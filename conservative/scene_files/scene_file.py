@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
-from ..check import describe, finite_array, finite_number, rotation
+from ..check import describe, finite_array, finite_number, rotation, unit_vector
 from ..deferred_imports import BODY_FILES, list_entries, load_entry
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
@@ -97,25 +97,21 @@ def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
     if given == ["inertia"]:
         table.only(("inertia",))
         return table.call(RigidBody), None
-    mass = _shape(table) if given == ["shape"] else _from_file(table, given[0])
+    (kind,) = given
+    if kind == "shape":
+        name = table.choice("shape", SHAPES)
+        table.only(("shape", *keys_of(SHAPES[name]), *_PLACEMENT))
+        mass = table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
+    else:
+        table.only((kind, "name", "com_B"))
+        path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
+        name = table.text("name", f"the name of the body in {path}")
+        with table.blame(path=kind):
+            mass = load_entry(BODY_FILES, "kind of file", kind)(path, name)
     if "com_B" in table:
         mass = table.call(mass.about)
-    with table.blame(inertia=given[0]):
+    with table.blame(inertia=kind):
         return mass.body, mass
-
-
-def _shape(table: TomlTable) -> MassDistribution:
-    name = table.choice("shape", SHAPES)
-    table.only(("shape", *keys_of(SHAPES[name]), *_PLACEMENT))
-    return table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
-
-
-def _from_file(table: TomlTable, kind: str) -> MassDistribution:
-    table.only((kind, "name", "com_B"))
-    path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
-    name = table.text("name", f"the name of the body in {path}")
-    with table.blame(path=kind):
-        return load_entry(BODY_FILES, "kind of file", kind)(path, name)
 
 
 def _field(top: TomlTable, body: RigidBody, mass: MassDistribution | None) -> AnyPotential | None:
@@ -143,20 +139,18 @@ def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None)
     known = {"kind", *keys_of(_POTENTIALS[kind])}
     if kind == "uniform_gravity":
         table.only({*known, "g"})
-        return _gravity(table, mass) if "g" in table else table.call(UniformGravity)
+        if "g" not in table:
+            return table.call(UniformGravity)
+        if mass is None:
+            raise table.bad("g", "an acceleration, but only the inertia is known of the body", "weight, N, and com_B, m")
+        if "weight" in table or "com_B" in table:
+            raise table.bad("g", "g and weight or com_B", "g alone, or weight and com_B")
+        return table.call(mass.gravity)
     if kind == "gravity_gradient":
         table.only(known - {"inertia"})
         return table.call(GravityGradient, inertia=body.inertia)
     table.only(known)
     return table.call(_POTENTIALS[kind])
-
-
-def _gravity(table: TomlTable, mass: MassDistribution | None) -> UniformGravity:
-    if mass is None:
-        raise table.bad("g", "an acceleration, but only the inertia is known of the body", "weight, N, and com_B, m")
-    if "weight" in table or "com_B" in table:
-        raise table.bad("g", "g and weight or com_B", "g alone, or weight and com_B")
-    return table.call(mass.gravity)
 
 
 def _start(table: TomlTable) -> tuple[Array, Array]:
@@ -184,8 +178,8 @@ def _attitude(table: TomlTable, key: str) -> Array:
 
 
 def _quaternion(quaternion_wxyz: ArrayLike) -> Array:
-    q = _direction("quaternion_wxyz", quaternion_wxyz, 4, "four finite numbers (4,), scalar first, not all 0")
-    return from_quaternion(q / np.linalg.norm(q))
+    allowed = "four finite numbers (4,), scalar first, not all 0"
+    return from_quaternion(unit_vector("quaternion_wxyz", quaternion_wxyz, allowed, size=4))
 
 
 def _vector(rotation_vector: ArrayLike) -> Array:
@@ -196,15 +190,8 @@ def _vector(rotation_vector: ArrayLike) -> Array:
 
 
 def _axis_angle(axis: ArrayLike, angle: float) -> Array:
-    direction = _direction("axis", axis, 3, "three finite numbers (3,), not all 0; their length does not matter")
+    direction = unit_vector("axis", axis, "three finite numbers (3,), not all 0; their length does not matter")
     return rotation_about(direction, finite_number("angle", angle, "a finite angle, rad"))
-
-
-def _direction(argument: str, value: ArrayLike, size: int, allowed: str) -> Array:
-    direction = finite_array(argument, value, ((size,),), allowed)
-    if not direction.any():
-        raise BadInput(argument, describe(value), allowed)
-    return direction / np.abs(direction).max()
 
 
 _ATTITUDES: dict[str, Callable[..., Array]] = {

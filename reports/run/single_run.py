@@ -16,7 +16,7 @@ from conservative.attitude import angle_between, orthonormality
 from conservative.errors import BadInput
 from conservative.files import text_file
 from conservative.grid import Grid, grid_for
-from conservative.integration.one import default_method, integrate, require_support
+from conservative.integration.one import integrate, read_method, require_support
 from conservative.invariants import sizes
 from conservative.method import Method
 from conservative.presentation import COLUMNS
@@ -50,7 +50,7 @@ def run_once(
         The method's engine is not installed.
     """
     scene = registry.scene(scene_name)
-    method = registry.method(method_name) if method_name else default_method(scene)
+    method = read_method(method_name or None, scene)
     grid = bounded_grid(scene, method, dt, t_end)
     with text_file(samples, "csv") if samples else nullcontext() as stream:
         trajectory = _integrate(scene, method, grid)

@@ -151,10 +151,7 @@ BEST = {2: "one_step", 4: "suzuki_5", 6: "kahan_li_9", 8: "kahan_li_17", 10: "so
 def composition_of(order: int, name: str | None = None) -> Composition:
     """Return the set called `name`, or the best one of the order.
 
-    Raises
-    ------
-    BadInput
-        There is no set of this order, no set of this name, or the one of this name has another order.
+    Raise `BadInput` if there is no set of this order, or none of this name that has this order.
     """
     choice("order", order, tuple(BEST))
     allowed = [known.name for known in _ALL if known.order == order]

@@ -16,13 +16,13 @@ DIGITS = 60
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """Coefficients of the s-stage method; `value + value_low` is each number to twice the precision of a float.
+    """Coefficients of the s-stage method; `b + b_low` are the weights to twice the precision of a float.
 
     Attributes
     ----------
     c, b
         Nodes and weights (s,) on [0, 1].
-    A, A_low
+    A
         A[i, j] is the integral of the j-th Lagrange polynomial from 0 to c_i.
     E
         The same from 1 to 1 + c_i. It extrapolates a step's polynomial to the stages of the next step, as a first guess.
@@ -32,7 +32,6 @@ class Tableau:
     b: Array
     b_low: Array
     A: Array
-    A_low: Array
     E: Array
 
 
@@ -43,18 +42,14 @@ def tableau(stages: int) -> Tableau:
 
     mp = MPContext()  # mpmath's global context has one precision for all threads
     mp.dps = DIGITS
-    c = _nodes(mp, stages)
+    # The zeros of the shifted Legendre polynomial, by Newton's method from their double-precision values.
+    start = np.polynomial.legendre.leggauss(stages)[0]
+    c = [(1 + mp.findroot(lambda x: mp.legendre(stages, x), mp.mpf(float(x)))) / 2 for x in start]
     inverse = mp.matrix([[node**k for node in c] for k in range(stages)]) ** -1
     b = _integrals(mp, inverse, [mp.mpf(0)], [mp.mpf(1)])
     A = _integrals(mp, inverse, [mp.mpf(0)] * stages, c)
     E = _integrals(mp, inverse, [mp.mpf(1)] * stages, [1 + node for node in c])
-    return Tableau(np.array(c, dtype=float), _high(b)[0], _low(b)[0], _high(A), _low(A), _high(E))
-
-
-def _nodes(mp: Any, stages: int) -> list[Any]:
-    """Return the zeros of the shifted Legendre polynomial, by Newton's method from their double-precision values."""
-    start = np.polynomial.legendre.leggauss(stages)[0]
-    return [(1 + mp.findroot(lambda x: mp.legendre(stages, x), mp.mpf(float(x)))) / 2 for x in start]
+    return Tableau(np.array(c, dtype=float), _high(b)[0], _high(b - mp.matrix(_high(b).tolist()))[0], _high(A), _high(E))
 
 
 def _integrals(mp: Any, inverse: Any, start: list[Any], end: list[Any]) -> Any:
@@ -66,7 +61,3 @@ def _integrals(mp: Any, inverse: Any, start: list[Any], end: list[Any]) -> Any:
 
 def _high(matrix: Any) -> Array:
     return np.array([[float(x) for x in matrix[i, :]] for i in range(matrix.rows)])
-
-
-def _low(matrix: Any) -> Array:
-    return np.array([[float(x - float(x)) for x in matrix[i, :]] for i in range(matrix.rows)])

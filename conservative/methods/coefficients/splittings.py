@@ -63,11 +63,7 @@ def lengths_of(order: int, name: str | None, exact: bool) -> Lengths:
     """Return the lengths of a sequence, or of a composition of half a kick, a rotation and half a kick.
 
     `name` is that of either; None for the most accurate one of the order, which is a sequence only if rotations are `exact`.
-
-    Raises
-    ------
-    BadInput
-        There is none of this order, or none of this name that has this order.
+    Raise `BadInput` if there is none of this order, or none of this name that has this order.
     """
     found = [known for known in SEQUENCES if exact and SEQUENCES[known].order == order]
     if found and name in (None, *found):
