@@ -176,12 +176,8 @@ def settings_text(value: Any) -> str:
 def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
     """Return the result of a function or class for settings such as "RK4,threads=2".
 
-    Items without a key are assigned to the parameters in their order. `argument` is the name of the target in messages.
-
-    Raises
-    ------
-    BadInput
-        A setting is unknown or has a wrong value.
+    Items without a key are assigned to the parameters in their order. `argument` is the name of the target in messages. Raise
+    `BadInput` if a setting is unknown or has a wrong value.
     """
     settings = [item.strip() for item in text.split(",") if item.strip()]
     defaults, arguments = _defaults(target), dict[str, Any]()

@@ -46,14 +46,8 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 def load_entry(group: str, argument: str, name: str) -> Any:
     """Return the object that is registered under a name in a group. `argument` is the name of the argument in messages.
 
-    Raises
-    ------
-    BadInput
-        The name is unknown.
-    NotLoadable
-        The import of the object fails.
-    MissingEngine
-        The object needs an engine that is not installed.
+    Raise `BadInput` for an unknown name, `NotLoadable` if the import of the object fails, and `MissingEngine` if it needs an
+    engine that is not installed.
     """
     known = list_entries(group)
     if name not in known:

@@ -33,12 +33,8 @@ def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
     """Yield a text stream whose contents become the file `target` when the block succeeds.
 
     A file that cannot be written is an error before the block. A link stays a link, a file keeps its permissions, and a device
-    or a pipe, such as /dev/null, is written directly.
-
-    Raises
-    ------
-    NotWritten
-        The file cannot be written, or the disk is full; the message names `argument`.
+    or a pipe, such as /dev/null, is written directly. Raise `NotWritten`, which names `argument`, if the file cannot be written
+    or the disk is full.
     """
     with _raw_file(target, argument) as raw:
         stream = io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="")

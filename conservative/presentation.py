@@ -44,13 +44,7 @@ def samples(trajectory: Any) -> Array:
 
 
 def table(trajectory: Any) -> pandas.DataFrame:
-    """Return the samples as a table with `COLUMNS`; its `attrs` contain scene, method and outcome.
-
-    Raises
-    ------
-    MissingExtra
-        pandas, of the extra `report`, is not installed.
-    """
+    """Return the samples as a table with `COLUMNS`; its `attrs` contain scene, method and outcome (`Trajectory.to_pandas`)."""
     require_extra("Trajectory.to_pandas", "report", "pandas")
     import pandas as pd
 
@@ -60,15 +54,7 @@ def table(trajectory: Any) -> pandas.DataFrame:
 
 
 def picture(trajectory: Any) -> altair.VConcatChart:
-    """Return an interactive chart of the body rates and of the drift of every invariant over time.
-
-    Raises
-    ------
-    BadInput
-        The trajectory has no samples.
-    MissingExtra
-        Altair or pandas, of the extra `report`, is not installed.
-    """
+    """Return an interactive chart of the body rates and of the drift of every invariant over time (`Trajectory.plot`)."""
     require_extra("Trajectory.plot", "report", "altair", "pandas")
     import altair as alt
 

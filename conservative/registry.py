@@ -49,12 +49,7 @@ def list_engines() -> tuple[str, ...]:
 def engine(name: str) -> Any:
     """Return the class of an engine that runs in an environment of its own.
 
-    Raises
-    ------
-    BadInput
-        The name is unknown.
-    NotLoadable
-        The import of the engine fails.
+    Raise `BadInput` for an unknown name, and `NotLoadable` if the import of the engine fails.
     """
     return load_entry(ENGINES, "engine", name)
 

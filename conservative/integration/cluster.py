@@ -45,14 +45,8 @@ _LOGGERS = ("distributed", "distributed.client", "tornado.application")
 def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
     """Yield a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, without Dask's own messages in the block.
 
-    The scheduler has `limit`, s, to answer.
-
-    Raises
-    ------
-    BadInput
-        No scheduler answers there, or it is not an address.
-    MissingExtra
-        Dask, of the extra `cluster`, is not installed.
+    The scheduler has `limit`, s, to answer. Raise `BadInput` if no scheduler answers there or it is not an address, and
+    `MissingExtra` without Dask, of the extra `cluster`.
     """
     require_extra("scheduler", "cluster")
     from distributed import Client
@@ -80,13 +74,9 @@ def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
 def start_executor(client: Client) -> Iterator[ClusterExecutor]:
     """Yield an executor on the workers of a client, after comparing their versions with this one.
 
-    Raises
-    ------
-    BadInput
-        The argument is not a client, or not a connected one; there are no workers, or some with another version of this
-        package. From the block: the cluster was lost, or a task ended every worker that tried it.
-    MissingExtra
-        Dask, of the extra `cluster`, is not installed.
+    Raise `BadInput` if the argument is not a connected client, or there are no workers, or some with another version of this
+    package; from the block, if the cluster was lost, or a task ended every worker that tried it. Raise `MissingExtra` without
+    Dask, of the extra `cluster`.
     """
     require_extra("client", "cluster")
     from distributed import Client, KilledWorker

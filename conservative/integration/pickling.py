@@ -31,6 +31,8 @@ class NotTransferable(TypeError):
 def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] = ()) -> bytes:
     """Return a value as bytes.
 
+    Raise `NotTransferable` if a part of it cannot be pickled, and `MissingExtra` without cloudpickle, of the extra `report`.
+
     Parameters
     ----------
     value
@@ -39,13 +41,6 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
         Objects that the other process also has. The bytes contain their indices in this list instead.
     by_value
         Modules that the other process cannot import. The bytes contain their functions and classes that the value uses.
-
-    Raises
-    ------
-    NotTransferable
-        A part of the value cannot be pickled.
-    MissingExtra
-        cloudpickle, of the extra `report`, is not installed.
     """
     stream, pickler = io.BytesIO(), _pickler()
     import cloudpickle

@@ -127,11 +127,8 @@ def keys_of(function: Callable[..., object]) -> list[str]:
 def read(path: Path) -> TomlTable:
     """Return the top table of a TOML file.
 
-    Raises
-    ------
-    BadFile
-        The file cannot be read, is not UTF-8, is larger than `LARGEST`, has a statement of more than `MOST_LINES` lines, or is
-        not TOML.
+    Raise `BadFile` if the file cannot be read, is not UTF-8, is larger than `LARGEST`, has a statement of more than
+    `MOST_LINES` lines, or is not TOML.
     """
     allowed = "a TOML file that can be read; `conservative new` writes one"
     try:
