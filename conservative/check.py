@@ -142,7 +142,7 @@ def unit_vector(argument: str, value: ArrayLike, allowed: str = "three finite nu
     direction = finite_array(argument, value, ((size,),), allowed)
     length = float(np.linalg.norm(direction))
     if length == 0:
-        raise BadInput(argument, describe(value), allowed)
+        raise BadInput(argument, direction.tolist(), allowed)
     return read_only(direction / length) if abs(length - 1) > _UNIT else direction
 
 

@@ -201,7 +201,7 @@ BAD = {
     "too large an integer": (replaced("12.5", "1" + 400 * "0"), 14, "potential.weight", "1000"),
     "integer of 9,999 digits": (replaced("12.5", 9999 * "1"), 20, "", "not TOML"),
     "not symmetric": (replaced("[3.1, 0.2, -0.1]", "[3.1, 0.9, -0.1]"), 6, "body.inertia", "not symmetric"),
-    "no direction": (replaced(str(AXIS.tolist()), "[0, 0, 0]"), 19, "start.R_WB.axis", "[0, 0, 0]"),
+    "no direction": (replaced(str(AXIS.tolist()), "[0, 0, 0]"), 19, "start.R_WB.axis", "[0.0, 0.0, 0.0]"),
     "empty attitude": (body_of("inertia = [1, 2, 3]").split("R_WB")[0] + "R_WB = {}", 10, "start.R_WB", "empty table"),
     "another shape's key": (body_of('shape = "box"\nradius = 1'), 7, "body.radius", "unknown key"),
     "no mass": (body_of('shape = "box"\nsize = [1, 2, 3]'), 5, "body.mass", "neither mass nor density"),
