@@ -86,9 +86,8 @@ def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
     last = max(math.floor(math.log10(most)) + 1, first + 1)
     edges = np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
     counts = {name: np.histogram(np.clip(values, edges[0], edges[-1]), edges)[0] for name, values in finite.items()}
-    # An empty bin gets half a body, which is below the axis.
-    rows = ({"of": name, "drift": edges, "bodies": np.maximum([*each, 0], 0.5)} for name, each in counts.items())
-    data = pd.concat(list(map(pd.DataFrame, rows)))
+    bodies = {name: np.maximum([*each, 0], 0.5) for name, each in counts.items()}  # half a body is below the axis
+    data = pd.concat([pd.DataFrame({"of": name, "drift": edges, "bodies": each}) for name, each in bodies.items()])
     x = alt.X(
         "drift:Q",
         title="largest drift, relative",

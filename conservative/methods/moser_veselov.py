@@ -100,12 +100,8 @@ class MoserVeselov(Method):
         exact = self.order is None
         if grid.dt >= (bound := step_limit(scene, exact)):
             turn = float(np.linalg.norm(scene.w_WB_B0)) * grid.dt
-            rule = (
-                f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode"
-                if exact
-                else f"|w| dt < {LONGEST:g}"
-            )
-            raise BadInput("dt", f"{grid.dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
+            rule = f"{LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"{LONGEST:g}"
+            raise BadInput("dt", f"{grid.dt:g}, |w| dt = {turn:.3g} rad", f"a step with |w| dt < {rule}: below {bound:.6g} s")
         try:
             return self._prepare(scene, grid)
         except BadInput:  # in units of our own
