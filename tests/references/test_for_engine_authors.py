@@ -25,7 +25,7 @@ DRIVER = r"""
 #include <stdio.h>
 #include <math.h>
 #include "rigid_step.h"
-/* Read moments, moment of the weight, step, q, L and number of steps. Print parts of the last step, q, L and change of energy. */
+/* Read moments, moment of the weight, step, q, L and number of steps. Print parts, q, L and change of energy. */
 int main(void) {
   double x[15];
   long n, i;
@@ -164,7 +164,7 @@ TOP = [1.2, 2.1, 2.6, 0.3, -1.1, 2.4, 0.05, 0.5, 0.5, -0.5, 0.5, 1, -2, 3]
 @pytest.mark.parametrize("row", [pytest.param(BRICK, id="brick"), pytest.param(TOP, id="top")])
 @pytest.mark.parametrize(("precision", "bound"), [("f64", 1e-12), ("f32", 3e-4)])
 def test_a_million_steps_conserve_energy(step, row, precision, bound):
-    """Measured: 1.1e-13 and 5e-14 in double, 6e-5 and 6e-5 in float, relative to kinetic energy plus the moment of the weight."""
+    """Measured: 1.1e-13 and 5e-14 in double, 6e-5 in float, relative to kinetic energy plus moment of the weight."""
     (found,) = step([[*row, 1_000_000]], precision)
     scale = sum(L * L / J for L, J in zip(row[11:], row[:3], strict=True)) / 2 + np.linalg.norm(row[3:6])
     assert found[8] <= bound * scale
