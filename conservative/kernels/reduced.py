@@ -8,8 +8,8 @@ The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principa
 
 Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
 constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
-residual has the size of L1 - L0 instead of L. L1 follows from its other side. The remaining round-off has no mean, so errors
-grow with the square root of the number of steps.
+residual has the size of L1 - L0 instead of L. L1 follows from its other side. The round-off left to an asymmetric body has no
+mean, so errors grow with the square root of the number of steps. Steps of symmetric bodies can repeat it.
 
 The arithmetic is a chain of dependent operations, so its length counts, not their number. The first guess and its
 tangent do not need L: the processor works on them while it waits for the L of the last step.

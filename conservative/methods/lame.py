@@ -62,9 +62,9 @@ MOST_RADIANS = 1e6
 class Lame(Method):
     """Closed-form steps of a symmetric top in uniform gravity (centre of mass on its axis); see the module for the equations.
 
-    The accuracy does not depend on dt: each step adds an attitude error of about 1e-15 rad. Energy, momenta and orthonormality
-    are conserved to round-off. Steps longer than about half a period of nutation are divided into equal parts, counted in
-    `Counters.stages`. Steps in which the body could turn by more than 10^6 rad raise `BadInput`.
+    The accuracy does not depend on dt: a step adds about 1e-15 rad to the attitude error. Energy, momenta and orthonormality
+    are conserved to round-off, but a free body's momentum turns by 6e-19 rad a step. Steps longer than about half a period of
+    nutation are divided, counted in `Counters.stages`. Steps with turns of more than 10^6 rad raise `BadInput`.
 
     References: F. Klein and A. Sommerfeld, Theorie des Kreisels, for alpha and beta as elliptic functions of the second kind;
     E. T. Whittaker and G. N. Watson, Modern Analysis, chapters 20 and 23, for p and Lame's equation.

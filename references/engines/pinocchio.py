@@ -1,9 +1,8 @@
 """Pinocchio's `aba` and `integrate`, stepped from Python.
 
-Pinocchio is a library of algorithms without a time loop, so this loop is Python's and takes most of the time of a step: the
-eight calls of the library take a sixth of a step of RK4. The body is on a spherical joint at its fixed point, or at its
-centre of mass if it is free. The torque of a field other than gravity is the joint's torque, in each call of `aba`; numba
-compiles it where it is installed.
+Pinocchio is a library of algorithms without a time loop, so this loop is Python's. The library's eight calls take a sixth of a
+step of RK4. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free. The torque of a field
+other than gravity is the joint's torque, in each call of `aba`; numba compiles it where it is installed.
 
 Parameters
 ----------
