@@ -11,7 +11,7 @@ import vl_convert
 from conservative import Reduced, Role, registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
-from conservative.reports.charts.style import _OTHERS, PALETTE, colours, power_axis, svg_text
+from conservative.reports.charts.style import _OTHERS, PALETTE, SHAPES, colours, look, power_axis, svg_text
 from conservative.reports.document.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
 from conservative.reports.rows import lines
 from conservative.reports.rows import points as work_precision
@@ -55,6 +55,14 @@ def test_convergence_is_in_seconds_and_drift_is_relative():
     (panel,) = spec["vconcat"]
     assert (panel["encoding"]["x"]["title"], panel["encoding"]["y"]["axis"]["title"]) == ("t, s", "largest so far, relative")
     assert drawn(spec, "shown") == [figures.FLOOR, 1e-9]
+
+
+def test_lines_have_the_colour_of_their_family_and_the_mark_of_their_place():
+    families = {"reduced": "reduced", "gauss 2": "gauss", "gauss 3": "gauss"}
+    channels = look(families, "shape")
+    scales = [channels[name].to_dict()["scale"] for name in ("color", "shape")]
+    found = [dict(zip(each["domain"], each["range"], strict=True)) for each in scales]
+    assert found == [colours(families), {"reduced": SHAPES[0], "gauss 2": SHAPES[0], "gauss 3": SHAPES[1]}]
 
 
 def test_the_cost_of_a_recommendation_is_in_microseconds():
