@@ -180,7 +180,7 @@ def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
     `BadInput` if a setting is unknown or has a wrong value.
     """
     settings = [item.strip() for item in text.split(",") if item.strip()]
-    defaults, arguments = _defaults(target), dict[str, Any]()
+    defaults, arguments = _defaults(target), {}
     names = list(defaults)
     for position, item in enumerate(settings):
         name, equals, setting = item.partition("=")

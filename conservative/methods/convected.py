@@ -69,12 +69,13 @@ class Convected(Method):
         q0 = scene.R_WB0.T.flatten()  # a copy, because kernels are compiled separately for read-only arrays
         kernel, J_inverse = kernels("convected"), np.ascontiguousarray(scene.body.inverse)
         u0 = np.concatenate([q0, kernel.conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
+        dt, residual_and_tangent, finite_gradient = grid.dt, kernel.residual_and_tangent, kernel.finite_gradient
         field = None if scene.potential is None else scene.potential.kernel_field(np.eye(3))
 
         def linearise(u0: Array, u1: Array) -> tuple[Array, Array]:
             """Return the residual (27) and tangent (29) of the state at both ends of a step."""
-            V_star, dV_star = (None, None) if field is None else kernel.finite_gradient(field, u0[:9], u1[:9])
-            return kernel.residual_and_tangent(grid.dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
+            V_star, dV_star = (None, None) if field is None else finite_gradient(field, u0[:9], u1[:9])
+            return residual_and_tangent(dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
 
         def run() -> Trajectory:
             with np.errstate(all="ignore"):  # a step that overflows fails
