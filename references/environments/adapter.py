@@ -84,18 +84,13 @@ class EngineData(Distribution):
 
 @cache
 def read_script(path: Path) -> ModuleType:
-    """Return a module with the documentation of an adapter in JavaScript, its first comment, and its data, `ENGINE`.
-
-    The data are JSON. Those that most engines in JavaScript have in common can be left out. The adapter runs in the environment
-    (see `worker/program.mjs`).
-    """
+    """Return a module with the first comment and `ENGINE`, JSON, of an adapter in JavaScript, and the data that most share."""
     words, _, code = path.read_text(encoding="utf-8").partition("*/")
     data, _ = json.JSONDecoder().raw_decode(code.partition("ENGINE = ")[2])
-    module = ModuleType(f"{__package__}.{path.stem}", words[3:].replace("\n *", "\n"))
-    installed = ("as_installed=true",)
     common = {"kind": "npm", "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
-    common |= {"fields": ("UniformGravity",), "card": {"variants": ("", *installed), "as_installed": installed}}
-    vars(module).update(__file__=str(path), ENGINE=common | data)
+    card = {"variants": ("", "as_installed=true"), "as_installed": ("as_installed=true",)}
+    module = ModuleType(f"{__package__}.{path.stem}", words[3:].replace("\n *", "\n"))
+    vars(module).update(__file__=str(path), ENGINE=common | {"fields": ("UniformGravity",), "card": card} | data)
     return module
 
 

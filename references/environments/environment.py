@@ -79,7 +79,6 @@ def version_key(version: str) -> tuple[tuple[int, int, str], ...]:
 RECORD, LOCK = "record.json", "lock.txt"
 """File that is written last into an environment, and file with the versions and hashes of all packages."""
 NODE = "Node 20 or later with npm, from https://nodejs.org or the system's packages"
-"""What engines in JavaScript need."""
 BUILD = "build."
 """Mark of builds in the local part of a version, such as 4.0.1+build.1a2b3c4d."""
 

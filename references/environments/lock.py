@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -130,22 +130,17 @@ _COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--gene
 
 def _as_bad_input(package: str, name: str, version: str, failure: UvFailed, source: Source) -> BadInput:
     if failure.says("there is no version of", "there are no versions of"):
-        return no_version(name, version, list_versions(package, source))
+        newest = sorted(list_versions(package, source), key=version_key, reverse=True)
+        if not newest:
+            return BadInput("version", repr(name), "a version that exists")
+        nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
+        return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
     if failure.says("Failed to fetch", "error sending request", "network was disabled"):
         return BadInput("engines", f"no answer for {name!r} from the package index", "a network, or --find-links FOLDER")
     if failure.says("was not found in"):
         place = "the package index" if source.find_links is None else str(source.find_links)
         return BadInput("engine", repr(name), f"a package that {place} has")
     return BadInput("engine", repr(name), f"a package that uv can install ({failure.summary})")
-
-
-def no_version(name: str, version: str, known: Iterable[str]) -> BadInput:
-    """Return the error of a version that does not exist, with those that do."""
-    newest = sorted(known, key=version_key, reverse=True)
-    if not newest:
-        return BadInput("version", repr(name), "a version that exists")
-    nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
-    return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
 
 
 def normal_name(package: str) -> str:

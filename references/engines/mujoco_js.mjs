@@ -1,0 +1,20 @@
+/* MuJoCo's official build for JavaScript, in double precision, with the models of mujoco.py; its loop is in JavaScript. */
+export const ENGINE = {
+  "package": "@mujoco/mujoco", "precision": "f64",
+  "settings": {"integrator": "RK4"}, "orders": {"Euler": 1, "RK4": 2, "implicit": 1, "implicitfast": 1},
+  "card": {"variants": ["Euler", "RK4", "implicit", "implicitfast"], "as_installed": ["Euler"]}
+};
+export const start = (mujoco) => mujoco();
+
+export function build({ mass, gravity, com, moments_com: [a, b, c], q_com, q0, w0, dt, free, integrator }, M, own) {
+  const moments = [Math.min(a, b + c), Math.min(b, c + a), Math.min(c, a + b)]; // planar bodies exceed it by a rounding unit
+  const model = M.MjModel.from_xml_string(`<mujoco><option timestep="${dt}" integrator="${integrator}"
+    gravity="0 0 ${-gravity}"><flag contact="disable" constraint="disable" autoreset="disable"/></option><worldbody><body>
+    <joint type="${free ? 'free' : 'ball'}"/><inertial mass="${mass}" pos="${com.join(' ')}" quat="${q_com.join(' ')}"
+    diaginertia="${moments.join(' ')}"/></body></worldbody></mujoco>`), data = new M.MjData(model);
+  own(() => model.delete());
+  own(() => data.delete());
+  data.qpos.set(q0, model.nq - 4);
+  data.qvel.set(w0, model.nv - 3);
+  return { step: () => M.mj_step(model, data), read: () => [data.qpos.slice(-4), data.qvel.slice(-3)], rates: 'w' };
+}
