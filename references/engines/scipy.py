@@ -86,7 +86,7 @@ class SciPy(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
-        axes, derivative = principal_axes(scene), _derivative(scene)
+        axes, derivative = principal_axes(scene), state_derivative(scene)
         start = np.concatenate([axes.q0, axes.w0])
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         atol = self.rtol * np.repeat([1.0, rate_scale], [4, 3])
@@ -127,8 +127,11 @@ def _count_steps(solver: Any) -> Any:
     return counting
 
 
-def _derivative(scene: Scene) -> Derivative:
-    """Return the derivative of the state; numba compiles it unless the potential is one of Python functions."""
+def state_derivative(scene: Scene) -> Derivative:
+    """Return the derivative of the state, a quaternion, scalar first, and rates in principal axes.
+
+    numba compiles it unless the potential is one of Python functions.
+    """
     axes, potential, compiled = principal_axes(scene), scene.potential, compile_derivative()
     field, static = SimpleNamespace(**describe_field(axes)), static_part(potential)
     moment = static.moment_B @ axes.R_BF if isinstance(static, UniformGravity) else 0.0

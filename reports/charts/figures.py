@@ -109,6 +109,18 @@ def drift(drifts: pd.DataFrame, scene: str) -> Any:
     return apply_style(alt.vconcat(*panels))
 
 
+def judged(rows: pd.DataFrame, name: str) -> Any:
+    """Return errors and drifts of a recorded motion after its first row, from `judgement.judge`, a panel for each quantity."""
+    panels = []
+    for kind, part in rows.assign(shown=rows["value"].clip(lower=FLOOR)).query("t > 0").groupby("quantity", sort=False):
+        base = alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 130, title=f"{name}: {kind}").mark_line(strokeWidth=1.4)
+        x = alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False))
+        panels.append(
+            base.encode(x=x, y=alt.Y(**log_channel("shown", "size", part["shown"])), color=alt.value(PALETTE["blue"]))
+        )
+    return apply_style(alt.vconcat(*panels))
+
+
 def growth(lines: pd.DataFrame) -> Any:
     """Return the largest error so far over time; rows of panels are quantities, columns scenes. Columns as in `long_time`."""
     data = lines.assign(shown=lines["value"].clip(lower=FLOOR))

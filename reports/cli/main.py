@@ -13,6 +13,7 @@ import click
 from ..terminal.interrupts import notes, received
 from .engines import engines
 from .gate import gate
+from .judge import judge
 from .list import list_all
 from .new import new
 from .options import epilog
@@ -88,5 +89,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, study):
+for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, study, judge):
     main.add_command(command)

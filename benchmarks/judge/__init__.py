@@ -1,0 +1,1 @@
+"""Motions that other programs recorded, compared with the exact motion, and what explains the difference."""

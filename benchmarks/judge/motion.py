@@ -1,0 +1,105 @@
+"""A recorded motion next to the exact motion, and next to motions with a fault."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from conservative.attitude import Array, from_quaternion
+from conservative.references.engine import principal_axes
+from conservative.references.engines.scipy import state_derivative
+from conservative.references.exact.method import Exact, free_body, lagrange_top
+from conservative.scene import Scene
+
+Motion = tuple[Array | None, Array | None]
+"""Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
+TOLERANCE = 2.3e-14  # the smallest relative one of SciPy
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A recorded motion at times t (n,), s, from 0, and the scene whose motion it should be.
+
+    If `from_row` is True, the scene starts in the first row, otherwise as the user's scene does.
+    """
+
+    scene: Scene
+    t: Array
+    data: Motion
+    from_row: bool
+
+    def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Case:
+        """Return the case of other data. The scene keeps the part of its initial state that they do not have."""
+        data = {"R_WB0": R_WB, "w_WB_B0": w_WB_B}
+        start = {name: values[0] for name, values in data.items() if self.from_row and values is not None}
+        return replace(self, scene=self.scene.rename(self.scene.name, **start), data=(R_WB, w_WB_B))
+
+    def take(self, rows: slice) -> Case:
+        """Return some of the rows, with the same initial state."""
+        R, w = (None if each is None else each[rows] for each in self.data)
+        return replace(self, t=self.t[rows], data=(R, w))
+
+    def first(self, angle: float, least: int) -> Case:
+        """Return the rows in which the body turns by an angle, rad, or at least so many."""
+        return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
+
+    @cached_property
+    def scale(self) -> float:
+        """Rate, rad/s, that errors of rates are relative to: the largest."""
+        rates = self.scene.w_WB_B0[None] if self.data[1] is None else self.data[1]
+        return float(np.linalg.norm(rates, axis=1).max()) or 1.0
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether the exact motion is known in closed form."""
+        return self.scene.free or (Exact().unsupported(self.scene) is None and self.scene.symmetry_axis_B is not None)
+
+    @cached_property
+    def error(self) -> Array:
+        """The errors (2, n) of the data."""
+        return self.errors(self.truth(self.t))
+
+    def truth(self, t: Array) -> Motion:
+        """Return the exact motion at ascending times (n,), s, from 0 or later."""
+        scene, field = self.scene, self.scene.potential
+        if field is None:
+            return free_body(scene.body, scene.R_WB0, scene.w_WB_B0, t)
+        if self.closed:
+            return lagrange_top(scene.body, field, scene.R_WB0, scene.w_WB_B0, t)  # type: ignore[arg-type]
+        return self.move(t)
+
+    def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> Motion:
+        """Return the motion by SciPy's DOP853, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
+        exact, axes = state_derivative(self.scene), principal_axes(self.scene)
+
+        def slope(t: float, y: Array) -> Array:
+            out = exact(t, y)
+            out[4:] -= damping * y[4:] + (0.0 if gyroscopic else np.cross(axes.J * y[4:], y[4:]) / axes.J)
+            return out
+
+        y, atol = np.full((len(t), 7), np.nan), TOLERANCE * np.repeat([1.0, self.scale], [4, 3])
+        with np.errstate(all="ignore"):  # a motion that diverges ends in nan
+            found = solve_ivp(slope, (0.0, t[-1]), [*axes.q0, *axes.w0], "DOP853", t, rtol=TOLERANCE, atol=atol).y
+            y[: np.shape(found)[1]] = np.transpose(found)
+            return self.motion(y)
+
+    def motion(self, y: Array) -> Motion:
+        """Return the motion of states (n, 7): quaternions, scalar first, and rates, rad/s, in principal axes."""
+        R_FB = principal_axes(self.scene).R_BF.T
+        return from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)) @ R_FB, y[:, 4:] @ R_FB
+
+    def differences(self, motion: Motion) -> Array:
+        """Return a motion minus the data (n, 12), in rad and relative to `scale`; 0 for what the file does not have."""
+        out = np.zeros((len(self.t), 12))
+        for part, unit, made, data in zip((slice(9), slice(9, 12)), (np.sqrt(2), self.scale), motion, self.data, strict=True):
+            if made is not None and data is not None:
+                out[:, part] = (made - data).reshape(len(out), -1) / unit
+        return np.nan_to_num(out, nan=1e3)
+
+    def errors(self, motion: Motion) -> Array:
+        """Return the sizes (2, n) of `differences`: angles between attitudes, rad, and differences of rates."""
+        d = self.differences(motion)
+        return np.stack([2 * np.arcsin(np.minimum(np.linalg.norm(d[:, :9], axis=1) / 2, 1)), np.linalg.norm(d[:, 9:], axis=1)])

@@ -1,0 +1,83 @@
+"""Each planted fault is named with its size, and a right file or a noisy one is not accused."""
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.benchmarks.judge.diagnose import diagnose
+from conservative.benchmarks.judge.motion import Case
+
+from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
+
+AB2, HEUN = "Adams-Bashforth 2, started with Euler", "Heun's method"
+IMPLICIT = "semi-implicit Euler with an implicit gyroscopic term"
+
+
+def diagnosed(scene, R, w, t=T):
+    return diagnose(Case(scene, t, (None, None), True).read(R, w), quaternion=True)[0]
+
+
+FAULTS = {
+    "time shift": (lambda scene: late(scene, 0.02), {"shift": 0.02}),
+    "phase drift": (lambda scene: exact(scene, T * (1 + 1e-4)), {"shift": 0.0, "rate": 1e-4}),
+    "no gyroscopic term": (without, {}),
+    "damped": (lambda scene: without(scene, 0.05, True), {"damping": 0.05}),
+    "no gyroscopic term, damped": (lambda scene: without(scene, 0.05), {"damping": 0.05}),
+    "order xyzw": (reordered, {}),
+    "transposed": (lambda scene: (np.swapaxes(exact(scene)[0], 1, 2), exact(scene)[1]), {}),
+    "world rates": (lambda scene: (exact(scene)[0], (exact(scene)[0] @ exact(scene)[1][..., None])[..., 0]), {}),
+    "body axes": (lambda scene: turned(scene, 0.3, 0.5, -0.4), {"turn_1": 0.3, "turn_2": 0.5, "turn_3": -0.4}),
+    AB2: (lambda scene: stepped(scene, AB2, 5), {"step": 0.01}),
+    IMPLICIT: (lambda scene: stepped(scene, IMPLICIT, 3), {"step": 0.05 / 3}),
+    HEUN: (lambda scene: stepped(scene, HEUN, 4), {"step": 0.0125}),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_planted_fault_is_named(name):
+    plant, values = FAULTS[name]
+    found = diagnosed(FREE, *plant(FREE))
+    assert found.name == name
+    assert found.values == pytest.approx(values, rel=1e-6, abs=1e-9)  # measured: 2e-10 of the shift
+    assert max(found.left) < 1e-10 < 1e-6 < max(found.plain)  # measured: at most 3e-12
+
+
+@pytest.mark.parametrize("name", ["time shift", "damped", "transposed", "body axes"])
+def test_a_planted_fault_in_gravity_is_named(name):
+    plant, values = FAULTS[name]
+    found = diagnosed(HEAVY, *plant(HEAVY))
+    assert (found.name, found.values) == (name, pytest.approx(values, rel=1e-6, abs=1e-9))
+
+
+@pytest.mark.slow
+def test_turned_body_axes_are_found_from_rates_alone_and_at_any_angle():
+    _, w = turned(FREE, 1.3, -1.5, 0.9)
+    found = diagnosed(FREE, None, w)
+    assert found.name == "body axes"
+    assert found.left[1] < 1e-10
+
+
+@pytest.mark.slow
+def test_another_body_and_another_first_row_are_named():
+    other = cv.Scene("other", cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.3, 0.3], [-0.2, 0.3, 4.2]]), *START, 6.0)
+    assert diagnosed(FREE, *exact(other)).name == "another body"
+    faster = FREE.rename("faster", w_WB_B0=[0.701, -1.1, 1.6])
+    R, w = exact(faster)
+    w[0] = FREE.w_WB_B0
+    found = diagnosed(FREE, R, w)
+    assert found.name == "first row"
+    assert found.values["rate_1"] == pytest.approx(1e-3 / np.linalg.norm(w, axis=1).max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("scene", [FREE, HEAVY], ids=["free", "heavy"])
+@pytest.mark.parametrize("size", [0.0, 1e-6])
+def test_a_right_file_is_not_accused(scene, size):
+    assert diagnosed(scene, *noisy(scene, size)) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_noise_of_other_bodies_is_not_accused(seed):
+    scene = cv.scenes.random_body(seed=seed)
+    scene = scene.rename("random", t_end=6.0, potential=None)
+    assert diagnosed(scene, *noisy(scene, 1e-6, seed)) is None

@@ -1,0 +1,104 @@
+"""`conservative judge`: files with the faults of five flight simulators, files that are written, and exit codes."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative.reports.cli.main import main
+
+from ..benchmarks.judge.made import exact, stepped
+
+# The brick of NASA's check case 2, slug ft^2: the motion of a free body depends on the ratios of its moments only.
+TOML = """t_end = 30
+[body]
+inertia = [0.00189422, 0.006211019, 0.007194665]
+[start]
+w_WB_B = [0.17453292519943295, 0.3490658503988659, 0.5235987755982988]
+"""
+BRICK = cv.Scene("brick", cv.RigidBody([0.00189422, 0.006211019, 0.007194665]), np.eye(3), np.radians([10, 20, 30]), 30.0)
+T = np.linspace(0, 30, 301)
+AB2 = "Adams-Bashforth 2, started with Euler"
+
+
+def judge(folder, rates, *options):
+    names = [f"bodyAngularRateWrtEi_deg_s_{axis}" for axis in ("Roll", "Pitch", "Yaw")]
+    table = pd.DataFrame(np.degrees(rates), columns=names)
+    table.insert(0, "time", T)
+    table.to_csv(folder / "run.csv", index=False)
+    (folder / "body.toml").write_text(TOML)
+    done = CliRunner().invoke(main, ["judge", str(folder / "run.csv"), "--body", str(folder / "body.toml"), *map(str, options)])
+    return done, (json.loads(done.stdout) if "--json" in options and done.exit_code < 2 else None)
+
+
+def late():
+    w = exact(BRICK, T + 5e-4)[1]
+    return np.concatenate([BRICK.w_WB_B0[None], w[1:]])
+
+
+FILES = {
+    "right, 12 digits": (lambda: np.radians(np.degrees(exact(BRICK, T)[1]).round(10)), None, {}),
+    "a step of 10 ms": (lambda: stepped(BRICK, AB2, 10, T)[1], AB2, {"step": 0.01}),
+    "half a millisecond": (late, "time shift", {"shift": 5e-4}),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_faults_of_flight_simulators_are_named(name, tmp_path):
+    made, fault, values = FILES[name]
+    done, found = judge(tmp_path, made(), "--json")
+    assert (done.exit_code, found["right"]) == ((0, True) if fault is None else (1, False))
+    if fault is None:
+        assert found["diagnosis"] is None
+        assert max(found["error"]) < 1e-11  # measured: 4e-12, the round-off of the digits
+    else:
+        assert found["diagnosis"]["name"] == fault
+        assert found["diagnosis"]["values"] == pytest.approx(values, rel=1e-6)
+
+
+def test_the_folder_has_every_format_and_is_replaced_by_the_same_command_only(tmp_path):
+    out = tmp_path / "out"
+    done, _ = judge(tmp_path, late(), "--out", out)
+    assert done.exit_code == 1
+    assert "run.csv is WRONG: its largest error is 4.7e-3 deg/s." in done.stdout
+    assert "Constant time shift: the file is +0.0005 s ahead of the exact motion." in done.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["judge.csv", "judge.json", "judge.md", "judge.svg"]
+    table = pd.read_csv(out / "judge.csv")
+    assert table["quantity"].unique().tolist() == ["rate error, deg/s", "drift of energy", "drift of |L|"]
+    assert table["value"].max() == pytest.approx(4.7428e-3, rel=1e-4)
+    picture = (out / "judge.svg").read_text()
+    assert all(f"run.csv: {quantity}" in picture for quantity in table["quantity"].unique())
+    assert judge(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 0
+    (out / "judge.md").write_text("mine")
+    assert judge(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 2
+    assert (out / "judge.md").read_text() == "mine"
+
+
+def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_path):
+    run = CliRunner().invoke(main, ["run", "lagrange_top", "-m", "exact", "--dt", "0.01", "--csv", str(tmp_path / "run.csv")])
+    assert run.exit_code == 0, run.output
+    done = CliRunner().invoke(main, ["judge", str(tmp_path / "run.csv"), "--body", "lagrange_top", "--json"])
+    found = json.loads(done.stdout)
+    assert (done.exit_code, found["diagnosis"]) == (0, None)
+    assert [each["quantity"] for each in found["quantities"]][:2] == ["attitude error, rad", "rate error, rad/s"]
+    assert found["quantities"][2]["quantity"] == "drift of energy"
+    table = pd.read_csv(tmp_path / "run.csv")
+    R = table[[f"R_WB_{i}{j}" for i in "123" for j in "123"]].to_numpy().reshape(-1, 3, 3)
+    q = cv.attitude.to_quaternion(R)[:, [1, 2, 3, 0]]
+    columns = {"t": table["t"], **{f"q{i}": q[:, i] for i in range(4)}}
+    pd.DataFrame(columns).to_csv(tmp_path / "order.csv", index=False)
+    done = CliRunner().invoke(main, ["judge", str(tmp_path / "order.csv"), "--body", "lagrange_top"])
+    assert done.exit_code == 0, done.output
+    assert "xyzw fits better" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"), [(("--euler", "zzq"), "euler: got 'zzq'"), (("--rates", "world"), "rates: got")]
+)
+def test_wrong_options_are_one_line(options, expected, tmp_path):
+    done, _ = judge(tmp_path, exact(BRICK, T)[1], *options)
+    assert (done.exit_code, len(done.stderr.splitlines())) == (2, 1)
+    assert expected in done.stderr
