@@ -48,12 +48,10 @@ def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str,
         f"{('attitude', 'rate')[kind]} error, {unit}": case.error[kind] * size
         for kind, (unit, size) in zip(kinds, units.items(), strict=True)
     }
-    if R is not None and w is not None:
-        recorded = Trajectory(case.scene, case.t, R, w, "file")
-        series |= {f"drift of {each.name}": sizes(recorded.drift(each)) for each in case.scene.invariants}
-    elif w is not None and scene.free:
-        E, L = kinetic_energy(body, w), np.linalg.norm(body.momentum(w), axis=1)
-        series |= {f"drift of {name}": np.abs(values / values[0] - 1) for name, values in (("energy", E), ("|L|", L))}
+    if w is not None and (R is not None or scene.free):  # rates alone determine the energy of a free body
+        recorded = Trajectory(case.scene, case.t, np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R, w, "file")
+        kept = [each for each in case.scene.invariants if R is not None or each.unit == "J"]
+        series |= {f"drift of {each.name}": sizes(recorded.drift(each)) for each in kept}
     if w is not None and scene.free and case.error.max() > FAR:
         gap = np.abs(kinetic_energy(body, w) * 2 * np.sort(body.moments)[1] / np.sum(body.momentum(w) ** 2, axis=1) - 1)
         if gap[-len(gap) // 10 :].max() < 0.1 * gap[0]:

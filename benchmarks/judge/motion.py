@@ -97,7 +97,7 @@ class Case:
         for part, unit, made, data in zip((slice(9), slice(9, 12)), (np.sqrt(2), self.scale), motion, self.data, strict=True):
             if made is not None and data is not None:
                 out[:, part] = (made - data).reshape(len(out), -1) / unit
-        return np.nan_to_num(out, nan=1e3)
+        return np.clip(np.nan_to_num(out, nan=1e3), -1e3, 1e3)
 
     def errors(self, motion: Motion) -> Array:
         """Return the sizes (2, n) of `differences`: angles between attitudes, rad, and differences of rates."""

@@ -9,7 +9,7 @@ from conservative.benchmarks.judge.motion import Case
 
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
 
-AB2, HEUN = "Adams-Bashforth 2, started with Euler", "Heun's method"
+AB2, HEUN = "Adams-Bashforth 2 (first step Euler)", "Heun's method"
 IMPLICIT = "semi-implicit Euler with an implicit gyroscopic term"
 
 
@@ -81,3 +81,10 @@ def test_noise_of_other_bodies_is_not_accused(seed):
     scene = cv.scenes.random_body(seed=seed)
     scene = scene.rename("random", t_end=6.0, potential=None)
     assert diagnosed(scene, *noisy(scene, 1e-6, seed)) is None
+
+
+@pytest.mark.parametrize("name", ["spherical_body", "needle"])
+def test_random_rows_have_no_diagnosis(name):
+    scene = cv.registry.scene(name)
+    random = np.random.default_rng(1)
+    assert diagnosed(scene, None, np.linalg.norm(scene.w_WB_B0) * random.normal(size=(len(T), 3)), scene.t_end / 6 * T) is None
