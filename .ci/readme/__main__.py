@@ -1,11 +1,11 @@
-"""Write README.md from README.md.j2 and measured.csv, which lie beside this file, and a table of benchmarks/README.md.
+"""Write README.md from README.md.j2 and measured.csv, which lie beside this file, and the tables of benchmarks/README.md.
 
     python .ci/readme                    # write both
     python .ci/readme --check            # exit with 1 if one of them is not current
-    python .ci/readme --measured REPORT TIMES [RANDOM]
+    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price FOLDER
 
-The last form first replaces measured.csv and the picture, from the folders of a report, a study of times and a study of random
-bodies. Without RANDOM the rows of random bodies stay. CONTRIBUTING.md has the commands that make them.
+The last form first replaces rows of measured.csv, from the folders of a report and of studies, and the picture. Options can be
+left out; the rows of others stay. CONTRIBUTING.md has the commands that make the folders.
 """
 
 from __future__ import annotations
@@ -21,18 +21,33 @@ import jinja2
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BENCHMARKS, MARK = ROOT / "benchmarks" / "README.md", "<!-- of measured.csv: python .ci/readme -->\n"
-"""The page with the table of random bodies, and the line before and after it."""
+"""The page with the other tables, and the line before and after each."""
 README, PICTURE = ROOT / "README.md", ROOT / "reports" / "pictures" / "time_against_error.svg"
 ROWS = HERE / "measured.csv"
-BODIES, RATIO = "random bodies", "heyoka's time over ours"
+REPORT, BODIES, SCENES, MANY, PRICE = "report", "random bodies", "three scenes", "many bodies", "price"
+"""Parts of measured.csv, in its order."""
+RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
+VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4", "SciPy": "DOP853"}
+
+
+def read_rows() -> list[dict[str, str]]:
+    """Return the rows of measured.csv."""
+    with ROWS.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def part_of(row: dict[str, str]) -> str:
+    """Return the part to which a row belongs."""
+    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, MANY, PRICE)]
+    return known[0] if known else SCENES if "," in row["scene"] else REPORT
 
 
 def read_values() -> tuple[dict[tuple[str, str, str], float], dict[str, str], str]:
-    """Return the values by scene, name and quantity, the versions by name, and the last date."""
-    with ROWS.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    """Return the values by scene, name and quantity, the versions by name, and the last date of README's rows."""
+    rows = read_rows()
     values = {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows}
-    return values, {row["name"]: row["version"] for row in rows if row["version"]}, max(row["date"] for row in rows)
+    dates = [row["date"] for row in rows if part_of(row) in (REPORT, BODIES)]
+    return values, {row["name"]: row["version"] for row in rows if row["version"]}, max(dates)
 
 
 def interval(values: dict[tuple[str, str, str], float], *place: str) -> list[float]:
@@ -67,7 +82,70 @@ def render_table() -> str:
         int(values["all fields", BODIES, f"cases{which}"]) for which in ("", " won", " open", " lost")
     )
     counts = f"\nOf these {cases} cases, a body at an error, ours won {won} and lost {lost}; {undecided} are open.\n"
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + counts
+    return as_markdown(lines) + counts + origin(BODIES) + "\n"
+
+
+def render_scenes() -> str:
+    """Return the times of all sides on three scenes, a row for each error and kind of run, the fastest in bold."""
+    values, versions, _ = read_values()
+    places = list(dict.fromkeys(place for place, name, _ in values if name == GENERAL))
+    sides = list(dict.fromkeys(name for place, name, quantity in values if place in places and quantity == "time"))
+    titles = [" ".join([each, *([versions[each]] if each in versions else [])]) for each in sides]
+    titles = [f"{title}, {VARIANTS[each]}" if each in VARIANTS else title for each, title in zip(sides, titles, strict=True)]
+    lines = [["scene", "error, rad", *titles, "heyoka / general"], ["---"] * (len(sides) + 3)]
+    before = ""
+    for place in places:
+        scene, _, what = place.partition(", ")
+        times = [values.get((place, side, "time"), math.inf) for side in sides]
+        cells = [two_digits(time) for time in times]
+        if math.isfinite(times[0]):  # all sides
+            fastest = times.index(min(times))
+            cells[fastest] = f"**{cells[fastest]}**"
+        lines.append([scene if scene != before else "", what, *cells, ratio_text(interval(values, place, GENERAL))])
+        before = scene
+    return as_markdown(lines) + f"\n{origin(SCENES)}\n"
+
+
+def render_many() -> str:
+    """Return heyoka's time over ours for many bodies, a row for each kind and statistic and a column for each error."""
+    values, *_ = read_values()
+    places = [tuple(place.split(", ")) for place, *key in values if key == [MANY, RATIO]]
+    errors = list(dict.fromkeys(error for *_, error in places))
+    lines, before = [["bodies", "errors", *errors], ["---"] * (len(errors) + 2)], ""
+    for kind, statistic in dict.fromkeys(place[:2] for place in places):
+        ratios = [ratio_text(interval(values, f"{kind}, {statistic}, {error}", MANY), 2) for error in errors]
+        lines.append([kind if kind != before else "", statistic.replace("95 %", "95th percentile"), *ratios])
+        before = kind
+    return as_markdown(lines) + f"\n{origin(MANY)}\n"
+
+
+def render_price() -> str:
+    """Return what runs cost in a new process, a row for each side, the least in bold."""
+    rows, (_, versions, _) = [row for row in read_rows() if part_of(row) == PRICE], read_values()
+    quantities = {row["quantity"]: row["unit"] for row in rows}
+    value = {(row["name"], row["quantity"]): float(row["value"]) for row in rows}
+    sides = list(dict.fromkeys(row["name"] for row in rows))
+    lines = [["side", *(f"{name}, {unit}" for name, unit in quantities.items())], ["---"] * (len(quantities) + 1)]
+    for side in sides:
+        line = [f"{side} {versions[side]}" if side in versions else side]
+        for name, unit in quantities.items():
+            text = f"{value[side, name]:.1e}".replace("e-0", "e-") if unit == "rad" else f"{value[side, name]:#.2g}"
+            least = unit != "rad" and value[side, name] == min(value[each, name] for each in sides)
+            line.append(f"**{text}**" if least else text)
+        lines.append(line)
+    return as_markdown(lines) + f"\n{origin(PRICE)}\n"
+
+
+def as_markdown(lines: list[list[str]]) -> str:
+    """Return lines of cells as a table."""
+    return "".join(f"| {' | '.join(line)} |\n".replace("|  |", "| |") for line in lines)
+
+
+def origin(part: str) -> str:
+    """Return the date and the commands of a part as a sentence."""
+    rows = [row for row in read_rows() if part_of(row) == part]
+    commands = " and ".join(dict.fromkeys(f"`{row['command']}`" for row in rows))
+    return f"Measured on {max(row['date'] for row in rows)} by {commands}."
 
 
 def ratio_text(ratio: list[float], digits: int = 3) -> str:
@@ -95,21 +173,32 @@ def main() -> None:
     parser.add_argument(
         "--measured", nargs="+", type=Path, metavar="FOLDER", help="REPORT TIMES [RANDOM]: folders of new measurements"
     )
+    parser.add_argument("--scenes", nargs=2, type=Path, metavar="FOLDER", help="TIMES EACH_STEP: the table of three scenes")
+    parser.add_argument("--many", type=Path, metavar="FOLDER", help="the table of many bodies")
+    parser.add_argument("--price", type=Path, metavar="FOLDER", help="the table of prices")
     options = parser.parse_args()
-    if options.measured:
+    if options.measured or options.scenes or options.many or options.price:
         import measure  # beside this file; it needs the package
 
-        report, times, *random = options.measured
-        with ROWS.open(encoding="utf-8", newline="") as file:
-            bodies = [row for row in csv.DictReader(file) if row["command"].startswith("conservative study random")]
-        new = [*measure.scene_rows(report, times), *(measure.random_rows(*random) if random else bodies)]
+        report, times, *random = options.measured or (None, None)
+        made = {
+            REPORT: measure.scene_rows(report, times) if report else None,
+            BODIES: measure.random_rows(*random) if random else None,
+            SCENES: measure.three_scenes(*options.scenes) if options.scenes else None,
+            MANY: measure.many_rows(options.many) if options.many else None,
+            PRICE: measure.price_rows(options.price) if options.price else None,
+        }
+        old = read_rows()
+        rows = [row for part, new in made.items() for row in new or [each for each in old if part_of(each) == part]]
         with ROWS.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, measure.COLUMNS, lineterminator="\n")
             writer.writeheader()
-            writer.writerows(new)
-        measure.draw(report, PICTURE)
-    before, _, after = (page := BENCHMARKS.read_text(encoding="utf-8")).split(MARK)
-    new = {README: render(), BENCHMARKS: MARK.join((before, render_table(), after))}
+            writer.writerows(rows)
+        if report:
+            measure.draw(report, PICTURE)
+    parts = (page := BENCHMARKS.read_text(encoding="utf-8")).split(MARK)
+    parts[1::2] = render_table(), render_scenes(), render_many(), render_price()
+    new = {README: render(), BENCHMARKS: MARK.join(parts)}
     if options.check and [new[README], new[BENCHMARKS]] != [README.read_text(encoding="utf-8"), page]:
         sys.exit("README.md or benchmarks/README.md differs from measured.csv and the template. Run: python .ci/readme")
     if not options.check:

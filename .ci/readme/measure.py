@@ -1,4 +1,4 @@
-"""The rows of measured.csv and the picture, from a report, a study of times and a study of random bodies."""
+"""The rows of measured.csv and the picture, from the folders of a report and of studies."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from typing import Any
 import pandas as pd
 
 from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
-from conservative.reports.rows.names import with_names
+from conservative.benchmarks.measures.measure import Measure
+from conservative.reports.document.cells import tolerance
+from conservative.reports.document.model import Table
+from conservative.reports.rows.names import MethodClass, of_classes, with_names
 from conservative.reports.rows.points import points
+from conservative.reports.sections import many_bodies, price
 from conservative.reports.sections.random_bodies import ANY, ratios
+from conservative.reports.sections.scene_contests import each_step
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
 CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
@@ -27,6 +32,16 @@ TIMES = (
     " --methods taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 )
 RANDOM = "conservative study random --bodies 20 --seed 1002 --methods gauss,projected,taylor,heyoka"
+SCENES = (
+    "conservative study work_precision --scenes brick_flip:t_end=24,lagrange_top:t_end=2,asymmetric_top --engines cyrk",
+    "conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 --engines cyrk",
+)
+MANY = "conservative study throughput --methods taylor,heyoka,mujoco --sizes 1024"
+PRICE = "conservative study price"
+OURS = {"our general integrators": MethodClass.GENERAL, "our closed forms": MethodClass.SOLUTION}
+OTHERS = {**ENGINES, "CyRK": "cyrk"}
+EACH = ("the scene's steps, all stored", "without the conversion of an engine's states", "the scene's steps, final state only")
+"""The rows of `each_step` in the table of three scenes, in the order of `EachStep.runs`."""
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
 
 
@@ -45,6 +60,56 @@ def random_rows(random: Path) -> Iterator[dict[str, Any]]:
     bodies = _read(random / "study.csv")
     common = {"command": RANDOM, "date": _date(random / "study.csv")}
     yield from (common | row for row in _random(bodies))
+
+
+def three_scenes(times: Path, each: Path) -> Iterator[dict[str, Any]]:
+    """Yield the times of every side on three scenes, and heyoka's time over ours, at errors and with every step stored."""
+    timed, table = points(with_names(_read(times / "study.csv"))), with_names(_read(each / "study.csv"))
+    loops = table.loc[table["measure"] == Measure.TIME_OWN_LOOP.text, "family"].unique()
+    for scene in timed["scene"].unique():
+        common = {"command": SCENES[0], "date": _date(times / "study.csv")}
+        for error in (1e-3, 1e-6, 1e-9):
+            reached = costs(timed[timed["scene"] == scene], [error])
+            yield from (common | row for row in _side_rows(f"{scene}, {tolerance(error)}", error, reached))
+        common = {"command": SCENES[1], "date": _date(each / "study.csv")}
+        for what, reached in zip(EACH, each_step(table, scene).runs.values(), strict=True):
+            shown = loops if what == EACH[1] else None
+            place = f"{scene}, {tolerance(ERROR)}, {what}"
+            yield from (common | row for row in _side_rows(place, ERROR, reached, shown))
+
+
+def _side_rows(place: str, error: float, reached: pd.DataFrame, shown: Any = None) -> Iterator[dict[str, Any]]:
+    """Yield the times of all sides, or of the families `shown` only, and heyoka's time over our general integrators'."""
+    fastest = {name: cheapest(of_classes(reached, kind)) for name, kind in OURS.items()}
+    fastest |= {name: cheapest(reached[reached["family"] == family]) for name, family in OTHERS.items()}
+    for name, each in fastest.items():
+        known = each if shown is None or OTHERS.get(name) in shown else None
+        time, method = (1e6 * known.time, known.name) if known else (math.inf, "")
+        common = {"scene": place, "name": name, "version": "", "method": method}
+        yield common | {"quantity": "time", "unit": "us per s", "value": time}
+    general, *_ = OURS
+    common = {"scene": place, "name": general, "version": ""}
+    yield from _ratio_rows(common, Contest(place, error, fastest[general], fastest["heyoka"]))
+
+
+def many_rows(throughput: Path) -> Iterator[dict[str, Any]]:
+    """Yield heyoka's time over ours for many bodies at once."""
+    rows = many_bodies.lines(with_names(_read(throughput / "study.csv")))
+    for group, engine, statistic, _, contest in many_bodies.contests(rows, many_bodies.body_costs(rows)):
+        if group == MethodClass.GENERAL and engine == "heyoka":
+            place = f"{contest.scene.replace('_', ' ')}, {statistic}, {tolerance(contest.error)} rad"
+            common = {"scene": place, "name": "many bodies", "version": "", "command": MANY}
+            yield from (common | {"date": _date(throughput / "study.csv")} | row for row in _ratio_rows({}, contest))
+
+
+def price_rows(study: Path) -> Iterator[dict[str, Any]]:
+    """Yield the columns of the table of prices for each side."""
+    table = next(each for each in price.section(_read(study / "study.csv"), pd.DataFrame()).blocks if isinstance(each, Table))
+    common = {"scene": "price", "method": "", "version": "", "command": PRICE, "date": _date(study / "study.csv")}
+    for side, _, *cells in table.rows:
+        for quantity, cell in zip(table.header[2:], cells, strict=True):
+            name, _, unit = quantity.rpartition(", ")
+            yield common | {"name": str(side), "quantity": name, "unit": unit, "value": cell.value}
 
 
 def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
