@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.studies import price as price_study
 
 from .pages import ROOT
 from .reports.rows import row
@@ -112,6 +113,42 @@ def test_random_bodies_have_ratios_intervals_and_counts_at_all_errors():
     assert low < ratios["spring 1e-06 rad"] < high
     counts = [found["all fields", f"cases{which}"] for which in ("", " won", " open", " lost")]
     assert counts == [55, 22, 11, 22]  # of the five bodies two are won, one is open, one is slower and one alone reached
+
+
+def test_the_tables_of_benchmarks_are_made_of_their_studies(tmp_path, monkeypatch):
+    """The other rows stay; a side without a time has no column."""
+    program, rows = load("__main__"), []
+    for study, measures in (("work_precision", ("",)), ("each_step", (", each step kept", ""))):
+        for name, role, error, time in (("taylor:order=12", "ours", 1e-7, 2e-6), ("heyoka", "engine", 1e-7, 3e-6)):
+            common = {"scene": "brick_flip", "role": role, "family": name.partition(":")[0]}
+            rows.append(row(study, name, "attitude error max", error, **common))
+            for process in range(5):
+                noise = 1 + 0.01 * process * (role == "ours")
+                times = {f"time per simulated second{each}": time * noise for each in measures}
+                if study == "each_step" and role == "engine":
+                    times["time per simulated second, each step kept, engine's own loop"] = time / 2
+                rows += [row(study, name, each, spent, **common, process=process) for each, spent in times.items()]
+    for family, role, price in (("taylor", "ours", 0.63), ("heyoka", "engine", 0.19)):
+        rows += [row("price", family, measure, price, role=role) for measure in price_study.MEASURES.values()]
+        rows.append(row("price", family, "attitude error final", 3e-9, role=role))
+    measurement.frame(rows).to_csv(tmp_path / "study.csv", index=False)
+    before = program.ROWS.read_text(encoding="utf-8").splitlines()
+    page = program.BENCHMARKS.read_text(encoding="utf-8")
+    for name, text in (("ROWS", "\n".join(before) + "\n"), ("BENCHMARKS", page), ("README", "")):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        monkeypatch.setattr(program, name, tmp_path / name)
+    monkeypatch.syspath_prepend(FOLDER)
+    monkeypatch.setattr(sys, "argv", ["readme", "--scenes", str(tmp_path), str(tmp_path), "--price", str(tmp_path)])
+    program.main()
+    tables = (tmp_path / "BENCHMARKS").read_text(encoding="utf-8").split(program.MARK)
+    assert [tables[i] == page.split(program.MARK)[i] for i in (1, 3, 5, 7)] == [True, False, True, False]
+    header, _, at_1e_3, *_ = tables[3].splitlines()
+    assert header.startswith("| scene | error, rad | our general integrators | heyoka 7.13.2 | heyoka / general |")
+    assert re.match(r"\| brick_flip \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", at_1e_3)
+    (own,) = [line for line in tables[3].splitlines() if "without the conversion" in line]
+    assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
+    assert "| conservative | 0.63 |" in tables[7]
+    assert "| heyoka 7.13.2 | **0.19** |" in tables[7]
 
 
 def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):

@@ -89,7 +89,8 @@ def render_scenes() -> str:
     """Return the times of all sides on three scenes, a row for each error and kind of run, the fastest in bold."""
     values, versions, _ = read_values()
     places = list(dict.fromkeys(place for place, name, _ in values if name == GENERAL))
-    sides = list(dict.fromkeys(name for place, name, quantity in values if place in places and quantity == "time"))
+    timed = [key[1] for key, value in values.items() if key[0] in places and key[2] == "time" and math.isfinite(value)]
+    sides = list(dict.fromkeys(timed))
     titles = [" ".join([each, *([versions[each]] if each in versions else [])]) for each in sides]
     titles = [f"{title}, {VARIANTS[each]}" if each in VARIANTS else title for each, title in zip(sides, titles, strict=True)]
     lines = [["scene", "error, rad", *titles, "heyoka / general"], ["---"] * (len(sides) + 3)]
@@ -129,7 +130,11 @@ def render_price() -> str:
     for side in sides:
         line = [f"{side} {versions[side]}" if side in versions else side]
         for name, unit in quantities.items():
-            text = f"{value[side, name]:.1e}".replace("e-0", "e-") if unit == "rad" else f"{value[side, name]:#.2g}"
+            text = (
+                f"{value[side, name]:.1e}".replace("e-0", "e-")
+                if unit == "rad"
+                else f"{value[side, name]:#.2g}".removesuffix(".")
+            )
             least = unit != "rad" and value[side, name] == min(value[each, name] for each in sides)
             line.append(f"**{text}**" if least else text)
         lines.append(line)

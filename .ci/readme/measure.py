@@ -160,7 +160,8 @@ def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
 
 
 def _read(path: Path) -> pd.DataFrame:
-    texts = dict.fromkeys(("version", "setting", "series_setting", "quantity", "reason", "detail"), "string")
+    names = ("field", "method", "label", "family", "engine", "version", "setting", "role", "series", "series_setting", "way")
+    texts = dict.fromkeys((*names, "quantity", "reason", "detail"), "string")
     return pd.read_csv(path, dtype=texts).fillna(dict.fromkeys(texts, ""))
 
 
