@@ -24,7 +24,7 @@ def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str,
     """Return the summary of a recording as a motion of a scene, and rows of t, quantity and value.
 
     The exact motion starts in the first row, or as the scene does. The summary has the largest errors, of attitudes, rad, and
-    of rates, relative to the largest; the `units` of the file and their sizes; the diagnosis, all findings, and notes.
+    of rates, relative to the largest; the unit of each in the file and its size, 0 if the file has none; and the diagnosis.
     """
     whole = Case(scene, recording.t, (None, None), from_row)
     case, notes = whole.read(*recording.data), [f"{len(recording.t):,} of {recording.rows:,} rows are compared."]
@@ -40,14 +40,10 @@ def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str,
         notes.append(f"{names} are not judged. If these angles turn body to world, name their sequence: --euler zyx.")
     named, tried = diagnose(case, recording.norm is not None)
     (R, w), body = case.data, scene.body
-    units = {"rad": 1.0} if R is not None else {}
-    if w is not None:
-        units |= {"deg/s": np.degrees(case.scale)} if recording.degrees else {"rad/s": case.scale}
-    kinds = [kind for kind, data in enumerate(case.data) if data is not None]
-    series: dict[str, Array] = {
-        f"{('attitude', 'rate')[kind]} error, {unit}": case.error[kind] * size
-        for kind, (unit, size) in zip(kinds, units.items(), strict=True)
-    }
+    rates = ("deg/s", float(np.degrees(case.scale))) if recording.degrees else ("rad/s", case.scale)
+    units = [(unit, size * (data is not None)) for (unit, size), data in zip((("rad", 1.0), rates), case.data, strict=True)]
+    of = zip(("attitude", "rate"), units, case.error, strict=True)
+    series: dict[str, Array] = {f"{name} error, {unit}": errors * size for name, (unit, size), errors in of if size}
     if w is not None and (R is not None or scene.free):  # rates alone determine the energy of a free body
         recorded = Trajectory(case.scene, case.t, np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R, w, "file")
         kept = [each for each in case.scene.invariants if R is not None or each.unit == "J"]
@@ -58,14 +54,7 @@ def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str,
             notes.append("The energy approaches L^2/(2 I2): intermediate axis instability is created by the integrator.")
     if recording.norm is not None:
         series["quaternion norm, minus 1"] = np.abs(recording.norm - 1)[: len(case.t)]
-    error = [float(case.error[kind].max()) for kind in (0, 1)]
-    summary: dict[str, Any] = {
-        "error": error,
-        "units": units,
-        "kinds": kinds,
-        "diagnosis": named,
-        "tried": tried,
-        "notes": notes,
-    }
-    summary["quantities"] = [{"quantity": name, "largest": float(x.max()), "final": float(x[-1])} for name, x in series.items()]
-    return summary, pd.concat(pd.DataFrame({"t": case.t, "quantity": name, "value": x}) for name, x in series.items())
+    error, found = case.error.max(axis=1).tolist(), {"diagnosis": named, "tried": tried, "notes": notes}
+    quantities = [{"quantity": name, "largest": float(x.max()), "final": float(x[-1])} for name, x in series.items()]
+    rows = pd.concat(pd.DataFrame({"t": case.t, "quantity": name, "value": x}) for name, x in series.items())
+    return {"error": error, "units": units, "quantities": quantities, **found}, rows

@@ -13,8 +13,8 @@ def build(summary: Mapping[str, Any], name: str, allowed: float) -> Document:
     """Return the document of `judgement.judge` on the file `name`, whose error may be up to `allowed` (rad, or relative)."""
 
     def amount(errors: Sequence[float]) -> str:
-        kinds = zip(summary["kinds"], summary["units"].items(), strict=True)
-        return " and ".join(f"{number(errors[kind] * size)} {unit}" for kind, (unit, size) in kinds)
+        units = zip(errors, summary["units"], strict=True)
+        return " and ".join(f"{number(error * size)} {unit}" for error, (unit, size) in units if size)
 
     found, right = summary["diagnosis"], max(summary["error"]) <= allowed
     verdict = f"{name} is {'right' if right else 'WRONG'}: its largest error is {amount(summary['error'])}."

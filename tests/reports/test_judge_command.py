@@ -77,6 +77,23 @@ def test_the_folder_has_every_format_and_is_replaced_by_the_same_command_only(tm
     assert (out / "judge.md").read_text() == "mine"
 
 
+def test_a_motion_that_the_integrator_turns_to_the_intermediate_axis_is_noted(tmp_path):
+    angle = 0.8 * np.exp(-T / 4)
+    J = BRICK.body.moments
+    done, found = judge(tmp_path, J[1] * 0.5 * np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=1) / J, "--json")
+    assert done.exit_code == 1
+    assert "The energy approaches L^2/(2 I2)" in found["notes"][-1]
+    assert not any("L^2" in note for note in judge(tmp_path, late(), "--json")[1]["notes"])
+
+
+def test_the_start_of_the_scene_shows_an_error_of_the_first_row(tmp_path):
+    w = exact(BRICK.rename("faster", w_WB_B0=1.01 * BRICK.w_WB_B0), T)[1]
+    assert judge(tmp_path, w)[0].exit_code == 0
+    done, found = judge(tmp_path, w, "--start", "scene", "--json")
+    assert (done.exit_code, found["error"][1] > 0.009) == (1, True)
+    assert judge(tmp_path, w, "--start", "scene", "--error", "2")[0].exit_code == 0
+
+
 def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_path):
     run = CliRunner().invoke(main, ["run", "lagrange_top", "-m", "exact", "--dt", "0.01", "--csv", str(tmp_path / "run.csv")])
     assert run.exit_code == 0, run.output

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative import registry
 from conservative.benchmarks.judge.diagnose import diagnose
 from conservative.benchmarks.judge.motion import Case
 
@@ -85,6 +86,6 @@ def test_noise_of_other_bodies_is_not_accused(seed):
 
 @pytest.mark.parametrize("name", ["spherical_body", "needle"])
 def test_random_rows_have_no_diagnosis(name):
-    scene = cv.registry.scene(name)
+    scene = registry.scene(name)
     random = np.random.default_rng(1)
     assert diagnosed(scene, None, np.linalg.norm(scene.w_WB_B0) * random.normal(size=(len(T), 3)), scene.t_end / 6 * T) is None
