@@ -2,7 +2,6 @@
 
     [engines]                       # conservative.toml
     my_engine = "build/my_engine"   # relative to this file
-    other_engine = "node engine.js --fast"
 
 The project's file is in the working directory, or in the nearest folder above it; CONSERVATIVE_PROJECT names another folder to
 start from. The user's file is in the configuration folder of platformdirs. A name in the project's file takes precedence.
@@ -19,8 +18,6 @@ from pathlib import Path
 
 from .errors import BadInput
 
-FILE = "conservative.toml"
-
 
 @dataclass(frozen=True)
 class Program:
@@ -30,32 +27,33 @@ class Program:
     file: Path
     command: str
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.command} ({self.file})"
+
     @property
     def words(self) -> tuple[str, ...]:
-        """The command line. Words that name a file are absolute paths, and so is a first word with a slash."""
-        first, *rest = shlex.split(self.command)
-        paths = {word: self.file.parent / word for word in (first, *rest)}
-        program = str(paths[first]) if os.sep in first or paths[first].is_file() else first
-        return (program, *(str(paths[word]) if paths[word].is_file() else word for word in rest))
+        """The command line. Words that name a file are absolute paths."""
+        words, folder = shlex.split(self.command), self.file.parent
+        return tuple(str(path) if (path := folder / word).is_file() else word for word in words)
 
 
 def project_file() -> Path:
     """Return the project's file, which may not exist."""
     here = Path(os.environ.get("CONSERVATIVE_PROJECT", "")).absolute()
-    return next((folder / FILE for folder in (here, *here.parents) if (folder / FILE).is_file()), here / FILE)
+    places = [folder / "conservative.toml" for folder in (here, *here.parents)]
+    return next(filter(Path.is_file, places), places[0])
 
 
 def user_file() -> Path:
     """Return the user's file, which may not exist. It needs platformdirs."""
     from platformdirs import user_config_path
 
-    return user_config_path("conservative-rotation") / FILE
+    return user_config_path("conservative-rotation") / "conservative.toml"
 
 
 def list_programs() -> dict[str, Program]:
     """Return the registered programs by name. Raise `BadInput` if a file cannot be read or has other values than texts."""
-    programs: dict[str, Program] = {}
-    files = []
+    programs, files = dict[str, Program](), []
     with suppress(ImportError):  # without platformdirs
         files.append(user_file())
     with suppress(OSError):  # the working directory was removed
@@ -63,9 +61,7 @@ def list_programs() -> dict[str, Program]:
     for file in filter(Path.is_file, files):
         try:
             table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
-            entries = {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
+            programs |= {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
         except (OSError, ValueError, AttributeError) as error:
-            allowed = 'a table [engines] of command lines, such as my_engine = "build/my_engine"'
-            raise BadInput(str(file), str(error), allowed) from None
-        programs |= entries
+            raise BadInput(str(file), str(error), 'a table [engines] of texts, such as my_engine = "build/my_engine"') from None
     return programs

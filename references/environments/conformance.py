@@ -1,8 +1,6 @@
 """Conformance test of a program: the conventions of PROTOCOL.md on a free and a heavy body, repeatability, and honest times.
 
-If the samples are not those of the motion, combinations of known mistakes are tried, and the one that explains the samples best
-is named. A combination has to explain them ten times better for each of its mistakes. The short run tells a constant delay from
-the error of a method of order 1, which is small after a few steps.
+The mistakes that explain the samples best are named. The short run tells a constant delay from an error of order 1.
 """
 
 from __future__ import annotations
@@ -25,11 +23,9 @@ from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.programs import Program
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
 
 from ..engine import principal_axes
 from ..samples import States, to_body_axes
-from ..worker.client import Worker
 from .environment import worker_of
 from .plain_numbers import describe, read_states
 from .programs import program_class
@@ -38,29 +34,22 @@ J, R0, W0 = np.array((2.1, 3.3, 4.2)), rotation_about((1, -1, 0.3), 1.1), np.arr
 WEIGHT, COM = 3.1, np.array((0.3, -0.2, 0.5))
 FREE = Scene("free body", RigidBody(J), R0, W0, 1.0)
 HEAVY = replace(FREE, name="heavy body", potential=UniformGravity(WEIGHT, COM))
-SHORT = Grid(0.005, 4)
-GRIDS = (SHORT, *(Grid(0.01 / part, 100 * part, 10 * part) for part in (1, 2, 4)))
-FLOOR = 1e-6
-"""Smaller errors are not compared: they may be those of single precision."""
-PACE = 0.2
-"""Wall time of the calls in a measurement, s."""
-
+GRIDS = (Grid(0.005, 4), *(Grid(0.01 / part, 100 * part, 10 * part) for part in (1, 2, 4)))
+CENTRAL = RigidBody(describe(principal_axes(HEAVY), GRIDS[0])["moments_com"])
+FLOOR, PACE = 1e-6, 0.2
+"""Smallest errors that are compared, above those of single precision, and wall time of the calls in a measurement, s."""
 READING: dict[str, dict[str, Any]] = {
     "": {},
     "It reads `q0` as x, y, z, w: the scalar comes first": {"R_WB0": from_quaternion(np.roll(to_quaternion(R0), 1))},
     "It reads the initial attitude transposed: v_W = R0 v_F": {"R_WB0": R0.T},
     "It reads `w0` in world axes: `w0` is in F": {"w_WB_B0": R0.T @ W0},
-    "It reads `w0_W` in body axes: `w0_W` is in W": {"w_WB_B0": R0 @ W0},
     "It reads rates in deg/s: they are in rad/s": {"w_WB_B0": np.deg2rad(W0)},
     "Its inertia is inverted: J w' = (J w) x w with J = `moments`": {"body": RigidBody(1 / J)},
     "It has no gyroscopic torque: J w' = (J w) x w of a free body": {"body": RigidBody((3, 3, 3))},
     "Gravity points up: it is along minus the third axis of W": {"potential": UniformGravity(WEIGHT, -COM)},
     'It ignores gravity: use it, or answer "unsupported" if `free` is false': {"potential": None},
-    "Its inertia is about the centre of mass: `moments` are about the fixed point": {
-        "body": RigidBody(describe(principal_axes(HEAVY), SHORT)["moments_com"])
-    },
+    "Its inertia is about the centre of mass: `moments` are about the fixed point": {"body": CENTRAL},
 }
-"""Initial values of the motion of a program with a mistake in reading the numbers."""
 ATTITUDES: dict[str, Callable[[Array], Array]] = {
     "": lambda values: values,
     "`q` is x, y, z, w: the scalar comes first": lambda values: values[..., [3, 0, 1, 2, *range(4, values.shape[-1])]],
@@ -68,54 +57,42 @@ ATTITUDES: dict[str, Callable[[Array], Array]] = {
         values * (1, -1, -1, -1, 1, 1, 1) if values.shape[-1] == 7 else values[..., [0, 3, 6, 1, 4, 7, 2, 5, 8, 9, 10, 11]]
     ),
 }
-RATES = {"": 1.0, "Rates are in deg/s: answer in rad/s": math.pi / 180}
-AXES = {"": False, "Rates in W are named `w`, or rates in F `w_W`: `w` is in F": True}
-TIMES: dict[str, tuple[float, int, int]] = {
+W_IN_W = "Rates in W are named `w`, or rates in F `w_W`: `w` is in F"
+RATES = {"": 1.0, W_IN_W: 1.0, "Rates are in deg/s: answer in rad/s": math.pi / 180}
+TIMES: dict[str, tuple[float, int, int]] = {  # unit of dt, and how much later attitudes and rates are, in half steps
     "": (1, 0, 0),
     "Samples are half a step late: answer the state after `steps` steps": (1, -1, -1),
-    "Samples are half a step early: answer the state after `steps` steps": (1, 1, 1),
-    "Samples are one step late: answer the state after `steps` steps": (1, -2, -2),
-    "Samples are one step early: answer the state after `steps` steps": (1, 2, 2),
     "Rates are half a step late: answer both at the time of the attitude": (1, 0, -1),
-    "Rates are half a step early: answer both at the time of the attitude": (1, 0, 1),
     "It reads `dt` in ms: it is in s": (1e-3, 0, 0),
 }
-"""Unit of dt, and how much later attitudes and rates are, in half steps."""
-
-
-@lru_cache(maxsize=256)
-def _motion(scene: Scene, dt: float, n_steps: int) -> Trajectory:
-    return registry.method("taylor").solve(scene, Grid(dt, n_steps))
+_solve = lru_cache(maxsize=256)(registry.method("taylor").solve)
 
 
 def _distance(scene: Scene, grid: Grid, seen: tuple[Array, Array], unit: float = 1, late_R: int = 0, late_w: int = 0) -> float:
-    """Return the largest error of attitude, rad, or of rates, relative, without the first sample."""
-    truth = _motion(scene, unit * grid.dt / 2, 2 * grid.n_steps + 2)
+    truth = _solve(scene, Grid(unit * grid.dt / 2, 2 * grid.n_steps + 2))
     place = 2 * grid.steps[1:].astype(int)
     rates = np.linalg.norm(truth.w_WB_B[place + late_w] - seen[1][1:], axis=-1) / np.linalg.norm(W0)
-    worst = float(np.max([angle_between(truth.R_WB[place + late_R], seen[0][1:]), rates]))
-    return worst if math.isfinite(worst) else math.inf
+    return float(np.nan_to_num(np.max([angle_between(truth.R_WB[place + late_R], seen[0][1:]), rates]), nan=math.inf))
 
 
-def _read(states: States, attitude: str = "", rates: str = "", axes: str = "") -> tuple[Array, Array]:
-    """Return attitudes and rates in body axes, without the named mistakes."""
+def _read(states: States, attitude: str = "", rates: str = "") -> tuple[Array, Array]:
     values = ATTITUDES[attitude](states.values)
     values = np.concatenate([values[..., :-3], RATES[rates] * values[..., -3:]], -1)
-    corrected = replace(states, values=values, rates_in_world=states.rates_in_world != AXES[axes])
+    corrected = replace(states, values=values, rates_in_world=states.rates_in_world != (rates == W_IN_W))
     R_WB, w_WB_B, _ = to_body_axes(np.empty(values.shape[1]), corrected, np.eye(3)[None])
     return R_WB[0], w_WB_B[0]
 
 
 def find_mistakes(scene: Scene, answers: dict[Grid, States]) -> tuple[str, ...]:
     """Return the mistakes that explain the samples of the short and of the last run; () if nothing does better than none."""
-    runs = [(grid, answers[grid]) for grid in (SHORT, GRIDS[-1])]
-    seen = {names: [(grid, _read(states, *names)) for grid, states in runs] for names in product(ATTITUDES, RATES, AXES)}
+    runs = [(grid, answers[grid]) for grid in (GRIDS[0], GRIDS[-1])]
+    seen = {names: [(grid, _read(states, *names)) for grid, states in runs] for names in product(ATTITUDES, RATES)}
     scenes = {reading: replace(scene, **values) for reading, values in READING.items()}
     costs = {}
     for reading, when, names in product(READING, TIMES, seen):
         errors = [_distance(scenes[reading], grid, samples, *TIMES[when]) for grid, samples in seen[names]]
         mistakes = tuple(filter(None, (reading, *names, when)))
-        costs[mistakes] = math.prod(max(FLOOR, error) for error in errors) * 10 ** len(mistakes)
+        costs[mistakes] = math.prod(max(FLOOR, error) for error in errors) * 10 ** len(mistakes)  # each has to explain much
     return min(costs, key=lambda mistakes: costs[mistakes])
 
 
@@ -128,42 +105,32 @@ def check(program: Program) -> Iterator[tuple[bool, str]]:
         answers = dict[Grid, States]()
         try:
             for grid in GRIDS:
-                numbers = describe(principal_axes(scene), grid)
-                run = worker.ask("prepare", adapter="", settings=method.settings, **numbers)["run"]
+                run = worker.ask("prepare", settings=method.settings, **describe(principal_axes(scene), grid))["run"]
                 answers[grid] = read_states(worker.ask("run", run=run), (grid.n_samples,))
             again = read_states(worker.ask("run", run=run), (grid.n_samples,))
-        except NotImplementedError as error:
-            yield scene is HEAVY, f"{scene.name}: unsupported ({error})"
-            if scene is FREE:
-                return
-            break
-        except IntegrationFailed as failure:
-            yield False, f"{scene.name}: {failure.outcome}"
+        except (IntegrationFailed, NotImplementedError) as failure:
+            right = scene is HEAVY and isinstance(failure, NotImplementedError)
+            yield right, f"{scene.name}: {getattr(failure, 'outcome', f'unsupported ({failure})')}"
+            if right:
+                break
             return
         errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
         text = f"error {errors[1]:.1e} at dt = {GRIDS[1].dt} s, {errors[-1]:.1e} at {grid.dt} s"
         mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
         if errors[-1] > 100 * FLOOR and not 2 * errors[-1] < errors[1] < 1:
             mistakes = mistakes or (f"{text}: it does not fall with dt, and no known mistake explains it",)
+        yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
         if mistakes:
-            yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
             return
         yield True, f"{scene.name}: {text}"
         same = np.array_equal(again.values, answers[grid].values)
         yield same, f"{scene.name}: a second run has {'the same' if same else 'other samples: start from `q0` and `w0`'}"
-    yield _check_time(worker, run)
-
-
-def _check_time(worker: Worker, run: int) -> tuple[bool, str]:
     calls, wall, seconds = 1, 0.0, 0.0
-    while wall < PACE and calls < 1e6:
+    while (wall < PACE or seconds < 0.5 * wall < 5 * PACE) and calls < 1e6:  # a busy machine may delay an answer
         calls, start = 4 * calls, perf_counter()
         seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
         wall = perf_counter() - start
-    problems = [
-        (wall < PACE, ": `time` has to make `calls` runs"),
-        (seconds < 0.5 * wall, ": `seconds` is the wall time of all calls together"),
-        (seconds > wall, ": `seconds` is in s, and only of the calls"),
-    ]
-    problem = next((text for wrong, text in problems if wrong), "")
-    return not problem, f"time: {seconds:.2g} s for {calls} calls, within {wall:.2g} s{problem}"
+    problem = ": `seconds` is the wall time of all calls together" if seconds < 0.5 * wall else ""
+    problem = ": `seconds` is in s, and only of the calls" if seconds > wall else problem
+    problem = ": `time` has to make `calls` runs" if wall < PACE else problem
+    yield not problem, f"time: {seconds:.2g} s for {calls} calls, within {wall:.2g} s{problem}"

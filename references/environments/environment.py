@@ -97,8 +97,8 @@ class Environment:
         Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
         All installed packages, as `name==version`.
-    kind
-        A key of `COMMANDS`.
+    kind, words
+        A key of `COMMANDS`, or the command line of a user's program, which has the variables of this process.
     """
 
     engine: str
@@ -107,6 +107,7 @@ class Environment:
     runtime: str
     packages: tuple[str, ...]
     kind: str = "python"
+    words: tuple[str, ...] = ()
 
     @property
     def is_build(self) -> bool:
@@ -128,19 +129,20 @@ class Environment:
         memory
             Another memory limit in bytes.
         """
+        memory = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
+        if self.words:
+            return Worker(self.words, temporary_folder(), memory=memory)
         home = self.folder / "home"
         home.mkdir(parents=True, exist_ok=True)
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "XDG_"))}
-        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory or MEMORY)
+        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory)
 
     def write(self) -> None:
         """Write the record, which turns a folder into an environment."""
-        record = {name: value for name, value in asdict(self).items() if name != "folder"}
+        record = {name: value for name, value in asdict(self).items() if name not in ("folder", "words")}
         write_text(self.folder / RECORD, json.dumps(record, indent=2), "engines")
 
 
-MEMORY = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
-"""Memory limit of a worker in bytes."""
 COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
     "npm": lambda folder: (find_node("node"), Path(program.__file__).with_suffix(".mjs"), folder),

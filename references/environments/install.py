@@ -15,6 +15,7 @@ from typing import Any
 from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
 from conservative.files import remove_leftovers, temporary
+from conservative.programs import Program, list_programs
 
 from ..worker.client import EngineCrashed, EngineTimeout
 from . import lock as python_packages
@@ -37,6 +38,7 @@ from .environment import (
     worker_of,
 )
 from .lock import Lock, Source, find_python, normal_name, resolve_wheel, split_requirement
+from .programs import register
 from .uv_command import UvFailed, run_uv
 
 _KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm}
@@ -211,8 +213,10 @@ def import_trouble(environment: Environment, distribution: Distribution) -> str:
     return ""
 
 
-def remove(requirement: str) -> tuple[Environment, ...]:
-    """Remove the environment of `NAME==VERSION`, or all of `NAME`, and return them. Raise `BadInput` if there is none."""
+def remove(requirement: str) -> tuple[Environment | Program, ...]:
+    """Remove the environment of `NAME==VERSION`, all of `NAME`, or a program, and return them. `BadInput` if there is none."""
+    if program := list_programs().get(requirement):
+        return (register(program, undo=True),)
     engine, version = split_requirement(requirement)
     installed = {f"{each.engine}=={each.version}": each for each in list_environments()}
     chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))

@@ -7,9 +7,8 @@ import os
 import re
 import shlex
 import tomllib
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -22,9 +21,8 @@ from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
 from conservative.scene_files.toml_reader import key_lines
 
-from ..worker.client import Worker
 from .engine_method import EngineMethod, engine_class
-from .environment import MEMORY, Environment, temporary_folder, worker_of
+from .environment import Environment, worker_of
 from .plain_numbers import FIELDS
 
 
@@ -38,16 +36,6 @@ class UnusableProgram(MissingEngine):
         ImportError.__init__(self, f"{program.name}, a program of {program.file}: {problem}. {remedy}")
 
 
-@dataclass(frozen=True)
-class ProgramEnvironment(Environment):
-    """The environment of a program, with the variables of this process. `words` is the command line."""
-
-    words: tuple[str, ...] = ()
-
-    def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = MEMORY) -> Worker:
-        return Worker(self.words, temporary_folder(), memory=memory)
-
-
 def __getattr__(name: str) -> type[EngineMethod]:
     if name.startswith("_") or name not in (programs := list_programs()):
         raise AttributeError(name)
@@ -58,7 +46,7 @@ def __getattr__(name: str) -> type[EngineMethod]:
 def program_class(program: Program) -> type[EngineMethod]:
     """Return the class of a program, which is started for its description. Raise `UnusableProgram` if that fails."""
     module: Any = ModuleType(program.name, f"{program.name}, a program.")
-    environment = ProgramEnvironment(program.name, "", Path(shlex.join(program.words)), "", (), words=program.words)
+    environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), words=program.words)
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet()
@@ -66,18 +54,14 @@ def program_class(program: Program) -> type[EngineMethod]:
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)
-        for method in made.settings_for("variants"):
-            method.order  # noqa: B018 - for its exception
+        [method.order for method in made.settings_for("variants")]  # for its exception
     except Exception as error:  # of the program, or of its description, which can be wrong in any way
         raise UnusableProgram(program, error) from None
     return made
 
 
 def read_program(text: str, name: str = "", project: bool = False) -> Program:
-    """Return the program of an executable or a command line; its name is by default that of the last file in it.
-
-    Its file is the user's, or the project's, to which its paths are relative. Raise `BadInput` if the name cannot be used.
-    """
+    """Return the program of a command line, by default with the name of its last file. Raise `BadInput` for a bad name."""
     file = project_file() if project else user_file()
     words = [text] if Path(text).is_file() else shlex.split(text)
     files = [word for word in words if Path(word).is_file()]
@@ -90,20 +74,11 @@ def read_program(text: str, name: str = "", project: bool = False) -> Program:
     return Program(name, file, shlex.join(places.get(word, word) for word in words))
 
 
-def add(program: Program) -> Program:
-    """Register a program. Raise `UnusableProgram` if it cannot be used, or `BadInput` if its file cannot be changed."""
-    program_class(program)
-    return _edit(program, [f"{program.name} = {json.dumps(program.command)}"])
-
-
-def remove(name: str) -> Program:
-    """Take a program out of its file, and return it. Raise `BadInput` if the file cannot be changed."""
-    return _edit(list_programs()[name], [])
-
-
-def _edit(program: Program, new: list[str]) -> Program:
-    """Replace the line of a program in its file; all other lines stay."""
-    file, name = program.file, program.name
+def register(program: Program, undo: bool = False) -> Program:
+    """Write the line of a program into its file, or take it out; other lines stay. Raise `UnusableProgram` or `BadInput`."""
+    file, name, new = program.file, program.name, [] if undo else [f"{program.name} = {json.dumps(program.command)}"]
+    if new:
+        program_class(program)
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     numbers = key_lines("\n".join(lines))
     if place := numbers.get(("engines", name)):

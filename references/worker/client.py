@@ -58,9 +58,7 @@ class EngineTimeout(IntegrationFailed):
         super().__init__(f"The engine did not answer within {limit:g} s. Use a shorter run or a longer time limit")
 
 
-class Answer(dict[str, Any]):
-    """An answer; one without a field that is read is a failure of its engine."""
-
+class _Answer(dict[str, Any]):
     def __missing__(self, name: str) -> NoReturn:
         raise EngineCrashed(f"its answer has no `{name}`")
 
@@ -139,7 +137,7 @@ class Worker:
             raise NotImplementedError(answer["message"])
         if "error" in answer:
             raise EngineCrashed(f"{answer['error']}: {answer['message']}")
-        return Answer(answer)
+        return _Answer(answer)
 
     def greet(self) -> dict[str, Any]:
         """Return the answer of the program to `hello`. Raise as `ask`."""

@@ -13,8 +13,6 @@ from conservative.errors import require_extra
 from .options import allow_build_option, epilog, find_links_option, json_option, show
 
 if TYPE_CHECKING:
-    from conservative.programs import Program
-    from conservative.references.environments.environment import Environment
     from conservative.references.environments.install import Installation
 
 Value = TypeVar("Value")
@@ -69,9 +67,7 @@ def install(
 
 @engines.command(
     short_help="Register a program as an engine.",
-    epilog=epilog(
-        "conservative engines add ./my_engine", "conservative engines add 'node engine.js' --name my_engine --project"
-    ),
+    epilog=epilog("conservative engines add ./my_engine", "conservative engines add 'node engine.js' --project"),
 )
 @click.argument("command")
 @click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
@@ -79,11 +75,9 @@ def install(
 def add(command: str, name: str, project: bool) -> None:
     """Register COMMAND, an executable or a command line that speaks the protocol of references/PROTOCOL.md, as an engine."""
     require_extra("conservative engines", "environments")
-    from conservative.references.environments.programs import add, read_program
+    from conservative.references.environments.programs import read_program, register
 
-    from ..sections.environments import program_line
-
-    click.echo(f"{program_line(add(read_program(command, name, project)))}: added")
+    click.echo(f"{register(read_program(command, name, project))}: added")
 
 
 @engines.command(short_help="Test a program.", epilog=epilog("conservative engines check ./my_engine"))
@@ -118,17 +112,11 @@ def list_engines(as_json: bool) -> None:
 def remove(names: tuple[str, ...], as_json: bool) -> None:
     """Remove the environment of each NAME==VERSION, or all environments of NAME. A program is not an engine any more."""
     require_extra("conservative engines", "environments")
-    from conservative.programs import list_programs
-    from conservative.references.environments import programs
     from conservative.references.environments.install import remove
 
     from ..sections.environments import removal_line
 
-    def remove_each() -> Iterable[Environment | Program]:
-        for name in names:
-            yield from [programs.remove(name)] if name in list_programs() else remove(name)
-
-    _show(remove_each(), removal_line, as_json)
+    _show((gone for name in names for gone in remove(name)), removal_line, as_json)
 
 
 def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:

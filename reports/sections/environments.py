@@ -13,7 +13,7 @@ from ..document.model import Document, Paragraph
 def build() -> Document:
     """Return a line for each program and each environment, and one for each engine without any."""
     environments, programs = list_environments(), list_programs()
-    lines = [program_line(program) for program in programs.values()]
+    lines = [str(program) for program in programs.values()]
     for engine in (name for name in registry.list_engines() if name not in programs):
         mine = [environment for environment in environments if environment.engine == engine]
         lines += [_line(environment) for environment in mine] or [f"{engine}: no environment"]
@@ -34,11 +34,6 @@ def installation_line(done: Installation) -> str:
     return f"{name}: {how}, {len(environment.packages)} packages, {environment.runtime}{trouble}{advice}"
 
 
-def program_line(program: Program) -> str:
-    """Return the name, the command line and the file of a program."""
-    return f"{program.name}: {program.command} ({program.file})"
-
-
 def removal_line(gone: Environment | Program) -> str:
     """Return one line about a removed environment or program."""
-    return f"{program_line(gone) if isinstance(gone, Program) else f'{gone.engine}=={gone.version}'}: removed"
+    return f"{gone if isinstance(gone, Program) else f'{gone.engine}=={gone.version}'}: removed"

@@ -116,7 +116,7 @@ def test_a_program_that_cannot_be_used_is_not_registered(arguments, message, fol
 def test_a_program_that_is_gone_is_named_with_file_and_remedy(folder):
     (folder / "conservative.toml").write_text('[engines]\nmine = "build/mine"\n')
     code, text = run("run", "brick_flip", "--method", "mine")
-    problem = f"{folder}/conservative.toml: crashed ({folder}/build/mine cannot be started: No such file or directory)"
+    problem = f"{folder}/conservative.toml: crashed (build/mine cannot be started: No such file or directory)"
     remedy = "Build it or change it as PROTOCOL.md describes, or run: conservative engines remove mine"
     assert (code, text) == (2, f"Error: mine, a program of {problem}. {remedy}\n")
     assert select_engines(["mine"], skip_missing=True)[0].family == "missing"

@@ -17,7 +17,7 @@ from conservative.references.worker.client import close_workers
 PAGE = (Path(program.__file__).parents[1] / "PROTOCOL.md").read_text(encoding="utf-8")
 SAMPLES = dict(re.findall(r"^```(c|javascript|cpp|rust|csharp|julia)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
 LANGUAGES = {
-    "c": ("gcc -Wall -Wextra -Werror -O2 my_engine.c -o my_engine", "./my_engine"),
+    "c": ("gcc -Wall -Wextra -Werror -O2 my_engine.c -o my_engine -lm", "./my_engine"),
     "javascript": ("", "node my_engine.js"),
     "cpp": ("g++ -Wall -Wextra -Werror -O2 -std=c++17 my_engine.cpp -o my_engine", "./my_engine"),
     "rust": ("rustc -O my_engine.rs", "./my_engine"),
