@@ -5,6 +5,7 @@ Tests that do are marked. `pytest --all` runs them as well, except the random se
 """
 
 import os
+import shutil
 import signal
 import tarfile
 
@@ -19,7 +20,7 @@ MARKERS = {
     "attack": "searches for failures at random; runs with --attack",
     "late": "runs last, with kernels that other tests have compiled",
 }
-ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0"
+ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
 """Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
 
 # A shell starts background jobs with SIGINT ignored, nohup with SIGHUP ignored, and every process started from there inherits

@@ -64,7 +64,7 @@ def _run_npm(folder: Path, *arguments: str) -> Any:
     done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return json.loads(done.stdout)
-    words = re.sub(r"(?<=://)[^/@\s]+@", "", " ".join((done.stdout + done.stderr).split()))  # without passwords
+    words = " ".join((done.stdout + done.stderr).split())  # npm hides passwords
     summary = re.search(r'"summary": "([^"]*)', words)
     got = f"npm {arguments[0]} {arguments[-1]}, which failed ({summary[1][:300] if summary else words[-300:]})"
     raise BadInput("engine", got, "a network, a package that npm can install, and a disk with room")

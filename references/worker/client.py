@@ -34,6 +34,7 @@ TIME_LIMIT = 600.0
 LARGEST_FILE = 1 << 28
 """Largest file in bytes that a program with a memory limit may write, including its output."""
 _LAST_WORDS = 300
+_ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")  # above a stack, of Python and of Node
 _PATIENCE = 2.0  # s, for a program to end when its input closes
 
 _limit: ContextVar[float] = ContextVar("limit", default=TIME_LIMIT)
@@ -247,13 +248,13 @@ class Worker:
         return f"{how}{name}" + (f": {words}" if words else "")
 
     def _last_words(self) -> str:
-        """Return the last line of output. If Python printed a stack, return the line above it, which has the error."""
+        """Return the last line of output. If Python or Node printed a stack, return the line above it, with the error."""
         if self._output is None:
             return ""
         size = self._output.seek(0, os.SEEK_END)
         self._output.seek(max(0, size - 8192))
         lines = [line.strip() for line in self._output.read().decode(errors="replace").splitlines() if line.strip()]
-        stack = next((i for i, line in enumerate(lines) if line.startswith(("Fatal Python error", "Current thread"))), None)
+        stack = next((i for i, line in enumerate(lines) if line.startswith(_ERRORS)), None)
         words = lines if stack is None else lines[: stack + 1]
         return "".join(char if char.isprintable() else "?" for char in (words[-1] if words else ""))[:_LAST_WORDS]
 

@@ -117,8 +117,6 @@ while (!hello.endsWith('\n')) hello += read(1);
 // The end of the client also ends a loop of an engine: another thread waits for it.
 const socket = `new (require('net').Socket)({ fd: ${JSON.parse(hello).life} })`;
 new Worker(`${socket}.on('close', () => process.kill(process.pid, 'SIGKILL')).resume()`, { eval: true }).unref();
-// The client shows the last line of a crash: the message, below the stack.
-process.on('uncaughtException', (error) => process.exit((console.error(String(error)), 1)));
 writeSync(1, Buffer.from(`{"protocol": 1, "program": "node", "version": "${process.versions.node}", "framing": "binary"}\n`));
 for (;;) {
   const { do: name, forget, ...values } = receive();
