@@ -31,7 +31,7 @@ TIMES = (
     "conservative study work_precision --scenes brick_flip,lagrange_top"
     " --methods taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 )
-RANDOM = "conservative study random --bodies 20 --seed 1002 --methods gauss,projected,taylor,heyoka"
+RANDOM = "conservative study random --bodies 20 --seed 1003 --methods gauss,projected,taylor,heyoka"
 SCENES = (
     "conservative study work_precision --scenes brick_flip:t_end=24,lagrange_top:t_end=2,asymmetric_top --engines cyrk",
     "conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 --engines cyrk",

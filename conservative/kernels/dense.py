@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 from ..arithmetic import cosine, root, sine
 from . import entry, kernel
+from .axial import TINY
 from .lanes import REGISTER, load, save_columns
 from .protocol import Result, find_ends, loosen
 from .series import recall
 from .signals import call_handlers, end_of_block
-from .taylor import BETWEEN, ENOUGH, LEFT, TINY, Model, begin, correct, expand, find_sample, project
+from .taylor import BETWEEN, ENOUGH, LEFT, Model, begin, correct, expand, find_sample, project
 from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
 from .traced import trace

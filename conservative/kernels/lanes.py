@@ -261,6 +261,16 @@ else:
         return x
 
 
+def gather_numbers(values):
+    """Return the numbers of a tuple of tuples as an array for `load_rows`, and a tuple of zeros of the same arrangement."""
+
+    def clear(value):
+        parts = map(clear, value) if isinstance(value, tuple) else ()
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts) if isinstance(value, tuple) else 0.0
+
+    return np.array(_flatten(values), dtype=float), clear(values)
+
+
 join = trace(traced.join)
 
 

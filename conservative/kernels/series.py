@@ -340,9 +340,9 @@ def sum_orders(series, c, h, start, K, accelerate, turn, ratio):
         before = term
 
 
-def sum_to_order(series, c, order, h, start, K, accelerate, turn, ratio):
-    """Return the change of (g, a, w) in a step of an order and a length h, its last term, and the one before."""
-    sums = enumerate(sum_orders(series, c, series.spread(h), start, K, accelerate, turn, ratio), 1)
+def sum_to_order(order, sums):
+    """Return what `sums` yields for an order: it yields tuples of numbers for the orders 1, 2, ... up to the highest."""
+    sums = enumerate(sums, 1)
     if not isinstance(order, Traced):
         return next(found for n, found in sums if n == order)
     builder, exits = order.builder, []
@@ -364,9 +364,10 @@ def sum_to_order(series, c, order, h, start, K, accelerate, turn, ratio):
         if isinstance(values[0], tuple):
             parts = [merge(each) for each in zip(*values, strict=True)]
             return Axes(*parts) if isinstance(values[0], Axes) else tuple(parts)
-        phi = builder.phi(values[0].registers[0].type)
+        phis = [builder.phi(register.type) for register in values[0].registers]
         for (block, _), value in zip(exits, values, strict=True):
-            phi.add_incoming(value.registers[0], block)
-        return Symbol(builder, [phi])
+            for phi, register in zip(phis, value.registers, strict=True):
+                phi.add_incoming(register, block)
+        return Symbol(builder, phis)
 
     return merge([found for _, found in exits])

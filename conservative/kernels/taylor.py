@@ -19,17 +19,18 @@ Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 from ..potentials.turning import Turned
 from . import entry, kernel, small
-from .lanes import REGISTER, load_rows, save_columns, save_rows
-from .protocol import Result, Workspace, find_ends, loosen, record
-from .series import Series, Vectors, sum_to_order
+from .axial import FLAT, TINY, significant
+from .lanes import REGISTER, gather_numbers, load_rows, save_columns, save_rows
+from .protocol import Result, Workspace, loosen, record
+from .series import Series, Vectors, sum_orders, sum_to_order
 from .signals import call_handlers, end_of_block
 from .traced import trace
-from .vector import add, apply, choose, cross, dot, product, scale, some, subtract, times
+from .vector import accumulate, add, apply, choose, cross, dot, product, scale, some, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -41,12 +42,10 @@ ENOUGH, NOISE = 2.0**-50, 2.0**-46
 BETWEEN = 2.0**-24
 """Relative defect after which a step is not corrected further. Each step is projected onto the initial values, so what is left
 does not add up, and it is at most 1/4096 of the step's own error, whose square it is."""
-ROUND_OFF = 2.0**-50
-"""Relative defect up to which nothing is corrected."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect of a step before and after projection."""
-DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
-"""Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
+DEPENDENT = 1e-8
+"""Regularisation, relative, of the gradients' Gram determinant."""
 
 
 class Model(NamedTuple):
@@ -133,7 +132,8 @@ def expand(field, constants, order, h, K, g, a, w):
     turn = series.spread(field.rate) if isinstance(field, Turned) else None
     ratio = series.vector(*constants) if isinstance(field, Free) else None
     accelerate, terms = field.series(constants, g, series), Vectors(series, len(start))
-    change, last, before = sum_to_order(series, terms, order, h, start, series.vector(*K), accelerate, turn, ratio)
+    sums = sum_orders(series, terms, series.spread(h), start, series.vector(*K), accelerate, turn, ratio)
+    change, last, before = sum_to_order(order, sums)
     end = tuple(v + d for v, d in zip(start, change, strict=True))
     return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
 
@@ -142,12 +142,6 @@ def expand(field, constants, order, h, K, g, a, w):
 def take_step(field, constants, order, h, K, g, a, w):
     """Return the state after one step, not projected."""
     return expand(field, constants, order, h, K, g, a, w)[0]
-
-
-def significant(x, scale):
-    """Return x moved towards 0 by the round-off of the scale: continuous, so that noise is not amplified."""
-    least = ROUND_OFF * scale
-    return choose(x > least, x - least, choose(x < -least, x + least, 0.0))
 
 
 def straighten(g, a):
@@ -235,10 +229,37 @@ def correct(field, body, enough, g, a, w):
 
     The square of the defect remains, and the share that regularisation leaves of the part above round-off.
     """
-    g, a, w, defect, rest = find_correction(field, *body, g, a, w)
+    if hasattr(field, "advance"):
+        g, defect, rest = field.correct(g)
+    else:
+        g, a, w, defect, rest = find_correction(field, *body, g, a, w)
     beyond_noise = choose(defect > NOISE, defect - NOISE, 0.0)
     left = defect * defect + choose(rest < 1.0, rest, 1.0) * beyond_noise
     return g, a, w, left, (left > enough) & (defect < FAR)
+
+
+@trace
+def start_of(model):
+    """Return `begin`, and g, a, w and the sums of angles with what was rounded off."""
+    if hasattr(model.field, "advance"):
+        return ((), ()), (), (model.g, (), ()), model.a
+    body, K, w = begin(model)
+    return body, K, (model.g, model.a, w), ()
+
+
+@trace
+def advance(field, constants, order, h, K, g, a, w, angles):
+    """Return the state after one step, not projected, and the sums of angles."""
+    if not hasattr(field, "advance"):
+        return expand(field, constants, order, h, K, g, a, w)[0], angles
+    x, changes = field.advance(order, h, g)
+    return (x, a, w), tuple(accumulate(*each, change) for each, change in zip(angles, changes, strict=True))
+
+
+@trace
+def find_rows(field, g, a, w, angles):
+    """Return g, a and w of a state."""
+    return field.find_rows(g, [x for x, _ in angles]) if angles else (g, a, w)
 
 
 @partial(kernel, forceinline=True)
@@ -274,17 +295,17 @@ def quaternion(g, a):
 @partial(kernel, forceinline=True, ahead=True)
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step that cannot be projected fails; the size is the relative defect that remains."""
-    field, left, g, a = model.field, model.left, model.g, model.a
+    field, left = model.field, model.left
     order, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
-    body, K, w = begin(model)
-    constants, _, _, _ = body
+    body, K, (g, a, w), angles = start_of(model)
+    constants = body[0]
     record(0, model.q, model.L, q_out, L_out)
     row, corrections, until_sample, done, defect = 0, 0, every, 0, 0.0
     while done < n_steps and defect < LEFT:
         last = end_of_block(done, n_steps, pause)
         while done < last:
-            g1, a1, w1 = take_step(field, constants, order, h, K, g, a, w)
+            (g1, a1, w1), angles = advance(field, constants, order, h, K, g, a, w, angles)
             g, a, w, defect, needed = correct(field, body, BETWEEN, g1, a1, w1)
             g, a, w, more, defect = project(field, body, BETWEEN, g, a, w, defect, needed)
             corrections += 1 + more
@@ -298,6 +319,7 @@ def march(model, coefficients, workspace):
                 # The motion continues from the state before, so that it does not depend on the samples.
                 g1, a1, w1, more, _ = project(field, body, ENOUGH, g, a, w, defect, defect > ENOUGH)
                 corrections += more
+                g1, a1, w1 = find_rows(field, g1, a1, w1, angles)
                 record(row, product(left, quaternion(g1, a1)), times(model.J, w1), q_out, L_out)
         if done < n_steps:
             call_handlers()
@@ -305,14 +327,23 @@ def march(model, coefficients, workspace):
     return Result(done, done * order, corrections, taken * order, defect, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+@cache
+def enter_like(like):
+    """Return `march` as Python calls it, for a model and a step size arranged like `like`."""
+
+    @entry
+    def enter(numbers, order, n_steps, every, pause, q, L):
+        """Take the numbers of the model and the step size as an array: a named tuple as an argument takes 1.1 us."""
+        model, h = load_rows(numbers, 0, 1, like, 1)
+        return loosen(march(model, Coefficients(order, h), Workspace(n_steps, every, pause, q, L)))
+
+    return enter
 
 
-@entry
-def enter(*loose):
-    """`march` as Python calls it (`protocol`)."""
-    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+def bind(model, coefficients):
+    """Return `march` as Python calls it (`protocol`), without the arguments that are given here."""
+    numbers, like = gather_numbers((model, coefficients.h))
+    return partial(enter_like(like), numbers, coefficients.order)
 
 
 class Bodies(NamedTuple):

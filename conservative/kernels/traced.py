@@ -266,6 +266,28 @@ else:
         return function
 
 
+def lanes_like(number, values):
+    """Return floats as a number with a lane for each if `number` is of compiled code, otherwise as they are: an array."""
+    if not isinstance(number, Traced):
+        return values
+    floats = floats_in_register(len(values))
+    parts = (values[i : i + floats].tolist() for i in range(0, len(values), floats))
+    return Symbol(number.builder, [ir.Constant(ir.VectorType(DOUBLE, floats), part) for part in parts])
+
+
+def add_lanes(x):
+    """Return the sum of the lanes, added in any order."""
+    if not isinstance(x, Traced):
+        return float(sum(x))
+    whole, *rest = x.registers
+    for part in rest:
+        whole = x.builder.fadd(whole, part)
+    function_type = ir.FunctionType(DOUBLE, [DOUBLE, whole.type])
+    name = f"llvm.vector.reduce.fadd.v{whole.type.count}f64"
+    function = cgutils.get_or_insert_function(x.builder.module, function_type, name)
+    return Symbol(x.builder, [x.builder.call(function, [ir.Constant(DOUBLE, -0.0), whole], fastmath=("reassoc",))])
+
+
 def join(a, b, c, d):
     """Return four floats as one number with a lane per component; in plain Python an array."""
     symbol = next((x for x in (a, b, c, d) if isinstance(x, Traced)), None)

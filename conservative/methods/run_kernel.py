@@ -27,7 +27,8 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     """
     n, n_steps, t = grid.n_samples, grid.n_steps, grid.t
     q, L, of_R, of_w = np.empty((n, 4)), np.empty((n, 3)), (n, 3, 3), (n, 3)
-    enter, to_body_axes = partial(kernel.enter, *model, *coefficients, n_steps, grid.every), kernels("samples").to_body_axes
+    bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
+    enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
     counters = _NO_COUNTERS

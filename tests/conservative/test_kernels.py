@@ -120,6 +120,7 @@ def test_compiled_code_belongs_to_all_files_that_it_is_made_from(tmp_path: Path,
 
 
 NAMES = sorted({family.card.kernel for family in list_families().values() if family.card.kernel})
+LOOSE = [name for name in NAMES if name != "taylor"]  # which takes its numbers in an array
 
 
 def named(fields: type) -> Any:
@@ -132,7 +133,7 @@ def plain_enter(module: ModuleType) -> Any:
     return getattr(module.enter, "py_func", module.enter)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", LOOSE)
 def test_a_kernel_takes_loose_values_by_the_fields_of_its_tuples(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     module, result, handed = kernels(name), Result(1, 2, 3, None, 0.5, False), []
     monkeypatch.setattr(module, "march", lambda *parts: handed.append(parts) or result)
