@@ -124,10 +124,17 @@ CASES = [
     (cv.MoserVeselov(), free(21), 0.3),
     (cv.MoserVeselov(6), free(21), 0.1),
     (cv.MoserVeselov(), batch(BODY, 11), 0.3),
-    *((cv.Taylor(order), varied(field), dt) for field in FIELDS for order, dt in ((4, 0.01), (9, 0.05), (18, 0.1))),
+    *(
+        (cv.Taylor(order), varied(field), dt)
+        for field in FIELDS
+        if FIELDS[field][0]
+        for order, dt in ((4, 0.01), (9, 0.05), (18, 0.1))
+    ),
     *((cv.Taylor(12), varied("gravity", *units), 0.05 * units[1]) for units in ((1e-20, 1e-4), (1e20, 1e5), (1.0, 1e12))),
-    (cv.Taylor(14), tops(11), 0.1),
-    (cv.Taylor(14), tops(11, None), 0.1),
+    # A single free body or top has other unknowns: both agree where neither has a truncation error.
+    (cv.Taylor(18), varied("none"), 0.03),
+    (cv.Taylor(18), tops(11), 0.03),
+    (cv.Taylor(18), tops(11, None), 0.03),
     (cv.Taylor(14), batch(TOP, 11, ON_AXIS, PARTLY_SYMMETRIC), 0.1),
 ]
 
@@ -206,7 +213,7 @@ def test_bodies_without_a_step_are_not_finished() -> None:
     assert run(cv.Taylor(6), far, cv.Grid(0.2, 20)).finished.tolist() == [True, False, True, True, True, True, False]
 
 
-@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize("field", [field for field, (potential, _) in FIELDS.items() if potential])
 def test_a_body_that_fails_in_lanes_fails_as_it_does_alone(field: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Residuals differ by up to 5e-14 of their size."""
     method, bodies, grid = cv.Taylor(6), varied(field), cv.Grid(0.45, 40, 3)
