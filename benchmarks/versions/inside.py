@@ -7,6 +7,7 @@ The worker calls its functions, or prepares a run whose task is in `given`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
@@ -29,16 +30,20 @@ def prepare(given: SimpleNamespace) -> Callable[[], Any]:
 
 def list_methods(names: list[str]) -> Answer:
     """List the settings of the methods `names` in the suite, by default of all methods with the role `Role.OURS`."""
-    families = registry.list_families()
+    families: dict[str, Any] = dict(registry.list_families())
+    with suppress(ImportError):  # a version without programs
+        from conservative.programs import list_programs
+
+        families |= dict.fromkeys(set(list_programs()).difference(families))
     methods: list[Method] = []
-    for name in names or sorted(name for name, family in families.items() if family.role == Role.OURS):
-        if name in families:
+    for name in names or sorted(name for name, family in families.items() if family and family.role == Role.OURS):
+        if families.get(name):
             methods += _suite_settings(families[name])
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             methods.append(registry.method(name))
 
     def describe(method: Method) -> Answer:
-        engine = method.label if method.role == Role.ENGINE else ""
+        engine = method.label if method.role == Role.ENGINE and families[method.family] else ""
         return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
     return {"methods": [describe(method) for method in methods]}

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import io
+import shutil
 import subprocess
 import tarfile
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
+from conservative.programs import project_file
 from conservative.references.environments.environment import Environment
 from conservative.references.environments.lock import Source
 from conservative.references.environments.projects import build_project, environment_of, keep_wheel
+from conservative.references.worker.calls import python_worker
+from conservative.references.worker.client import Worker
+from conservative.version import VERSION
 
 from ..measures.origin import commit, git
 
@@ -67,9 +73,7 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     if name and path.is_dir():
         wheel = keep_wheel("", build_project(path, source))
         return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
-    commit_hash = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
-    if not commit_hash:
-        raise BadInput("against", repr(name), _ALLOWED)
+    commit_hash = _find_commit(name, project)
     return Version(name, commit_hash, environment_of(_wheel_of_commit(commit_hash, project, source), requirements, source))
 
 
@@ -78,16 +82,59 @@ def _wheel_of_commit(commit_hash: str, project: Path, source: Source) -> Path:
     inside, top = git(project, "rev-parse", "--show-prefix"), git(project, "rev-parse", "--show-toplevel")
 
     def make_wheel(folder: Path) -> Path:
-        sources, archive = folder / "sources", ["git", "-C", top, "archive", "--format=tar", commit_hash]
-        try:
-            done = subprocess.run(archive, capture_output=True, check=True, timeout=600)
-        except (OSError, subprocess.SubprocessError) as error:
-            raise BadInput("against", f"{commit_hash}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
-        with tarfile.open(fileobj=io.BytesIO(done.stdout)) as files:
-            if hasattr(tarfile, "data_filter"):  # not before 3.11.4
-                files.extraction_filter = tarfile.data_filter
-            files.extractall(sources)
+        sources = folder / "sources"
+        _take_out(commit_hash, top, sources)
         # setuptools-scm, and tools built on it, would look for a version in a repository
         return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{commit_hash[:12]}")(folder)
 
     return keep_wheel(f"{commit_hash}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
+
+
+def _find_commit(name: str, project: Path) -> str:
+    commit_hash = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
+    if not commit_hash:
+        raise BadInput("against", repr(name), _ALLOWED)
+    return commit_hash
+
+
+def _take_out(commit_hash: str, top: str, sources: Path) -> None:
+    archive = ["git", "-C", top, "archive", "--format=tar", commit_hash]
+    try:
+        done = subprocess.run(archive, capture_output=True, check=True, timeout=600)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise BadInput("against", f"{commit_hash}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as files:
+        if hasattr(tarfile, "data_filter"):  # not before 3.11.4
+            files.extraction_filter = tarfile.data_filter
+        files.extractall(sources)
+
+
+class Checkout(Environment):
+    """A folder in which a project in any language was built. Its file names the programs that this package runs."""
+
+    def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = 0) -> Worker:
+        return python_worker({"CONSERVATIVE_PROJECT": str(self.folder)}, memory)
+
+
+def build_version(name: str, command: str, folder: Path) -> Version:
+    """Return a version of the programs of a project, which a shell command builds: in its own folder, or a commit in `folder`.
+
+    Raises
+    ------
+    BadInput
+        There is no such version, or the command fails.
+    """
+    project, place, key = project_file().parent, Path(name).resolve(), ""
+    if not place.is_dir():
+        sources, key = Path(tempfile.mkdtemp(dir=folder)), _find_commit(name, project)
+        _take_out(key, git(project, "rev-parse", "--show-toplevel"), sources)
+        place = sources / git(project, "rev-parse", "--show-prefix")
+    done = subprocess.run(command, shell=True, cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode:
+        last = (done.stdout.split("\n")[-2:] or [""])[0]
+        got = f"{command!r}, which ends with exit code {done.returncode} for {name} ({last})"
+        raise BadInput("build", got, "a command that builds each version")
+    if not (place / "conservative.toml").exists():  # of before the programs were registered
+        shutil.copy(project_file(), place)
+    environment = Checkout("conservative", VERSION, place, "", ())
+    return Version(name if key else place.name, key or commit(place, mark_changes=True), environment)

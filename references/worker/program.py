@@ -183,6 +183,8 @@ def _split(numbers: Message, rows: list[str]) -> list[Message]:
 
 
 def _wall_time(run: Any, calls: int) -> float:
+    if inner := getattr(getattr(run, "own_loop", None), "wall_time", None):  # of another process, without the exchange with it
+        return float(inner(calls))
     renew: Callable[[], None] | None = getattr(run, "renew", None)
     if renew is None:
         start = perf_counter()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from conservative.errors import require_extra
+from conservative.errors import BadInput, require_extra
 
 from . import completion
 from .options import (
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 FILES = ("junit", "markdown", "html")
 OF_BASELINE = ("results", "baseline", "update")
-OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "find_links", "allow_build", *FILES)
+OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "build", "find_links", "allow_build", *FILES)
 
 
 @click.command(
@@ -37,6 +39,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
     epilog=epilog(
         "conservative gate --against main              compare the files in this folder with a branch; needs no baseline",
         "conservative gate --against v1.2 --methods my_method --html gate.html",
+        "conservative gate --against main --build 'cmake -B build && cmake --build build'",
         "pytest --benchmark --gate                     run benchmarks, compare with the baseline, keep the results",
         "conservative gate                             compare these results again",
         'conservative gate --update "Fewer corrections"   accept these results as the baseline, with the reason',
@@ -67,6 +70,11 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
 )
 @click.option(
     "--processes", type=click.IntRange(2), metavar="N", help="With --against: number of processes per version.  [default: 7]"
+)
+@click.option(
+    "--build",
+    metavar="COMMAND",
+    help="With --against: compare the programs of conservative.toml, in any language. COMMAND builds a version in its folder.",
 )
 @find_links_option
 @allow_build_option
@@ -146,7 +154,9 @@ def _compare(options: dict[str, Any]) -> Document:
         A version or a scene cannot be used, or neither version has a method.
     """
     from conservative.benchmarks.versions.project import compare_projects
-    from conservative.benchmarks.versions.version import Version, install_version
+    from conservative.benchmarks.versions.version import Version, build_version, install_version
+    from conservative.programs import list_programs, project_file
+    from conservative.references.environments.environment import temporary_folder
     from conservative.references.environments.lock import Source
 
     from ..run.provenance import provenance
@@ -155,15 +165,23 @@ def _compare(options: dict[str, Any]) -> Document:
 
     made = provenance().facts
     source, head = Source(options["find_links"], options["allow_build"]), options["project"] or "."
+    programs = [each.name for each in list_programs().values() if each.file == project_file()]
+    if options["build"] and not programs:
+        raise BadInput("build", "no program", "one in the project: conservative engines add ./my_engine --project")
     project = Path(head) if Path(head).is_dir() else Path()
     asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}
+    if options["build"]:
+        asked = {"methods": programs, **asked}
     if options["processes"]:
         asked["processes"] = options["processes"]
 
     def prepare(name: str) -> Version:
         click.echo(f"preparing {name}", err=True)
+        if options["build"]:
+            return build_version(name, options["build"], Path(folder))
         return install_version(name, project, source, options["requirements"])
 
-    base, latest = prepare(options["against"]), prepare(head)
-    with progress() as step:
-        return build(compare_projects(base, latest, tell=step, **asked), made)
+    with TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
+        base, latest = prepare(options["against"]), prepare(head)
+        with progress() as step:
+            return build(compare_projects(base, latest, tell=step, **asked), made)
