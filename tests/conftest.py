@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import tarfile
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +22,7 @@ MARKERS = {
     "late": "runs last, with kernels that other tests have compiled",
 }
 ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
+ENGINES += ",ode,bullet" * all(Path("/usr/include", name).exists() for name in ("ode", "bullet", "nlohmann"))
 """Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
 
 # A shell starts background jobs with SIGINT ignored, nohup with SIGHUP ignored, and every process started from there inherits

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
-from ..environments.adapter import LocalEngine, method_class, read_script
+from ..environments.adapter import SCRIPTS, LocalEngine, method_class, read_script
 from ..environments.engine_method import EngineMethod, engine_class
 from . import mujoco as _mujoco
 from . import pinocchio as _pinocchio
@@ -17,5 +17,6 @@ Pinocchio = method_class(_pinocchio, LocalEngine)
 def __getattr__(name: str) -> type[EngineMethod]:
     if name.startswith("_"):
         raise AttributeError(name)
-    script = Path(__file__).with_name(f"{name}.mjs")
-    return engine_class(read_script(script) if script.is_file() else import_module(f"{__package__}.{name}"))
+    scripts = (Path(__file__).with_name(name + suffix) for suffix in SCRIPTS)
+    script = next((each for each in scripts if each.is_file()), None)
+    return engine_class(read_script(script) if script else import_module(f"{__package__}.{name}"))

@@ -82,14 +82,18 @@ class EngineData(Distribution):
     card: Mapping[str, Any] = field(default_factory=dict)
 
 
+SCRIPTS = {".mjs": "npm", ".cpp": "apt"}
+"""Suffixes of adapters that are not in Python, and the kinds of their environments."""
+
+
 @cache
 def read_script(path: Path) -> ModuleType:
-    """Return a module with the first comment and `ENGINE`, JSON, of an adapter in JavaScript, and the data that most share."""
-    words, _, code = path.read_text(encoding="utf-8").partition("*/")
-    data, _ = json.JSONDecoder().raw_decode(code.partition("ENGINE = ")[2])
-    common = {"kind": "npm", "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
+    """Return a module with the first comment and `ENGINE`, JSON, of an adapter in another language, and what most share."""
+    words, _, code = path.read_text(encoding="utf-8").partition("ENGINE = ")
+    data, _ = json.JSONDecoder().raw_decode(code.replace("\n *", "\n"))
+    common = {"kind": SCRIPTS[path.suffix], "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
     card = {"variants": ("", "as_installed=true"), "as_installed": ("as_installed=true",)}
-    module = ModuleType(f"{__package__}.{path.stem}", words[3:].replace("\n *", "\n"))
+    module = ModuleType(f"{__package__}.{path.stem}", words[3:].partition("*/")[0].replace("\n *", "\n"))
     vars(module).update(__file__=str(path), ENGINE=common | {"fields": ("UniformGravity",), "card": card} | data)
     return module
 

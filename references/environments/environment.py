@@ -9,10 +9,12 @@ FOLDER is `engines` in the cache folder that platformdirs returns for this packa
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
 import shutil
+import subprocess
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -92,7 +94,7 @@ class Environment:
     engine, version
         Name of the engine, such as `bsk`, and its version.
     folder
-        The virtual environment, or the folder of `node_modules`.
+        The virtual environment, the folder of `node_modules`, or that of the compiled program.
     runtime
         Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
@@ -146,6 +148,7 @@ class Environment:
 COMMANDS: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "python": lambda folder: (interpreter_of(folder), "-I", program.__file__),
     "npm": lambda folder: (find_node("node"), Path(program.__file__).with_suffix(".mjs"), folder),
+    "apt": lambda folder: (build(folder),),
 }
 """Kinds of environments, and the command line of the program that runs the engine in a folder of each kind."""
 _workers: dict[tuple[Path, str, int], Worker] = {}
@@ -181,6 +184,26 @@ def find_node(name: str) -> str:
     if path := shutil.which(name):
         return path
     raise BadInput("engine", f"an engine in JavaScript, but no {name} on this machine", NODE)
+
+
+def build(folder: Path) -> Path:
+    """Return the program of an engine in C++, compiled again if its sources have changed. Raise `BadInput` if that fails."""
+    sources = Path(__file__).parents[1] / "engines" / f"{folder.parent.name}.cpp", Path(program.__file__).with_suffix(".hpp")
+    done = folder / f"program-{hashlib.sha256(b''.join(each.read_bytes() for each in sources)).hexdigest()[:16]}"
+    if not done.is_file():
+        new, lock = done.with_suffix(f".{os.getpid()}"), (folder / LOCK).read_text(encoding="utf-8")
+        libraries = run_tool("pkg-config", "--cflags", "--libs", *re.findall(r"^[^=]+", lock, re.MULTILINE)).split()
+        run_tool("g++", "-O2", sources[0], "-o", new, *libraries, "-std=c++17")
+        new.rename(done)
+    return done
+
+
+def run_tool(*command: str | Path, advice: str = "packages as in `conservative engines install`, which checks them") -> str:
+    """Return the output of a command. Raise `BadInput` if it fails."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BadInput("engine", f"{command[0]}, which failed ({' '.join(done.stderr.split())[:300]})", advice)
+    return done.stdout.strip()
 
 
 def folder_of_all() -> Path:

@@ -18,8 +18,8 @@ from conservative.files import remove_leftovers, temporary
 from conservative.programs import Program, list_programs
 
 from ..worker.client import EngineCrashed, EngineTimeout
+from . import apt, npm
 from . import lock as python_packages
-from . import npm
 from .environment import (
     BUILD,
     LOCK,
@@ -41,7 +41,7 @@ from .lock import Lock, Source, find_python, normal_name, resolve_wheel, split_r
 from .programs import register
 from .uv_command import UvFailed, run_uv
 
-_KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm}
+_KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm, "apt": apt}
 """Modules that lock, fill and list the versions of environments: functions `resolve`, `fill` and `list_versions`."""
 _EPOCH = "315532800"  # 1980, the first date in zip files, so that the same sources give the same wheel
 

@@ -11,6 +11,9 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.errors import BadInput
+from conservative.references.environments import apt
+from conservative.references.environments.environment import Distribution
 from conservative.references.environments.install import install
 from conservative.references.environments.lock import Source
 
@@ -93,6 +96,10 @@ ROWS = {
     ("mujoco_js", "Euler"): ENERGY_GROWS,
     ("mujoco_js", "implicit"): ENERGY_DECAYS,
     ("cannon_es", ""): NO_GYROSCOPIC_MOTION,
+    ("ode", "finite"): (1.55, -0.13, 0.06, None),
+    ("bullet", "body"): ENERGY_DECAYS,
+    ("bullet", "world"): ENERGY_DECAYS,
+    ("bullet", "explicit"): ENERGY_GROWS,
     ("oimo", ""): NO_GYROSCOPIC_MOTION,
     ("havok", ""): NO_GYROSCOPIC_MOTION,
     ("lammps", "nve"): (4.0e-4, None, None, 2),
@@ -192,6 +199,8 @@ DEFAULTS = {
     "havok": ("as installed,f32", (0.51, -0.7, 0.45, None)),
     "cannon_es": ("as installed", (4.8e-2, -0.11, 0.059, None)),
     "mujoco_js": ("Euler", ENERGY_GROWS),
+    "ode": ("infinitesimal", (1.55, -0.13, 0.06, None)),
+    "bullet": ("body,as installed", ENERGY_DECAYS),
 }
 
 
@@ -208,6 +217,14 @@ def test_an_engine_as_installed(engine):
 def test_an_engine_without_a_default_has_none(engine):
     install(engine)
     assert registry.engine(engine).settings_for("as_installed") == ()
+
+
+@pytest.mark.engine("ode")
+def test_an_engine_whose_package_the_system_does_not_have():
+    with pytest.raises(BadInput, match="apt install libnone-dev nlohmann-json3-dev"):
+        apt.resolve(Distribution("libnone-dev", "none"), "", Source())
+    with pytest.raises(BadInput, match="the version of the system"):
+        apt.resolve(registry.engine("ode").data, "0.0.1", Source())
 
 
 @pytest.mark.engine("jsbsim")
@@ -253,6 +270,11 @@ ERRORS = {
     ("mujoco_js", "RK4"): (9.13e-6, 2),
     ("mujoco_js", "Euler"): EULER,
     ("cannon_es", ""): (WITHOUT_GYROSCOPIC, 0),
+    ("ode", "finite"): (2.72e-2, 1),
+    ("ode", "infinitesimal"): (2.73e-2, 1),
+    ("bullet", "body"): (1.7e-2, 1),
+    ("bullet", "world"): (1.7e-2, 1),
+    ("bullet", "explicit"): (3.85e-3, 1),
     ("oimo", ""): (WITHOUT_GYROSCOPIC, 0),
     ("havok", ""): (WITHOUT_GYROSCOPIC, 0),
 }
