@@ -100,6 +100,8 @@ ROWS = {
     ("bullet", "body"): ENERGY_DECAYS,
     ("bullet", "world"): ENERGY_DECAYS,
     ("bullet", "explicit"): ENERGY_GROWS,
+    ("simbody", "RungeKuttaMerson"): (7.9e-4, 2e-8, 5e-7, 5),
+    ("simbody", "accuracy=1e-10"): (1.2e-7, None, None, None),
     ("oimo", ""): NO_GYROSCOPIC_MOTION,
     ("havok", ""): NO_GYROSCOPIC_MOTION,
     ("lammps", "nve"): (4.0e-4, None, None, 2),
@@ -201,6 +203,7 @@ DEFAULTS = {
     "mujoco_js": ("Euler", ENERGY_GROWS),
     "ode": ("infinitesimal", (1.55, -0.13, 0.06, None)),
     "bullet": ("body,as installed", ENERGY_DECAYS),
+    "simbody": ("RungeKuttaMerson,accuracy=0.001", (7.9e-4, None, None, None)),
 }
 
 
@@ -275,6 +278,8 @@ ERRORS = {
     ("bullet", "body"): (1.7e-2, 1),
     ("bullet", "world"): (1.7e-2, 1),
     ("bullet", "explicit"): (3.85e-3, 1),
+    ("simbody", "RungeKuttaMerson"): (2.8e-10, 4),
+    ("simbody", "Verlet"): (4.6e-5, 2),
     ("oimo", ""): (WITHOUT_GYROSCOPIC, 0),
     ("havok", ""): (WITHOUT_GYROSCOPIC, 0),
 }
