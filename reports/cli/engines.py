@@ -72,12 +72,13 @@ def install(
 @click.argument("command")
 @click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
 @click.option("--project", is_flag=True, help="Register it in conservative.toml of this project, not for the user.")
-def add(command: str, name: str, project: bool) -> None:
+@json_option
+def add(command: str, name: str, project: bool, as_json: bool) -> None:
     """Register COMMAND, an executable or a command line that speaks the protocol of references/PROTOCOL.md, as an engine."""
     require_extra("conservative engines", "environments")
     from conservative.references.environments.programs import read_program, register
 
-    click.echo(f"{register(read_program(command, name, project))}: added")
+    _show([register(read_program(command, name, project))], lambda program: f"{program}: added", as_json)
 
 
 @engines.command(short_help="Test a program.", epilog=epilog("conservative engines check ./my_engine"))
