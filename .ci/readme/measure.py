@@ -32,9 +32,10 @@ TIMES = (
     " --methods taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 )
 RANDOM = "conservative study random --bodies 20 --seed 1003 --methods gauss,projected,taylor,heyoka"
+METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 SCENES = (
-    "conservative study work_precision --scenes brick_flip:t_end=24,lagrange_top:t_end=2,asymmetric_top --engines cyrk",
-    "conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 --engines cyrk",
+    f"conservative study work_precision --scenes brick_flip:t_end=24,lagrange_top:t_end=2,asymmetric_top {METHODS}",
+    f"conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 {METHODS}",
 )
 MANY = "conservative study throughput --methods taylor,heyoka,mujoco --sizes 1024"
 PRICE = "conservative study price"
