@@ -121,7 +121,7 @@ def render_many() -> str:
 
 
 def render_price() -> str:
-    """Return what runs cost in a new process, a row for each side, the least in bold."""
+    """Return the rows of the table of prices, one for each side, with the lowest values in bold."""
     rows, (_, versions, _) = [row for row in read_rows() if part_of(row) == PRICE], read_values()
     quantities = {row["quantity"]: row["unit"] for row in rows}
     value = {(row["name"], row["quantity"]): float(row["value"]) for row in rows}

@@ -1,4 +1,4 @@
-"""What explains the error of a recorded motion: hypotheses, each another reading of the data or another motion."""
+"""Hypotheses that may explain the error of a recorded motion: each is another reading of the data, or another motion."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def machine() -> dict[str, str]:
 
 
 def machine_title() -> str:
-    """Return what round-off depends on: processor (on Linux with family and model), architecture and numba's version."""
+    """Return processor (on Linux with family and model), architecture and the version of numba: round-off depends on them."""
     numbers = first_values("/proc/cpuinfo")
     model = [f"{key} {numbers[key]}" for key in ("cpu family", "model") if key in numbers]
     return ", ".join((" ".join([machine()["processor"], *model]), platform.machine(), f"numba {metadata.version('numba')}"))

@@ -341,7 +341,7 @@ def sum_orders(series, c, h, start, K, accelerate, turn, ratio):
 
 
 def sum_to_order(order, sums):
-    """Return what `sums` yields for an order: it yields tuples of numbers for the orders 1, 2, ... up to the highest."""
+    """Return the tuple of numbers that `sums` yields for an order; it yields one for each order 1, 2, ... up to the highest."""
     sums = enumerate(sums, 1)
     if not isinstance(order, Traced):
         return next(found for n, found in sums if n == order)

@@ -25,7 +25,7 @@ def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
 
 
 def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-    """Compile the program. Return what runs the engine, such as `g++ 12.2.0`, and the packages."""
+    """Compile the program. Return the runtime of the engine, such as `g++ 12.2.0`, and the packages."""
     build(folder)
     return f"g++ {run_tool('g++', '-dumpfullversion')}", tuple(lock.text.splitlines())
 

@@ -90,7 +90,7 @@ def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
 
 
 def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-    """Create a virtual environment from a lock. Return what runs the engine, such as `Python 3.11.4`, and its packages."""
+    """Create a virtual environment from a lock. Return the runtime of the engine, such as `Python 3.11.4`, and its packages."""
     python = interpreter_of(folder)
     run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
     options = ("--quiet", "--require-hashes", "--python", python)

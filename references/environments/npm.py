@@ -33,7 +33,7 @@ def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
 
 
 def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-    """Install the packages of a lock. Return what runs the engine, such as `Node 20.20.2`, and its packages."""
+    """Install the packages of a lock. Return the runtime of the engine, such as `Node 20.20.2`, and its packages."""
     ask = [find_node("node"), "-p", "process.versions.node"]
     node = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
     if version_key(node) < version_key("20"):

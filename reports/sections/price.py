@@ -1,4 +1,4 @@
-"""The study of prices: what runs cost in a new process, as medians over random bodies."""
+"""The study of prices: times of runs in a new process, as medians over random bodies."""
 
 from __future__ import annotations
 
