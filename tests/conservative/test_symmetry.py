@@ -148,12 +148,14 @@ PAIRS = [(method, kind) for method in ours() for kind in KINDS if supported(meth
 def test_symmetries_hold(method, kind, data):
     case = data.draw(cases(kind))
     plain = run(method, case.scene)
+    # The steps that a tolerance chooses depend on the direction and the start: measured 8e-12 in 150 cases of 1e-9.
+    bound = max(ROUND_OFF, 0.1 * (getattr(method, "tolerance", None) or 0.0))
     for symmetry in SYMMETRIES:
         if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
             continue  # equal moments have no axes of their own, and its error depends on the axes
         R, w = symmetry(method, case, plain)
-        assert angle_between(plain.R_WB, R).max() < ROUND_OFF, symmetry.__name__
-        assert np.abs(plain.w_WB_B - w).max() < ROUND_OFF, symmetry.__name__
+        assert angle_between(plain.R_WB, R).max() < bound, symmetry.__name__
+        assert np.abs(plain.w_WB_B - w).max() < bound, symmetry.__name__
 
 
 def test_a_top_is_symmetric_in_any_axes() -> None:
