@@ -195,6 +195,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "environments": ("uv", "platformdirs"),
         "report": ("click", "rich", "jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
+        "parquet": ("pyarrow",),
         "cluster": ("distributed", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }

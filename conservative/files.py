@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from .errors import NotWritten
 
@@ -29,7 +29,7 @@ except ImportError:  # not POSIX: no locks, so leftovers are unknown
 
 
 @contextmanager
-def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
+def text_file(target: Path, argument: str) -> Iterator[io.TextIOWrapper]:
     """Yield a text stream whose contents become the file `target` when the block succeeds.
 
     A file that cannot be written is an error before the block. A link stays a link, a file keeps its permissions, and a device

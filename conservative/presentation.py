@@ -22,11 +22,15 @@ if TYPE_CHECKING:
 COLUMNS = (
     "t",
     *(f"R_WB_{row}{column}" for row in "123" for column in "123"),
+    *(f"q_WB_{part}" for part in "wxyz"),
     *(f"w_WB_B_{axis}" for axis in "123"),
     "energy",
     *(f"momentum_W_{axis}" for axis in "123"),
 )
-"""Columns of a table of samples: s; R_WB by rows; rad/s, body axes; J; kg m^2/s, world axes."""
+"""Columns of a table of samples: attitudes by rows and as quaternions, rates in body axes, momentum in world axes."""
+
+UNITS = {"t": "s", "w": "rad/s", "energy": "J", "momentum": "kg m^2/s"}
+"""Units of the columns, by the first part of their names; attitudes have none."""
 
 LEAST_DRAWN = 1e-17
 """Smallest relative drift in a chart, also drawn for smaller ones and 0: a tenth of the round-off of one number."""
@@ -38,9 +42,16 @@ _WIDTH, _HEIGHT = 480, 160
 
 
 def samples(trajectory: Any) -> Array:
-    """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
+    """Return a row for each of n samples under `COLUMNS`, (n, 21): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
-    return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
+    attitudes = R_by_rows, trajectory.quaternion_wxyz
+    return np.column_stack([trajectory.t, *attitudes, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
+
+
+def header() -> list[str]:
+    """Return the columns with their units, such as `w_WB_B_1 (rad/s)`."""
+    units = {name: UNITS.get(name.split("_")[0]) for name in COLUMNS}
+    return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
 
 
 def table(trajectory: Any) -> pandas.DataFrame:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import invariants, presentation
-from .attitude import Array, orthonormality
+from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest
 from .grid import Grid
@@ -74,6 +74,11 @@ class Trajectory:
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
 
     @property
+    def quaternion_wxyz(self) -> Array:
+        """Attitudes as unit quaternions (n, 4), body to world, scalar first and not negative."""
+        return to_quaternion(self.R_WB)
+
+    @property
     def work(self) -> dict[str, int]:
         """Counts of work by name, without those that the method does not provide."""
         return {name: count for name, count in vars(self.counters).items() if count is not None}
@@ -98,8 +103,20 @@ class Trajectory:
         R = self.scene.in_field_axes(self.R_WB, self.t)
         return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)
 
+    def error(self, truth: Trajectory) -> Array:
+        """Return the attitude error (n,), rad: the angle between this attitude and that of `truth` at each sample.
+
+        Raises
+        ------
+        BadInput
+            The two do not have samples at the same times.
+        """
+        if len(self) != len(truth) or not np.allclose(self.t, truth.t, rtol=1e-12, atol=0):
+            raise BadInput("truth", repr(truth), f"a trajectory with the times of {self!r}")
+        return angle_between(truth.R_WB, self.R_WB)
+
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row for each sample: t, R_WB (by rows), w_WB_B, energy, momentum_W; units as above.
+        """Return a table with a row for each sample: t, R_WB (by rows), q_WB, w_WB_B, energy, momentum_W; units as above.
 
         Raises
         ------

@@ -62,7 +62,7 @@ def requirements(wheel):
 @pytest.mark.slow
 def test_five_packages_are_required_and_no_more(requirements):
     assert requirements[""] == LEAN
-    assert set(requirements) == {"", "engines", "environments", "report", "ensembles", "cluster", "gate", "all", "dev"}
+    assert set(requirements) == {"", "all", "dev", *EXTRAS}
 
 
 @pytest.mark.slow

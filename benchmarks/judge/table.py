@@ -28,7 +28,7 @@ _RATES = r"(w|omega|wwbb|gyro|(?:body)?rates?|(?:body)?ang(?:ular)?(?:vel(?:ocit
 COLUMNS: dict[str, tuple[str, Sequence[Sequence[str]]]] = {
     "time": (r"(time|timestamp|(?=t$))(t?)", ([""], "t")),
     "rates": (rf"{_RATES}([xyz123pqr]|roll|pitch|yaw)", (*_AXES, "pqr")),
-    "quaternion": (r"(q|quat|quaternion|orientation|rotation|attitude)([wxyz0-4])", ("wxyz", "0123", "1234")),
+    "quaternion": (r"(q|qwb|quat|quaternion|orientation|rotation|attitude)([wxyz0-4])", ("wxyz", "0123", "1234")),
     "matrix": (r"(r|m|rwb|dcm|rotation|matrix)([0-3]{2})", _MATRIX),
     "angles": (r"(euler|eulerangles?|angles?|(?=roll|pitch|yaw))([xyz123]|roll|pitch|yaw)", _AXES),
 }

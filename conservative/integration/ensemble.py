@@ -94,8 +94,8 @@ class Ensemble:
         Parameters
         ----------
         rows
-            "samples": index of the body, t, R_WB (by rows), w_WB_B, energy, momentum_W, without samples after a failure. A
-            million rows take about 140 MB. "bodies": outcome, time reached, s, and largest drifts, with the index of the body.
+            "samples": index of the body, t, R_WB (by rows), q_WB, w_WB_B, energy, momentum_W, without samples after a failure.
+            A million rows take about 180 MB. "bodies": outcome, time reached, s, and largest drifts, by the index of the body.
 
         Raises
         ------

@@ -37,24 +37,43 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
 @t_end_option
 @json_option
-@click.option("--csv", type=Output("t,R_WB_11,"), help="Write t, R_WB, w_WB_B, energy and momentum of each sample.")
-def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
-    """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
+@click.option(
+    "--truth/--no-truth",
+    default=None,
+    help="Errors against the reference solution, at 200 samples.  [default: unless it takes long]",
+)
+@click.option(
+    "--csv", type=Output("t (s),R_WB_11,"), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample."
+)
+@click.option("--parquet", type=Output("PAR1"), help="Write the same as a Parquet file.")
+def run(
+    scene: str,
+    methods: tuple[str, ...],
+    dt: float | None,
+    t_end: float | None,
+    truth: bool | None,
+    as_json: bool,
+    csv: Path | None,
+    parquet: Path | None,
+) -> None:
+    """Integrate SCENE once and print its errors, drifts and final state; with several methods, a table.
 
-    Every step is stored. Longer runs store a million evenly spaced samples. If the run fails, the CSV file contains the samples
+    Every step is stored. Longer runs store a million evenly spaced samples. If the run fails, the files contain the samples
     before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")
+    if parquet is not None:
+        require_extra("conservative run --parquet", "parquet", "pyarrow")
     from ..run.single_run import compare, run_once
     from ..sections.run import build
     from ..terminal.progress import progress, show_waiting
 
     if len(methods) > 1:
-        if csv is not None:
-            raise click.UsageError("--csv holds the samples of one method; give --method once.")
+        if csv is not None or parquet is not None:
+            raise click.UsageError("--csv and --parquet hold the samples of one method; give --method once.")
         with progress() as step:
-            summaries = compare(scene, methods, dt, t_end, step)
+            summaries = compare(scene, methods, dt, t_end, truth, step)
     else:
         with show_waiting(": ".join([scene, *methods])):
-            summaries = [run_once(scene, methods[0] if methods else None, dt, t_end, csv)]
+            summaries = [run_once(scene, methods[0] if methods else None, dt, t_end, truth, csv, parquet)]
     show(build(summaries), as_json)

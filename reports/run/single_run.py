@@ -5,23 +5,26 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from conservative import registry
 from conservative.attitude import angle_between, orthonormality
-from conservative.errors import BadInput
+from conservative.errors import BadInput, MissingEngine
 from conservative.files import text_file
 from conservative.grid import Grid, grid_for
 from conservative.integration.one import integrate, read_method, require_support
 from conservative.invariants import sizes
 from conservative.method import Method
-from conservative.presentation import COLUMNS
+from conservative.presentation import header
 from conservative.presentation import samples as samples_of
 from conservative.references.exact.method import Exact
+from conservative.references.truth import solve
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -35,12 +38,22 @@ TIMED = 0.2
 """Time, s, for which a run of a table is repeated; a longer one is made once."""
 FIRST_STEPS = 10
 """Steps of the run that compiles a method before it is timed."""
+COMPARED = 200
+"""Largest number of samples that are compared with the reference solution, evenly chosen."""
+TURNS = 1000.0
+"""Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
 
 
 def run_once(
-    scene_name: str, method_name: str | None, dt: float | None, t_end: float | None, samples: Path | None
+    scene_name: str,
+    method_name: str | None,
+    dt: float | None = None,
+    t_end: float | None = None,
+    truth: bool | None = None,
+    csv_file: Path | None = None,
+    parquet_file: Path | None = None,
 ) -> dict[str, Any]:
-    """Integrate and return the summary; samples go to the file `samples` if there is one, one line each, with every digit.
+    """Integrate and return the summary, with the errors (`find_errors`); samples go to the files, with every digit.
 
     Raises
     ------
@@ -52,22 +65,51 @@ def run_once(
     scene = registry.scene(scene_name)
     method = read_method(method_name or None, scene)
     grid = bounded_grid(scene, method, dt, t_end)
-    with text_file(samples, "csv") if samples else nullcontext() as stream:
+    with ExitStack() as stack:
+        stream = stack.enter_context(text_file(csv_file, "csv")) if csv_file else None
+        binary = stack.enter_context(text_file(parquet_file, "parquet")).buffer if parquet_file else None
         trajectory = _integrate(scene, method, grid)
         if stream is not None:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(COLUMNS)
+            writer.writerow(header())
             writer.writerows(samples_of(trajectory).tolist())
-    return summarize(trajectory, method, grid.dt)
+        if binary is not None:
+            binary.write(trajectory.to_pandas().set_axis(header(), axis=1).to_parquet(index=False))
+    return summarize(trajectory, method, grid.dt) | {"error": find_errors(trajectory, grid, truth)}
+
+
+def find_errors(trajectory: Trajectory, grid: Grid, wanted: bool | None) -> dict[str, Any]:
+    """Return the largest errors against the reference solution, or the reason why there are none.
+
+    At most `COMPARED` samples are compared. `attitude` is in rad and `rate` in rad/s. `wanted` None leaves out long runs
+    without closed form (`TURNS`).
+    """
+    scene = trajectory.scene
+    if wanted is False:
+        return {"reason": "not computed (--no-truth)"}
+    if not trajectory.ok:
+        return {"reason": "not computed, because the run did not reach its end"}
+    if wanted is None and Exact().unsupported(scene) is not None and np.linalg.norm(scene.w_WB_B0) * trajectory.t[-1] > TURNS:
+        return {"reason": "not computed, because the reference solution of a long run takes long; --truth computes it"}
+    stride = math.ceil(grid.n_samples / COMPARED)
+    try:
+        truth = solve(scene, replace(grid, every=grid.every * stride))
+    except MissingEngine as missing:
+        return {"reason": f"not computed: {missing}"}
+    if not truth.ok:
+        return {"reason": f"not computed: the reference solution ended: {truth.outcome}"}
+    compared = np.unique([*range(0, len(trajectory), stride), len(trajectory) - 1])
+    attitude = angle_between(truth.R_WB, trajectory.R_WB[compared])
+    rate = np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[compared], axis=1)
+    return {"attitude": float(attitude.max()), "rate": float(rate.max()), "samples": len(compared), "truth": truth.label}
 
 
 def compare(
-    scene_name: str, method_names: Sequence[str], dt: float | None, t_end: float | None, step: Step
+    scene_name: str, method_names: Sequence[str], dt: float | None, t_end: float | None, truth: bool | None, step: Step
 ) -> list[dict[str, Any]]:
-    """Return the summary of each method on a scene, with its wall time and the attitude error at the end of the run.
+    """Return the summary of each method on a scene, with its wall time and its errors (`find_errors`).
 
-    `wall_time`, s, is that of the fastest run after a short first one, which compiles. `attitude_error`, rad, is relative to
-    the exact solution. It is None if no exact solution is known, or the run did not reach its end.
+    `wall_time`, s, is that of the fastest run after a short first one, which compiles.
 
     Raises
     ------
@@ -80,20 +122,17 @@ def compare(
     runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in map(registry.method, method_names)]
     for method, _ in runs:
         _ = method.label  # raises `MissingEngine`
-    exact = Exact()
     summaries = []
     for number, (method, grid) in enumerate(runs):
         step(number / len(runs), method.name)
         _integrate(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
-        wall_time, error, begin = math.inf, None, perf_counter()
+        wall_time, begin = math.inf, perf_counter()
         while wall_time == math.inf or perf_counter() - begin < TIMED:
             start = perf_counter()
             trajectory = _integrate(scene, method, grid)
             wall_time = min(wall_time, perf_counter() - start)
-        if trajectory.ok and exact.unsupported(scene) is None:
-            truth = exact.solve(scene, Grid(grid.dt * grid.n_steps, 1))
-            error = float(angle_between(trajectory.R_WB[-1:], truth.R_WB[-1:])[0])
-        summaries.append(summarize(trajectory, method, grid.dt) | {"attitude_error": error, "wall_time": wall_time})
+        errors = find_errors(trajectory, grid, truth)
+        summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, "wall_time": wall_time})
     return summaries
 
 

@@ -24,6 +24,11 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "status", str(summary["outcome"])
     yield "run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"
     yield "work", ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
+    error = summary["error"]
+    for name, unit in (("attitude", "rad"), ("rate", "rad/s")):
+        yield f"{name} error", error.get("reason") or f"{error[name]:.1e} {unit}"
+    if "truth" in error:
+        yield "error against", f"{error['truth']}, largest of {error['samples']} samples"
     for name, value in summary["drift"].items():
         yield f"drift of {name}", f"{value:.2e} (relative)"
     yield "orthonormality", f"{summary['orthonormality']:.2e}"
@@ -39,13 +44,21 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
     drifts = list(summaries[0]["drift"])
-    header = ["method", "outcome", *(f"drift of {name}" for name in drifts), "attitude error, rad", "steps", "wall time, s"]
+    header = [
+        "method",
+        "outcome",
+        *(f"drift of {name}" for name in drifts),
+        "attitude error, rad",
+        "rate error, rad/s",
+        "steps",
+        "wall time, s",
+    ]
     rows = [
         [
             summary["method"],
             str(summary["outcome"]),
             *(f"{summary['drift'][name]:.1e}" for name in drifts),
-            DASH if summary["attitude_error"] is None else f"{summary['attitude_error']:.1e}",
+            *(f"{summary['error'][name]:.1e}" if name in summary["error"] else DASH for name in ("attitude", "rate")),
             f"{summary['counters']['steps']:,}",
             f"{summary['wall_time']:.2g}",
         ]

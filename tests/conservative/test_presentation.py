@@ -44,6 +44,16 @@ def test_a_table_has_every_sample_and_every_digit(trajectory):
     assert frame.attrs == {"scene": "a <b>body</b>", "method": trajectory.label, "outcome": "ok"}
 
 
+def test_quaternions_and_errors_of_a_trajectory(trajectory):
+    q = trajectory.quaternion_wxyz
+    assert np.abs(cv.attitude.from_quaternion(q) - trajectory.R_WB).max() < 1e-14  # measured 2e-15
+    W = rotation_about((0.2, 0.5, -1), 0.01)
+    turned = replace(trajectory, R_WB=W @ trajectory.R_WB)
+    np.testing.assert_allclose(turned.error(trajectory), 0.01, rtol=1e-12)
+    with pytest.raises(cv.BadInput, match="truth: got"):
+        trajectory.error(replace(turned, t=turned.t + 1e-3))
+
+
 def test_a_picture_draws_rates_and_drifts(trajectory):
     specification = json.loads(trajectory.plot().to_json())
     rates, drifts = (specification["datasets"][chart["data"]["name"]] for chart in specification["vconcat"])

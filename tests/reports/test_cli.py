@@ -5,6 +5,7 @@ import sys
 import tomllib
 
 import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
 
@@ -51,8 +52,8 @@ def test_several_methods_are_a_table():
     arguments = ("run", "brick_flip", "-m", "reduced", "-m", "reduced:order=4")
     second, fourth = json.loads(conservative(*arguments, "--json").stdout)
     assert [second["method"], fourth["method"]] == ["reduced", "reduced:order=4"]
-    assert 1e-2 < second["attitude_error"] < 0.1  # measured 5.5e-2
-    assert fourth["attitude_error"] < 1e-3
+    assert 1e-2 < second["error"]["attitude"] < 0.1  # measured 5.5e-2
+    assert fourth["error"]["attitude"] < 1e-3
     assert fourth["drift"]["energy"] < 1e-13
     assert fourth["wall_time"] > 0
     lines = conservative(*arguments).stdout.splitlines()
@@ -70,7 +71,8 @@ def test_a_table_shows_the_methods_that_fail_and_exits_with_1():
 def test_run_writes_samples(tmp_path):
     path = tmp_path / "run.csv"
     assert conservative("run", "lagrange_top", "--t-end", "0.1", "--csv", path).exit_code == 0
-    rows = list(csv.DictReader(path.read_text().splitlines()))
+    table = csv.DictReader(path.read_text().splitlines())
+    rows = [{name.partition(" ")[0]: value for name, value in row.items()} for row in table]
     assert len(rows) == 11
     assert float(rows[-1]["t"]) == pytest.approx(0.1, abs=1e-15)
     R = np.array([[float(rows[-1][f"R_WB_{i}{j}"]) for j in "123"] for i in "123"])
@@ -85,7 +87,35 @@ def test_a_run_of_many_steps_keeps_a_limited_number_of_samples(tmp_path, monkeyp
     rows = list(csv.DictReader(path.read_text().splitlines()))
     assert summary["counters"]["steps"] == 858
     assert len(rows) == 97  # every ninth step, the start and the end
-    assert float(rows[-1]["t"]) == pytest.approx(858 * 0.007, rel=1e-14)  # measured 0
+    assert float(rows[-1]["t (s)"]) == pytest.approx(858 * 0.007, rel=1e-14)  # measured 0
+
+
+@pytest.mark.parametrize(("scene", "allowed"), [("brick_flip", 2e-11), ("kovalevskaya_top", 1e-13)])
+def test_a_run_says_how_wrong_it_is(scene, allowed):
+    right = json.loads(conservative("run", scene, "-m", "taylor", "--json").stdout)["error"]
+    assert 0 < right["attitude"] < allowed  # measured 1.2e-11 (brick), 1.4e-14 (top: without closed form)
+    wrong = json.loads(conservative("run", scene, "-m", "reduced", "--json").stdout)["error"]
+    assert wrong["attitude"] > 1e-2
+    assert wrong["rate"] > 1e-3
+    skipped = json.loads(conservative("run", scene, "--no-truth", "--json").stdout)["error"]
+    assert skipped == {"reason": "not computed (--no-truth)"}
+
+
+def test_a_long_run_without_closed_form_is_compared_when_asked():
+    long = ("run", "kovalevskaya_top", "-m", "taylor", "--t-end", "450", "--dt", "0.05", "--json")  # 1,030 rad
+    assert "--truth" in json.loads(conservative(*long).stdout)["error"]["reason"]
+    assert json.loads(conservative(*long, "--truth").stdout)["error"]["attitude"] < 1e-8  # measured 2.5e-10
+
+
+def test_samples_as_parquet_equal_those_as_csv(tmp_path):
+    files = tmp_path / "run.csv", tmp_path / "run.parquet"
+    for _ in range(2):  # its own files are replaced
+        assert conservative("run", "lagrange_top", "--csv", files[0], "--parquet", files[1]).exit_code == 0
+    table, other = pd.read_csv(files[0]), pd.read_parquet(files[1])
+    assert {"t (s)", "q_WB_w", "w_WB_B_1 (rad/s)", "energy (J)", "momentum_W_3 (kg m^2/s)"} <= set(table.columns)
+    pd.testing.assert_frame_equal(table, other, rtol=1e-15, atol=0)
+    files[1].write_text("mine")
+    assert conservative("run", "lagrange_top", "--parquet", files[1]).exit_code == 2
 
 
 def test_a_failed_run_reports_the_failure_and_writes_its_samples(tmp_path):

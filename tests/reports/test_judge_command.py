@@ -105,7 +105,7 @@ def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_pa
     table = pd.read_csv(tmp_path / "run.csv")
     R = table[[f"R_WB_{i}{j}" for i in "123" for j in "123"]].to_numpy().reshape(-1, 3, 3)
     q = cv.attitude.to_quaternion(R)[:, [1, 2, 3, 0]]
-    columns = {"t": table["t"], **{f"q{i}": q[:, i] for i in range(4)}}
+    columns = {"t": table["t (s)"], **{f"q{i}": q[:, i] for i in range(4)}}
     pd.DataFrame(columns).to_csv(tmp_path / "order.csv", index=False)
     done = CliRunner().invoke(main, ["judge", str(tmp_path / "order.csv"), "--body", "lagrange_top"])
     assert done.exit_code == 0, done.output
