@@ -90,6 +90,8 @@ class Card:
         Settings whose motion a report draws; if there are none, it draws the first that it measured.
     as_installed
         The engine as installed, with nothing set but the step; () if its user has to choose a setting.
+    usual_dt
+        The engine's own default step, s, which its users take; None if it has none.
     rank
         Rank in the automatic choice, `integrate(scene, error=...)`; the lowest comes first. None: the family is not considered.
     group
@@ -118,6 +120,7 @@ class Card:
     many: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     as_installed: tuple[str, ...] = ()
+    usual_dt: float | None = None
     rank: int | None = None
     group: str = ""
     exact: bool = False

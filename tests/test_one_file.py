@@ -7,7 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.benchmarks.studies import hard_cases, selection, sphere_curves
+from conservative.benchmarks.studies import hard_cases, motion, selection
 from conservative.benchmarks.suite import points
 from conservative.errors import NotLoadable
 from conservative.methods import search
@@ -108,7 +108,7 @@ def test_pictures_use_its_colour_and_its_setting(installed):
     assert style.colours(lines)["borrowed parts=2"] == "#123456"
     assert list(style.order_lines(lines)) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
     methods = selection.methods(["borrowed", "reduced:order=4"])
-    assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
+    assert [method.name for method in motion.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
 
 def test_a_method_needs_no_card(installed):
@@ -116,7 +116,7 @@ def test_a_method_needs_no_card(installed):
     method = registry.method("borrowed")
     assert method in [point.method for point in points.points()]
     assert method in hard_cases.settings(selection.methods())
-    assert method in sphere_curves.select_methods(selection.methods())
+    assert method in motion.select_methods(selection.methods())
     assert style.colours({"borrowed": "borrowed"})["borrowed"] not in style.PALETTE.values()
     assert "borrowed" not in {each.family for each in search.candidates(cv.scenes.asymmetric_top())}
 

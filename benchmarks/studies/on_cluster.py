@@ -18,7 +18,7 @@ from conservative.references.truth import reference
 from . import studies
 from .study import Finding, Progress, Study, remember_truths
 
-UNTIMED = ("paper", "convergence", "long_runs", "sphere_curves", "paper_figures", "stability", "hard_cases")
+UNTIMED = ("paper", "convergence", "long_runs", "motion", "paper_figures", "stability", "hard_cases")
 """Studies without times."""
 
 

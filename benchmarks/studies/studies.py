@@ -21,13 +21,13 @@ from . import (
     hard_cases,
     long_runs,
     long_time,
+    motion,
     paper,
     paper_figures,
     price,
     random,
     selection,
     speed,
-    sphere_curves,
     stability,
     throughput,
     work_precision,
@@ -35,7 +35,7 @@ from . import (
 from .study import Finding, Maker, Progress, Study, remember_truths
 
 _IN_ORDER = (
-    *(paper, convergence, speed, work_precision, each_step, long_runs, long_time, sphere_curves, paper_figures),
+    *(motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time, paper_figures),
     *(engines_at_one_step, engines_over_steps, stability, hard_cases, random, price, throughput),
 )
 MAKERS: Mapping[str, Maker] = {study.__name__.rpartition(".")[2]: study.findings for study in _IN_ORDER}
@@ -52,11 +52,11 @@ LONG_TIME = "long_time"
 """Study of errors over a million turns."""
 PRICE = "price"
 """Study of new processes."""
-MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
+MAIN = ("motion", "paper", "convergence", "speed", "work_precision", "long_runs")
 """Studies of the selected scenes and methods in every report."""
 IN_TURN = ("random", "work_precision", "each_step", "throughput")
 """Studies of times that several processes measure in turn, in a full report and alone."""
-MORE = ("each_step", LONG_TIME, "sphere_curves", "paper_figures")
+MORE = ("each_step", LONG_TIME, "paper_figures")
 """Studies of the same scenes and methods in a full report only."""
 
 

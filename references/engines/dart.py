@@ -19,6 +19,7 @@ ENGINE = {
     "fields": ("UniformGravity",),
     "card": {
         "as_installed": ("",),
+        "usual_dt": 0.001,
     },
 }
 

@@ -34,6 +34,7 @@ ENGINE = {
         "variants": ("Euler", "implicitfast", "RK4", "RK4,precision=f32"),
         "many": ("RK4", "RK4,precision=f32"),
         "as_installed": ("Euler,precision=f32",),
+        "usual_dt": 0.002,
     },
 }
 

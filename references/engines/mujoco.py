@@ -44,6 +44,7 @@ ENGINE = {
         "many": ("RK4", "RK4,threads=2", "Euler", "implicit", "implicitfast", "discrete"),
         "pictures": ("Euler", "RK4", "implicit"),
         "as_installed": ("Euler",),
+        "usual_dt": 0.002,
         "colour": "vermilion",
     },
 }

@@ -33,6 +33,7 @@ ENGINE = {
     "card": {
         "variants": ("", "maximal", "as_installed=true"),
         "as_installed": ("as_installed=true",),
+        "usual_dt": 1 / 240,
     },
 }
 

@@ -32,6 +32,7 @@ ENGINE = {
     "card": {
         "variants": ("", "substeps=1", "as_installed=true"),
         "as_installed": ("as_installed=true",),
+        "usual_dt": 1 / 60,
     },
 }
 

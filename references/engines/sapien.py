@@ -31,6 +31,7 @@ ENGINE = {
     "card": {
         "variants": ("", "as_installed=true"),
         "as_installed": ("as_installed=true",),
+        "usual_dt": 0.01,
     },
 }
 

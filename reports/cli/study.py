@@ -78,7 +78,7 @@ def study(
 ) -> None:
     """Run one study and show its rows, or for `random` the time ratios.
 
-    NAME is paper, convergence, speed, work_precision, each_step, long_runs, long_time, sphere_curves, paper_figures,
+    NAME is paper, convergence, speed, work_precision, each_step, long_runs, long_time, motion, paper_figures,
     engines_at_one_step, engines_over_steps, stability, hard_cases, random, price or throughput. A report consists of the same
     studies. benchmarks/README.md describes them.
     """

@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import long_runs, sphere_curves
+from conservative.benchmarks.studies import long_runs, motion
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
 from conservative.outcome import OutcomeKind
 
@@ -47,7 +47,7 @@ def thin(drifts: pd.DataFrame) -> pd.DataFrame:
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
     keys = ["scene", "method", "family", "name", "t"]
-    return _points(_samples_of(samples, "sphere_curves"), keys, sphere_curves.AXES)
+    return _points(_samples_of(samples, "motion"), keys, motion.AXES)
 
 
 def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) -> pd.DataFrame:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import long_runs, sphere_curves, step_ladder
+from conservative.benchmarks.studies import long_runs, motion, step_ladder
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.scene import Scene
 
@@ -140,7 +140,7 @@ def _sphere_figure(measured: Measured, scene: Scene) -> Figure | None:
     if scene.free:
         title = "polhode on the momentum sphere"
         words = "The angular momentum in body axes. The exact curve is closed; drift widens it or leaves the sphere."
-    wanted = sphere_curves.select_methods(measured.plan.methods)
+    wanted = motion.select_methods(measured.plan.methods)
     absent = ", ".join(method.name for method in wanted if method.name not in set(curves["method"]))
     failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
     summary = f"At the scene's own step, over {long_runs.DURATIONS:g} durations. {words}{failed}"

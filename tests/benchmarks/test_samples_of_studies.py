@@ -1,21 +1,25 @@
 """Values in the rows of single studies, and the lines of their pictures."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry
+from conservative import Scene, registry
+from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
-from conservative.benchmarks.studies import long_runs, paper_figures, speed, sphere_curves, studies
+from conservative.benchmarks.studies import long_runs, motion, paper_figures, speed, studies
 from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
+from conservative.methods.symplectic import NoSquish
 from conservative.outcome import OK, OutcomeKind
+from conservative.references.exact.method import Exact
 
 BRICK = registry.scene("brick_flip:t_end=1")
 
@@ -46,16 +50,50 @@ def test_a_long_run_that_fails_has_rows_and_no_line():
     }
 
 
-@pytest.mark.parametrize("scene", [BRICK, registry.scene("lagrange_top:t_end=0.1")], ids=lambda scene: scene.name)
-def test_a_curve_lies_on_the_unit_sphere(scene):
-    rows, lines = findings("sphere_curves", cv.Reduced(), registry.method("exact"), scenes=(scene,))
-    assert rows == []
-    assert [line.method for line in lines] == ["exact"] * 3 + ["reduced"] * 3
-    assert [line.quantity for line in lines] == [*sphere_curves.AXES] * 2
-    for three in (lines[:3], lines[3:]):
-        off = np.linalg.norm([line.value for line in three], axis=0) - 1
+TURNED = rotation_about((1.0, 2.0, -0.5), 0.7)
+TUMBLING = Scene(
+    "tumbling", cv.RigidBody(TURNED @ np.diag((1.3, 0.5, 1.0)) @ TURNED.T), TURNED.T, TURNED @ (0.2, 0.3, 9.0), 1.0, dt=0.01
+)
+"""A body whose inertia has products, in a rotated frame."""
+
+
+@pytest.mark.parametrize("scene", [TUMBLING, registry.scene("lagrange_top:t_end=0.1")], ids=lambda scene: scene.name)
+def test_a_motion_has_the_states_of_its_first_duration_and_a_curve_on_the_unit_sphere(scene):
+    rows, lines = findings("motion", cv.Reduced(), scenes=(scene,))
+    drifts = [motion.SIGNED + invariant.name for invariant in scene.invariants]
+    assert [line.quantity for line in lines] == [*motion.STATES, *drifts, *motion.AXES] * 2
+    assert {row.method for row in rows} == {"reduced"}
+    for start, step in ((0, scene.t_end / motion.FRAMES), (len(lines) // 2, scene.dt)):
+        states = np.array([line.value for line in lines[start : start + 7]]).T
+        grid = Grid(step, round(scene.t_end / step))
+        method = Exact() if start == 0 else cv.Reduced()
+        expected = method.solve(scene, grid)
+        np.testing.assert_allclose(from_quaternion(states[:, :4]), expected.R_WB, atol=1e-12)  # measured 1e-15
+        np.testing.assert_allclose(states[:, 4:], expected.w_WB_B, atol=1e-9)
+    for curve in (lines[len(lines) // 2 - 3 : len(lines) // 2], lines[-3:]):
+        off = np.linalg.norm([line.value for line in curve], axis=0) - 1
         assert np.abs(off).max() < 1e-13  # measured 3e-16
-        assert len(off) <= sphere_curves.SAMPLES
+        assert len(off) <= motion.SAMPLES
+
+
+def test_a_motion_has_signed_drifts_and_the_errors_of_the_first_duration_at_the_step_of_the_users(monkeypatch):
+    monkeypatch.setattr(NoSquish, "card", replace(NoSquish.card, usual_dt=0.004))
+    rows, lines = findings("motion", NoSquish(), scenes=(TUMBLING,))
+    assert {row.dt for row in rows} == {0.004}
+    grid = Grid(0.004, 250)
+    run, truth = NoSquish().solve(TUMBLING, grid), Exact().solve(TUMBLING, grid)
+    errors = {(row.measure, row.quantity): row.value for row in rows}
+    assert errors[Measure.ATTITUDE_MAX, ""] == pytest.approx(angle_between(truth.R_WB, run.R_WB).max(), rel=1e-9)
+    long = NoSquish().solve(TUMBLING, Grid(0.004, 2500))
+    energy = {line.quantity: line for line in lines if line.method == "no_squish"}["drift of energy"]
+    assert energy.value.min() < -1e-7 or energy.value.max() > 1e-7
+    np.testing.assert_allclose(energy.value[-1], long.energy[-1] / long.energy[0] - 1, atol=1e-13)
+
+
+def test_a_motion_that_fails_has_rows_with_the_outcome():
+    rows, lines = findings("motion", cv.Lame())
+    assert {row.outcome.kind for row in rows} == {OutcomeKind.UNSUPPORTED}
+    assert {line.method for line in lines} == {"exact"}
 
 
 def test_the_papers_figures_are_those_of_its_scenes():

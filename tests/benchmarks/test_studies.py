@@ -32,9 +32,7 @@ KINDS = {
 BROKEN = tuple(Broken(how) for how in KINDS)
 FACTS = (Measure.PRECISION, Measure.ORDER_EXPECTED)
 """Properties of a method that do not depend on its runs."""
-CROSSING = [
-    name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "throughput", "price", "long_time")
-]
+CROSSING = [name for name in studies.MAKERS if name not in ("motion", "paper_figures", "throughput", "price", "long_time")]
 """Studies with a row for every method, also for failures. The studies of throughput, prices and growth have their own tests."""
 
 
@@ -137,7 +135,7 @@ def test_nothing_is_dropped_silently(name):
     assert all(row.outcome.kind is OutcomeKind.MISSING and math.isnan(row.value) for row in missing)
 
 
-@pytest.mark.parametrize("name", [*CROSSING, "sphere_curves"])
+@pytest.mark.parametrize("name", [*CROSSING, "motion"])
 def test_a_missing_engine_is_an_error_unless_skipped(name):
     with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
         list(studies.findings(Study(name, (SCENE,), (ABSENT,), truth=truth)))
@@ -151,7 +149,7 @@ def test_a_bug_of_our_own_is_not_an_outcome():
         rows("paper", Ours("raises"))
 
 
-@pytest.mark.parametrize("name", [*CROSSING, "sphere_curves"])
+@pytest.mark.parametrize("name", [*CROSSING, "motion"])
 def test_progress_counts_up_to_the_whole(name):
     seen = []
     study = Study(name, (SCENE, SCENE.rename("again")), (cv.Reduced(),), quick=True, truth=truth)

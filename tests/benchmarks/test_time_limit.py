@@ -106,7 +106,7 @@ def test_a_method_that_cannot_be_sent_runs_here():
     assert isinstance(attempt_within(60.0, Case("any", SCENE, Held(), grid_for(SCENE, 0.05))), Success)
 
 
-@pytest.mark.parametrize("name", ["paper", "convergence", "speed", "work_precision", "long_runs", "sphere_curves", "stability"])
+@pytest.mark.parametrize("name", ["paper", "convergence", "speed", "work_precision", "long_runs", "motion", "stability"])
 def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     monkeypatch.setattr(study, "HANG_LIMIT", 0.5)
     monkeypatch.setattr(studies.stability, "FIRST_LIMIT", 0.5)
@@ -117,8 +117,8 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     mine = [row for row in measured if row.method == Harmful("hang").name]
     assert {row.outcome.kind for row in mine} <= {OutcomeKind.TIMEOUT, OutcomeKind.SKIPPED, OutcomeKind.NO_ORDER}
     assert all(math.isnan(row.value) for row in mine)
-    assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine) or name == "sphere_curves"
-    assert any(row.outcome.ok for row in measured if row.method == "reduced") or name == "sphere_curves"
+    assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine)
+    assert any(row.outcome.ok for row in measured if row.method == "reduced")
 
 
 @pytest.fixture

@@ -57,8 +57,9 @@ def measurements():
 
 
 def curves(scene, *methods):
-    """Lines of the curves on spheres, which are integrated."""
-    return list(studies.findings(Study("sphere_curves", (scene,), methods)))
+    """Lines of the motions of methods, which are integrated."""
+    found = studies.findings(Study("motion", (scene,), methods))
+    return [each for each in found if isinstance(each, Samples) and each.role != Role.TRUTH]
 
 
 SCENE = "brick_flip"

@@ -10,7 +10,7 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, Samples
-from conservative.benchmarks.studies import sphere_curves, studies
+from conservative.benchmarks.studies import motion, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
 from conservative.reports.rows import lines
@@ -64,7 +64,7 @@ def test_fewer_samples_keep_the_last_of_each_line():
 def test_curves_lie_on_the_unit_sphere(name):
     found = lines.curves(with_names(measurement.samples_frame(curves(registry.scene(name), registry.method("reduced")))))
     assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
-    assert 200 < len(found) <= sphere_curves.SAMPLES
+    assert 200 < len(found) <= motion.SAMPLES
 
 
 def test_polhode_is_the_same_whatever_the_body_axes():
@@ -81,7 +81,7 @@ def test_polhode_is_the_same_whatever_the_body_axes():
 def test_picks_one_method_of_each_family_that_has_no_preferred_one():
     names = [
         m.name
-        for m in sphere_curves.select_methods(
+        for m in motion.select_methods(
             [registry.method(n) for n in ("gauss:stages=2", "gauss", "reduced:order=4", "reduced", "exact")]
         )
     ]

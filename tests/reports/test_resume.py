@@ -147,7 +147,7 @@ def test_finished_studies_survive_an_error(tmp_path):
     made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         report.write(made, tmp_path / "report", fail)
-    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
+    assert "2 of 6 studies are finished (motion, paper)" in caught.value.__notes__[0]
     assert list(json.loads((tmp_path / "report.partial.json").read_text())["studies"]) == ["paper"]
 
 

@@ -184,7 +184,7 @@ def test_each_scene_has_its_rows_and_no_others(built):
 
 
 def test_curves_that_are_missing_are_named(planned, table):
-    curve = measurement.samples_frame([line("sphere_curves", "brick_flip", quantity) for quantity in ("x", "y", "z")])
+    curve = measurement.samples_frame([line("motion", "brick_flip", quantity) for quantity in ("x", "y", "z")])
     document = build(planned, Measurements(table, curve), provenance(["report"]))
     assert (
         "Not drawn, as they fail or do not support the scene: gauss:stages=2." in figure(document, "sphere_brick_flip").summary

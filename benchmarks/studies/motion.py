@@ -1,0 +1,109 @@
+"""The study of motions that a report shows: those of the methods in the charts, at the steps of their users, and the exact one.
+
+A run has ten durations of its scene, or one if it fails after that. It yields the errors and drifts of the first duration, and
+lines: attitudes and rates of the first duration, the drift of each invariant with its sign, and a curve on a sphere. The curve
+of a free body is its polhode: the angular momentum in principal axes, relative to its initial length. The curve of a body in a
+field is the trace of an axis, a unit vector in world axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from conservative.attitude import Array, to_quaternion
+from conservative.grid import Grid, grid_for
+from conservative.invariants import sizes
+from conservative.method import Method, Role
+from conservative.outcome import Outcome
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.references.exact.method import Exact
+from conservative.references.precise import Precise
+from conservative.trajectory import Trajectory
+
+from ..measures import errors
+from ..measures.measurement import Samples
+from .case import Case, Success
+from .long_runs import DURATIONS
+from .study import Finding, Progress, Study
+
+SAMPLES = 700
+"""Largest number of samples of a curve."""
+FRAMES = 200
+"""Largest number of samples of attitudes and rates, after the first one."""
+POINTS = 120
+"""Largest number of samples of a drift."""
+AXES = ("x", "y", "z")
+"""Quantities of a curve, in units of the sphere's radius."""
+STATES = ("q_w", "q_x", "q_y", "q_z", "w_x", "w_y", "w_z")
+"""Quantities of the first duration: attitude as a quaternion, body to world, and rates, rad/s, body axes."""
+SIGNED = "drift of "
+"""Begins the quantities of relative drifts; that of a vector is the change of its length."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Finding]:
+    """Yield the rows and lines of each run, the exact motion first. A run that fails has rows with its outcome and no lines."""
+    drawn = select_methods(study.methods)
+    tell = study.count(progress, len(drawn) + 1)
+    for scene in study.scenes:
+        tell(f"{scene.name}: exact")
+        grid = Grid(scene.t_end / FRAMES, FRAMES)
+        solver = Exact() if Exact().unsupported(scene) is None else Precise()
+        yield from _lines(Case(study.name, scene, solver, grid), study.truth(scene, grid).trajectory)
+        for method in drawn:
+            tell(f"{scene.name}: {method.name}")
+            step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
+            first = grid_for(scene, step)
+            for durations in (DURATIONS, 1.0):
+                case = Case(study.name, scene, method, grid_for(scene, step, scene.t_end * durations))
+                done = study.attempt(case)
+                if isinstance(done, Success):
+                    begin = _head(done.trajectory, first.n_samples)
+                    yield from case.rows(errors.measure_errors(begin, study.truth(scene, first).trajectory))
+                    yield from _lines(case, done.trajectory)
+                    break
+            if isinstance(done, Outcome):
+                yield from case.rows(errors.blanks(scene), done)
+
+
+def select_methods(methods: Sequence[Method]) -> list[Method]:
+    """Return the methods in the charts: of each family those of `Card.pictures`, or else the first."""
+    competitors = [method for method in methods if method.role != Role.TRUTH]
+    preferred = [method for method in competitors if method in method.settings_for("pictures")]
+    firsts = {method.family: method for method in reversed(competitors)}
+    return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
+
+
+def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
+    def line(quantity: str, values: Array, count: int) -> Samples:
+        some = np.unique(np.linspace(0, len(values) - 1, count).round().astype(int))
+        return case.samples(quantity, trajectory.t[some], values[some])
+
+    begin = _head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - 1e-9))))
+    states = np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
+    yield from (line(quantity, values, FRAMES + 1) for quantity, values in zip(STATES, states.T, strict=True))
+    for invariant in case.scene.invariants:
+        drift = trajectory.drift(invariant)
+        if drift.ndim > 1:  # relative to the initial value, which is the scale of a vector that is not zero
+            start = invariant.evaluate(trajectory.R_WB[:1], trajectory.w_WB_B[:1]) / invariant.scale
+            drift = sizes(drift + start) - sizes(start)
+        yield line(SIGNED + invariant.name, drift, POINTS)
+    yield from (line(axis, values, SAMPLES) for axis, values in zip(AXES, project_on_sphere(trajectory).T, strict=True))
+
+
+def _head(trajectory: Trajectory, n: int) -> Trajectory:
+    return replace(trajectory, t=trajectory.t[:n], R_WB=trajectory.R_WB[:n], w_WB_B=trajectory.w_WB_B[:n])
+
+
+def project_on_sphere(trajectory: Trajectory) -> Array:
+    """Return the points (n, 3) of a curve, in units of the sphere's radius at the start."""
+    scene = trajectory.scene
+    if scene.free:
+        momentum = trajectory.w_WB_B @ scene.body.inertia  # symmetric
+        return np.asarray(momentum @ np.linalg.eigh(scene.body.inertia)[1] / np.linalg.norm(momentum[0]))
+    # The traced axis points to the centre of mass; without one it is the third body axis.
+    com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)
+    length = float(np.linalg.norm(com_B))
+    return np.asarray(trajectory.R_WB @ (com_B / length if length else np.eye(3)[2]))
