@@ -49,7 +49,7 @@ class Measured:
         """Errors and times on the scenes (see `rows.points`), and the time per `sample`, s."""
         every = points.all_points(self.rows)
         intervals = {scene.name: scene.t_end / SAMPLES for scene in self.plan.scenes}
-        return every.assign(sample=every["time"] * every["scene"].map(intervals))
+        return every.assign(sample=every["time"] * every["scene"].map(intervals).astype(float))
 
     @cached_property
     def every_step(self) -> dict[str, EachStep | None]:
