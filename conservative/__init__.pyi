@@ -16,6 +16,7 @@ from .errors import NotConverged as NotConverged
 from .errors import NotRun as NotRun
 from .errors import NotWritten as NotWritten
 from .errors import PotentialFailed as PotentialFailed
+from .errors import TorqueFailed as TorqueFailed
 from .errors import Unsupported as Unsupported
 from .errors import WrongBranch as WrongBranch
 from .grid import Grid as Grid
@@ -43,6 +44,8 @@ from .methods.textbook import Textbook as Textbook
 from .outcome import Outcome as Outcome
 from .outcome import OutcomeKind as OutcomeKind
 from .potentials.gravity_gradient import GravityGradient as GravityGradient
+from .potentials.load import Damping as Damping
+from .potentials.load import Torque as Torque
 from .potentials.point_to_point import LinearSpring as LinearSpring
 from .potentials.point_to_point import PointAttraction as PointAttraction
 from .potentials.potential import Potential as Potential

@@ -112,6 +112,8 @@ class Card:
         Returns the `Structure` of a setting; None if it is unknown.
     time_dependent
         True if potentials that depend on time are supported. If not, `Method.unsupported` reports them.
+    loads
+        True if a torque and damping are supported. If not, `Method.unsupported` reports them.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -131,6 +133,7 @@ class Card:
     kernel: str = ""
     structure: Callable[[Any], Structure | None] = lambda method: None
     time_dependent: bool = False
+    loads: bool = False
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

@@ -170,12 +170,12 @@ def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
         raise BadInput(argument, describe(value), "one of " + ", ".join(repr(o) for o in options))
 
 
-def set_fields(value: object, **values: Any) -> None:
+def set_fields(value: object, /, **values: Any) -> None:
     """Set the fields of a frozen dataclass in its constructor, where assignments fail."""
     vars(value).update(values)
 
 
-def replace_unchecked(value: T, **changes: Any) -> T:
+def replace_unchecked(value: T, /, **changes: Any) -> T:
     """Return a copy of a frozen dataclass with other fields, without the checks of its constructor and with an empty cache."""
     frozen: Any = value
     return build_unchecked(type(value), **{field.name: getattr(frozen, field.name) for field in fields(frozen)} | changes)

@@ -178,6 +178,15 @@ class PotentialFailed(_Error, RuntimeError):
         )
 
 
+class TorqueFailed(_Error, RuntimeError):
+    """A torque has no value at a time of the run. Attributes: `time` (s), `got` and `allowed`."""
+
+    def __init__(self, time: float, got: str) -> None:
+        self.time, self.got = time, got
+        self.allowed = "three finite numbers (3,), N m, at every time of the run, including its last step"
+        super().__init__(f"torque: got {got} at t = {time:g} s; expected {self.allowed}")
+
+
 class AccuracyNotReached(UserWarning):
     """Round-off prevents the requested error. Attributes: `error` and `estimate`, rad."""
 

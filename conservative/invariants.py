@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,9 @@ class Invariant:
     which is positive and has the unit `unit`. In a turning field, `evaluate` receives attitudes R_OB relative to the axes O
     that turn with the field (`Scene.in_field_axes`).
 
+    In a scene with a torque or damping, I(t) - I(0) equals what these loads supplied. `supplied` returns it, (n,) or (n, 3),
+    from `Trajectory.supplied`, and the drift is that of the balance I(t) - I(0) - supplied.
+
     Raises
     ------
     BadInput
@@ -42,6 +45,7 @@ class Invariant:
     unit: str
     scale: float
     evaluate: Callable[[Array, Array], Array]
+    supplied: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         if not printable_text("name", self.name, _NAME):
@@ -123,6 +127,24 @@ def invariants_of(
     if axis is not None:
         conserved.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(conserved)
+
+
+def balance_of(invariant: Invariant, potential: AnyPotential | None) -> Invariant:
+    """Return the balance that replaces an invariant of body and potential in a scene with a torque or damping."""
+    line = None if potential is None else potential.axis_W
+
+    def supplied(given: Array) -> Array:
+        if invariant.unit == "J":
+            turning = potential.orbit.rate * potential.orbit.normal_W if isinstance(potential, Turning) else np.zeros(3)
+            return np.asarray(given[:, 0] - given[:, 1:] @ turning)
+        return given[:, 1:] if line is None else np.asarray(given[:, 1:] @ line)
+
+    return replace(invariant, name=f"{invariant.name} balance", supplied=supplied)
+
+
+def with_balances(*names: str) -> frozenset[str]:
+    """Return names of invariants, and of the balances that replace them in scenes with a torque or damping."""
+    return frozenset((*names, *(f"{name} balance" for name in names)))
 
 
 def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:

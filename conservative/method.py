@@ -22,12 +22,14 @@ Run = Callable[[], Trajectory]
 
 
 def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
-    """Extend `Method.unsupported` by the reason for potentials that depend on time, which most methods do not support."""
+    """Extend `Method.unsupported` by the reasons for potentials that depend on time, and for loads."""
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
         if getattr(scene.potential, "time_dependent", False) and not method.card.time_dependent:
             return "it is for fields that do not depend on time; integrate(scene, error=1e-9) chooses a method for others"
+        if scene.loaded and not method.card.loads:
+            return "it does not take a torque or damping; reduced, projected and scipy do"
         return unsupported(method, scene)
 
     return reason
@@ -142,7 +144,7 @@ class Method(ABC):
         passes, no other check is made.
         """
         mistake, conserved, bounds = find_mistake(result, scene, grid), self.conserves, self.bounds(scene, grid)
-        if mistake is None and result.failure is None and self.card.kernel:
+        if mistake is None and result.failure is None and self.card.kernel and not scene.loaded:
             reference = scene.derive(scene_reference, conserved)
             drifts = reference.measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
             if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift and drifts[1] <= bounds.energy:

@@ -15,7 +15,8 @@ from .attitude import Array
 from .body import RigidBody
 from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation, set_fields
 from .errors import BadInput
-from .invariants import Invariant, axial_direction, invariants_of
+from .invariants import Invariant, axial_direction, balance_of, invariants_of
+from .potentials.load import Damping, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.turning import Turning
 
@@ -50,6 +51,8 @@ class Scene:
         Duration, s.
     potential
         The field that acts on the body; None for a free body. `Turning` and functions of attitude and time depend on time.
+    torque, damping
+        Loads that act beside the potential. Energy and momenta then obey balances with their work and impulse.
     dt
         Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end.
     extra_invariants
@@ -70,6 +73,8 @@ class Scene:
     t_end: float
     potential: AnyPotential | None
     dt: float
+    torque: Torque | None = None
+    damping: Damping | None = None
     extra_invariants: tuple[Invariant, ...] = ()
     group: str = "your own"
     source: str = ""
@@ -84,6 +89,8 @@ class Scene:
         potential: AnyPotential | None = None,
         *,
         dt: float | None = None,
+        torque: Torque | None = None,
+        damping: Damping | None = None,
         extra_invariants: Iterable[Invariant] = (),
         group: str = "your own",
         source: str = "",
@@ -94,8 +101,14 @@ class Scene:
             raise BadInput("body", describe(body), "a RigidBody")
         if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
             raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
+        if not isinstance(torque, Torque | None):
+            raise BadInput("torque", describe(torque), "None or a Torque, such as Torque((0, 0, 1.5))")
+        if not isinstance(damping, Damping | None):
+            raise BadInput("damping", describe(damping), "None or a Damping, such as Damping(0.1 * np.eye(3))")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
+        if torque is not None:
+            torque.require(end)
         try:
             given: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
@@ -114,6 +127,8 @@ class Scene:
             t_end=end,
             potential=potential,
             dt=positive_number("dt", dt, "a finite step above 0, s"),
+            torque=torque,
+            damping=damping,
             extra_invariants=given,
             group=printable_text("group", group, "a text"),
             source=printable_text("source", source, "a text"),
@@ -125,6 +140,11 @@ class Scene:
         return self.potential is None
 
     @property
+    def loaded(self) -> bool:
+        """True if a torque or damping acts beside the potential."""
+        return self.torque is not None or self.damping is not None
+
+    @property
     def integrable(self) -> bool:
         """True if three invariants of the scene are known, one for each degree of freedom, so that it is integrable.
 
@@ -132,7 +152,7 @@ class Scene:
         Methods of Classical Mechanics, section 49, Liouville's theorem). False is no proof of the opposite: a body in a fixed
         gravity gradient has a third integral that `invariants` does not list (see `GravityGradient`).
         """
-        return self.free or len(self.invariants) >= 3
+        return not self.loaded and (self.free or len(self.invariants) >= 3)
 
     @cached_property
     def kinetic_energy0(self) -> float:
@@ -141,24 +161,30 @@ class Scene:
 
     @cached_property
     def energy_scale(self) -> float:
-        """Reference scale of energy drifts, J: initial kinetic energy plus the magnitude of the potential.
+        """Reference scale of energy drifts, J: initial kinetic energy, magnitude of the potential, work of the torque in 1 rad.
 
         Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
+        return self._energies or 1.0
+
+    @cached_property
+    def _energies(self) -> float:
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
-        return size or 1.0
+        return size if self.torque is None else size + self.torque.require(self.t_end)
 
     @cached_property
     def magnitudes(self) -> tuple[int, int | None]:
         """Binary exponents of the largest moment, kg m^2, and of the rate that all energy allows, 1/s; None without energy."""
         moment = math.frexp(float(self.body.moments.max()))[1]
-        energy = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
+        energy = self._energies
         return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
-        """Conserved quantities of the exact motion: energy, momenta, and `extra_invariants`."""
+        """Conserved quantities of the exact motion: energy, momenta or their balances, and `extra_invariants`."""
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
+        if self.loaded:
+            own = tuple(balance_of(each, self.potential) for each in own)
         return (*own, *self.extra_invariants)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
@@ -167,8 +193,8 @@ class Scene:
 
     @cached_property
     def symmetry_axis_B(self) -> Array | None:
-        """Unit vector (3,), body axes, of the common symmetry axis of body and field; None if there is none."""
-        return axial_direction(self.body, self.potential)
+        """Unit vector (3,), body axes, of the common symmetry axis of body and field; None without one, or with loads."""
+        return None if self.loaded else axial_direction(self.body, self.potential)
 
     @cached_property
     def _derivations(self) -> dict[Any, Any]:

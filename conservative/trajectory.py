@@ -42,6 +42,9 @@ class Trajectory:
         The exception that `integrate` raises if the run ended early, otherwise None. The samples end before the failure.
     choice
         Method, step size and estimated error of a run with a target error, otherwise None.
+    supplied
+        Work, J, and impulse, N m s, world axes, of torque and damping up to each sample (n, 4), as the method's own steps sum
+        them; None for scenes without them and for methods that do not provide it.
     """
 
     scene: Scene
@@ -52,6 +55,7 @@ class Trajectory:
     counters: Counters = field(default=Counters(0))
     failure: IntegrationFailed | None = None
     choice: Choice | None = None
+    supplied: Array | None = None
 
     @property
     def outcome(self) -> Outcome:
@@ -87,7 +91,8 @@ class Trajectory:
         """Return the drift (I - I0) / scale of an invariant I, (n,) or (n, 3); I0 is its value in the scene's initial state.
 
         The invariant is one of `scene.invariants`, or its name, such as "energy". `conservative.invariants.sizes` returns
-        magnitudes.
+        magnitudes. In a scene with a torque or damping, the drift is that of the balance I - I0 - supplied, and nan if the
+        method does not provide `supplied`.
 
         Raises
         ------
@@ -101,7 +106,10 @@ class Trajectory:
             invariant = by_name[invariant]
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
         R = self.scene.in_field_axes(self.R_WB, self.t)
-        return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)
+        change = invariant.evaluate(R, self.w_WB_B) - start
+        if invariant.supplied is not None:
+            change = change - (np.nan if self.supplied is None else invariant.supplied(self.supplied))
+        return np.asarray(change / invariant.scale)
 
     def error(self, truth: Trajectory) -> Array:
         """Return the attitude error (n,), rad: the angle between this attitude and that of `truth` at each sample.
@@ -235,4 +243,5 @@ def _count_within(values: Array, bound: float) -> int:
 
 
 def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
-    return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], failure=failure)
+    supplied = None if result.supplied is None else result.supplied[:n]
+    return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], failure=failure, supplied=supplied)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conservative.arithmetic import in_body
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.grid import Grid
 from conservative.potentials.turning import Turning
@@ -28,18 +29,22 @@ MOST_ITERATIONS = 60
 
 
 def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
-    """Return the motion of a scene at the samples of a grid, with `parts` steps for each of the grid's.
+    """Return the motion of a scene at the samples of a grid, with `parts` steps between two samples.
 
     The field is one that kernels know. A step that is too long to converge gives a wrong result, or one that is not finite.
+    Steps also end at the times of a table of torques, where the motion is not smooth.
     """
     c, b, A = _tableau()
-    slope, h = _slope(scene), np.longdouble(grid.dt) / parts
+    slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
+    bends = scene.torque.value[0] if scene.torque is not None and isinstance(scene.torque.value, tuple) else ends[:0]
+    stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
     y = np.concatenate([q / np.sqrt(q @ q), scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0])
     samples = [y]
     with np.errstate(all="ignore"):
-        for i in range(grid.n_steps * parts):
-            t, stages, change = h * (i + c), np.repeat(y[:, None], STAGES, axis=1), np.inf
+        for i in range((len(stops) - 1) * parts):
+            h = (stops[i // parts + 1] - stops[i // parts]) / parts
+            t, stages, change = stops[i // parts] + h * (i % parts + c), np.repeat(y[:, None], STAGES, axis=1), np.inf
             for _ in range(MOST_ITERATIONS):
                 before, last = stages, change
                 stages = y[:, None] + h * slope(t, stages) @ A.T
@@ -47,7 +52,7 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
                 if change < ROUND_OFF or (change >= last and change < 1e3 * ROUND_OFF):
                     break
             y = y + h * slope(t, stages) @ b
-            if (i + 1) % (parts * grid.every) == 0:
+            if (i + 1) % parts == 0 and stops[i // parts + 1] in ends:
                 samples.append(y)
         found = np.array(samples)
         R_WB = from_quaternion((found[:, :4] / np.sqrt((found[:, :4] ** 2).sum(axis=1, keepdims=True))).astype(float))
@@ -66,9 +71,14 @@ def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
         if isinstance(potential, Turning):  # its own `at_time` is for single times in double precision
             half = fixed.rate / np.longdouble(2) * t
             field = fixed._replace(back=(np.cos(half), *(-np.sin(half) * n for n in fixed.normal)))
-        T1, T2, T3 = (0.0, 0.0, 0.0) if field is None else field.body_torque((a, b, c, d))
+        T = np.zeros_like(y[4:]) if field is None else np.array(field.body_torque((a, b, c, d)))
         turn = -b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x
-        spin = L2 * z - L3 * y_ + T1, L3 * x - L1 * z + T2, L1 * y_ - L2 * x + T3
+        if scene.damping is not None:
+            T = T - scene.damping.matrix @ np.array([x, y_, z])
+        if scene.torque is not None:
+            given = np.array([scene.torque.at(float(each)) for each in t], dtype=np.longdouble).T
+            T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
+        spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
         return np.array([*(rate / 2 for rate in turn), *spin])
 
     return slope

@@ -3,6 +3,7 @@
     scene                                           trajectory              checked against
     free body, Lagrange top, compound pendulum      `Exact`                 `Precise`
     any other field that `Precise` knows            `Precise`               `SciPy` (DOP853, the tightest tolerance)
+    torque or damping in a field that kernels know  Gauss collocation       `SciPy` (DOP853, the tightest tolerance)
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
     random bodies (`confirm`)                       `Precise` (96 bits)     Gauss collocation, extended precision (`collocate`)
 
@@ -20,6 +21,7 @@ import numpy as np
 from conservative.attitude import angle_between
 from conservative.grid import Grid
 from conservative.method import Method
+from conservative.potentials.python_function import FunctionPotential
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -38,6 +40,8 @@ CONFIRMED = 1e-13
 """Largest difference of two reference solutions of a random body, rad: a tenth of the smallest error that is compared."""
 PARTS = (2, 8, 32, 128)
 """Steps of the collocation between two samples. More are tried while the difference is larger than `CONFIRMED`."""
+MOST_PARTS = 2**12
+"""Most steps of the collocation between two samples of a scene with a torque or damping."""
 TIGHTEST = 2.3e-14
 """Smallest relative tolerance of SciPy."""
 
@@ -88,6 +92,8 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     MissingEngine
         A package that a solution needs is not installed.
     """
+    if scene.loaded and not isinstance(scene.potential, FunctionPotential):
+        return _confirm_loads(scene, grid)
     first, second, allowed = _pair(scene)
     trajectory = first.solve(scene, grid)
     if trajectory.failure is not None:
@@ -135,6 +141,20 @@ def confirm(scene: Scene, grid: Grid) -> Truth:
         if (agreement := difference(trajectory, second)) <= CONFIRMED:
             return Truth(trajectory, agreement, (method.label, second.label), end)
     raise Disagreement(scene.name, (method.label, second.label), agreement, CONFIRMED)
+
+
+def _confirm_loads(scene: Scene, grid: Grid) -> Truth:
+    """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, checked by SciPy."""
+    second, allowed = SciPy("DOP853", TIGHTEST), 1e-8
+    trajectory, parts, change = collocate(scene, grid, 1), 1, np.inf
+    while change > CONFIRMED and parts < MOST_PARTS:
+        parts, coarse = 2 * parts, trajectory
+        trajectory = collocate(scene, grid, parts)
+        change = difference(coarse, trajectory)
+    agreement, names = difference(trajectory, second.solve(scene, grid)), (trajectory.label, second.label)
+    if not max(change, agreement) <= allowed:
+        raise Disagreement(scene.name, names, max(change, agreement), allowed)
+    return Truth(trajectory, agreement, names, float(grid.t[-1]))
 
 
 def difference(a: Trajectory, b: Trajectory) -> float:

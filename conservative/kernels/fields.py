@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arithmetic import accumulate, add
 from . import small
 from .lanes import load_rows, save_rows
 from .traced import trace
@@ -33,6 +34,44 @@ def energy(field, q):
 def body_torque(field, q):
     """Return the torque in N m, principal axes, at the attitude of the quaternion q, whose length does not matter."""
     return field.body_torque(q)
+
+
+@trace
+def torque(field, q, w):
+    """Return the torque of field and loads in N m at rates w, rad/s."""
+    found = field.body_torque(q)
+    return add(found, field.load(q, w)) if hasattr(field, "load") else found
+
+
+@trace
+def at_step(field, t, h):
+    """Return the field as it is for a step of length h from t, both s."""
+    return field.at_step(t, h) if hasattr(field, "at_step") else field
+
+
+@trace
+def no_supply(field):
+    """Return the sums of work and impulse of the loads (4), and their rounding errors (4), as zeros; () without loads."""
+    return (0.0,) * 8 if hasattr(field, "load") else ()
+
+
+@trace
+def supply(field, h, q, a, supplied):
+    """Return the sums `supplied` with work and impulse of a step from the quaternion q."""
+    return add_supply(supplied, field.supply(h, q, a)) if supplied else supplied
+
+
+@trace
+def supply_rate(field, q, w):
+    """Return power, W, and torque, N m, world axes, of the loads at rates w, rad/s; () without loads."""
+    return field.supply_rate(q, w) if hasattr(field, "load") else ()
+
+
+@trace
+def add_supply(supplied, gained):
+    """Return compensated sums with work and impulse `gained`."""
+    pairs = [accumulate(*each) for each in zip(supplied[:4], supplied[4:], gained, strict=True)] if supplied else []
+    return (*(total for total, _ in pairs), *(carry for _, carry in pairs))
 
 
 @trace

@@ -22,7 +22,7 @@ if COMPILED:
 
     from .traced import DOUBLE, INDEX, INTEGER, Symbol
 
-BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
+BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES = 0, 1, 2, 3, 4
 
 
 def evaluate(field, what, *state):
@@ -30,7 +30,7 @@ def evaluate(field, what, *state):
 
     The inputs are R_BP (9) and the state (18). BODY_TORQUE: q, and t if the field depends on time, to T. FINITE_TORQUE: q, a to
     T and its derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q
-    to V.
+    to V. TORQUES: t to the torques in body and world axes.
     """
     inputs = [x for row in field.rows for x in row] + [x for part in state for x in part]
     inputs += [0.0] * (N_INPUTS - len(inputs))
@@ -83,6 +83,18 @@ class Function(NamedTuple):
         """Return V* (9) and its derivative by q1 (81)."""
         v = evaluate(self, FINITE_DERIVATIVE, *q0, *q1)
         return tuple(v[:9]), tuple(v[9:])
+
+
+class Torques(NamedTuple):
+    """Address of the Python object that is called for a torque (`conservative.potentials.load`), and the rows of R_BP."""
+
+    address: Any
+    rows: Any
+
+    def at(self, t):
+        """Return the torques in body and in world axes, N m, at a time t, s."""
+        v = evaluate(self, TORQUES, (t,))
+        return tuple(v[:3]), tuple(v[3:6])
 
 
 class FunctionInTime(NamedTuple):

@@ -22,6 +22,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from . import small
+from .lanes import save_rows
 
 
 class Workspace(NamedTuple):
@@ -67,6 +68,12 @@ def record(row, q, L, q_out, L_out):
     """Store a sample, number by number: for a tuple assigned to a slice numba compiles its text of an error, 2.2 s."""
     q_out[row, 0], q_out[row, 1], q_out[row, 2], q_out[row, 3] = q
     L_out[row, 0], L_out[row, 1], L_out[row, 2] = L
+
+
+@small
+def record_supply(row, supplied, L_out):
+    """Store the sums of work and impulse of the loads behind the momentum; nothing without loads."""
+    save_rows(L_out.reshape(-1), row * L_out.shape[1] + 3, 1, supplied[:4])
 
 
 @small

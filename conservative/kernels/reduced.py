@@ -29,9 +29,9 @@ from typing import Any, NamedTuple
 
 from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .fields import body_torque, finite_torque
+from .fields import at_step, finite_torque, no_supply, supply, torque
 from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
 from .vector import (
     accumulate,
@@ -95,9 +95,10 @@ class Coefficients(NamedTuple):
 @small
 def explicit_guess(h, J_inverse, field, q, L):
     """Return a of an explicit half step of Euler's equations: third order in h."""
-    rate = cross(L, times(J_inverse, L))
+    w = times(J_inverse, L)
+    rate = cross(L, w)
     if field is not None:
-        rate = add(rate, body_torque(field, q))
+        rate = add(rate, torque(field, q, w))
     return scale(0.5 * h, times(J_inverse, add(L, scale(0.5 * h, rate))))
 
 
@@ -271,7 +272,8 @@ def march(model, coefficients, workspace):
     lengths = coefficients.lengths
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
     record(0, model.q, model.L, q_out, L_out)
-    state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
+    state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0), no_supply(field))
+    record_supply(0, state[4], L_out)
     at, row, corrections, history = (1, 0), 0, 0, no_history()
     block = -(-pause // len(lengths))
     left = block
@@ -286,16 +288,18 @@ def march(model, coefficients, workspace):
         if step > n_steps:
             return Result(n_steps, n_steps * len(lengths), corrections, None, size, False)
         if step <= last:
-            q, q_carry, L, L_carry = state
+            q, q_carry, L, L_carry, supplied = state
             h = lengths[stage]
-            a, gain, more, size, found = continue_branch(h, J, J_inverse, field, q, L, L_carry, tolerance)
+            now = at_step(field, find_start(lengths, step, stage), h)
+            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, q, L, L_carry, tolerance)
             corrections += more
             if not found:
-                elsewhere = find_solution(h, J, J_inverse, field, q, L)
+                elsewhere = find_solution(h, J, J_inverse, now, q, L)
                 return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
             L, L_carry = add_momentum(L, L_carry, gain)
+            supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
-            at, state, history = (step, stage + 1), (q, q_carry, L, L_carry), no_history()
+            at, state, history = (step, stage + 1), (q, q_carry, L, L_carry, supplied), no_history()
             left -= DEAR
         left -= step - first
         if left <= 0 < pause:
@@ -320,23 +324,25 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
     """
     first_step, first = at
-    q, q_carry, L, L_carry = state
+    q, q_carry, L, L_carry, supplied = state
     corrections, size = 0, 0.0
     until_sample = every - (first_step - 1) % every
     known, past = history
     for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
             h = lengths[stage]
-            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, field, q, L)
-            a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
+            now = at_step(field, find_start(lengths, step, stage), h)
+            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, q, L)
+            a, gain, iterations, size, trusted = newton_solve(h, J, now, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
-                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry), (known, past)
+                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
             if len(lengths) == 1:
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
             L, L_carry = add_momentum(L, L_carry, gain)
+            supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
         first = 0
         until_sample -= 1
@@ -344,7 +350,17 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
             until_sample = every
             row += 1
             record(row, q, L, q_out, L_out)
-    return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry), (known, past)
+            record_supply(row, supplied, L_out)
+    return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
+
+
+@small
+def find_start(lengths, step, stage):
+    """Return the time, s, at which a stage of a step starts. Without loads its callers do not use it, and it is left out."""
+    t = 0.0
+    for i in range(len(lengths)):
+        t += (step - 1) * lengths[i] if i >= stage else step * lengths[i]
+    return t
 
 
 @small

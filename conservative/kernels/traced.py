@@ -198,6 +198,8 @@ else:
 
     def unpack(builder, kind, value, flags=("contract",)):
         """Return the symbols of an LLVM value of a numba type: one, or a tuple of them."""
+        if isinstance(kind, types.NoneType):
+            return None
         if isinstance(kind, types.BaseTuple):
             parts = cgutils.unpack_tuple(builder, value, len(kind))
             numbers = [unpack(builder, *each, flags) for each in zip(kind, parts, strict=True)]
@@ -212,6 +214,8 @@ else:
         if isinstance(kind, types.BaseTuple):
             parts = [pack(context, builder, *each) for each in zip(kind, value, strict=True)]
             return context.make_tuple(builder, kind, parts)
+        if value is None:
+            return context.get_dummy_value()
         if not isinstance(value, Symbol):
             return context.get_constant(kind, value)
         if not value.width:
@@ -223,6 +227,8 @@ else:
 
     def type_of(value):
         """Return the numba type of a symbol, a constant or a tuple of them."""
+        if value is None:
+            return types.none
         if isinstance(value, tuple):
             named = type(value) if hasattr(value, "_fields") else None
             return types.BaseTuple.from_types([type_of(each) for each in value], named)

@@ -16,6 +16,7 @@ from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
 from ..errors import BadInput
 from ..invariants import jacobi_scale
+from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning
 from ..scene import Scene
@@ -83,6 +84,8 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     """Return the initial state in the axes R_BP (3, 3), in which the body has the moments (3,), kg m^2."""
     L = (scene.w_WB_B0 @ R_BP) * moments
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
+    if scene.loaded:
+        field = load_field(field, scene.torque, scene.damping, R_BP)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
     return PrincipalStart(triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
 

@@ -13,6 +13,7 @@ from ..card import Card, Cost, Structure
 from ..check import choice, positive_number
 from ..deferred_imports import kernels
 from ..grid import Grid
+from ..invariants import with_balances
 from ..method import Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds
@@ -34,8 +35,8 @@ from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
-_MOMENTA = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
-_MOMENTA_AND_ENERGY = _MOMENTA | {"energy"}
+_MOMENTA = with_balances("momentum", "vertical momentum", "momentum along the field's axis")
+_MOMENTA_AND_ENERGY = _MOMENTA | with_balances("energy")
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class Reduced(Method):
         colour="blue",
         kernel="reduced",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
+        loads=True,
     )
 
     def __post_init__(self) -> None:

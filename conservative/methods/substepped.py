@@ -45,6 +45,7 @@ class Substepped(Method):
         report=(),
         structure=lambda method: method.inner.card.structure(method.inner),
         time_dependent=True,  # `unsupported` asks the other method
+        loads=True,
     )
 
     def __post_init__(self) -> None:

@@ -17,6 +17,8 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
 from ..check import read_only, replace_unchecked
 from ..grid import Grid
 from ..method import Method, Run
@@ -52,6 +54,8 @@ class Units:
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
             t_end=scene.t_end / self.time,
             potential=potential,
+            torque=scene.torque and scene.torque.in_units(energy, self.time),
+            damping=scene.damping and scene.damping.in_units(energy, self.time),
             dt=scene.dt / self.time,
             extra_invariants=(),
         )
@@ -60,7 +64,9 @@ class Units:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
         failure = found.failure and found.failure.at_times(self.time)
         w_WB_B = found.w_WB_B / self.time
-        return replace(found, scene=scene, t=grid.t[: len(found)], w_WB_B=w_WB_B, failure=failure)
+        momentum = self.moment / self.time
+        supplied = None if found.supplied is None else found.supplied * np.repeat([momentum / self.time, momentum], [1, 3])
+        return replace(found, scene=scene, t=grid.t[: len(found)], w_WB_B=w_WB_B, failure=failure, supplied=supplied)
 
 
 SI = Units(1.0, 1.0)

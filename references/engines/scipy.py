@@ -16,6 +16,7 @@ from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.units import in_own_units
+from conservative.potentials.load import load_B
 from conservative.potentials.potential import torque_W
 from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
@@ -62,7 +63,12 @@ class SciPy(Method):
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
     card: ClassVar[Card] = Card(
-        variants=("rtol=1e-9", "rtol=1e-12"), report=("",), suite=("rtol=1e-9",), colour="orange", time_dependent=True
+        variants=("rtol=1e-9", "rtol=1e-12"),
+        report=("",),
+        suite=("rtol=1e-9",),
+        colour="orange",
+        time_dependent=True,
+        loads=True,
     )
 
     def __post_init__(self) -> None:
@@ -130,7 +136,7 @@ def _count_steps(solver: Any) -> Any:
 def state_derivative(scene: Scene) -> Derivative:
     """Return the derivative of the state, a quaternion, scalar first, and rates in principal axes.
 
-    numba compiles it unless the potential is one of Python functions.
+    numba compiles it unless the potential is one of Python functions, or the scene has a torque or damping.
     """
     axes, potential, compiled = principal_axes(scene), scene.potential, compile_derivative()
     field, static = SimpleNamespace(**describe_field(axes)), static_part(potential)
@@ -147,4 +153,11 @@ def state_derivative(scene: Scene) -> Derivative:
         out[4:] += torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J  # type: ignore[arg-type]
         return out
 
-    return derivative if potential is None or type(static) in FIELDS else through_gradient
+    of_field = derivative if potential is None or type(static) in FIELDS else through_gradient
+
+    def with_loads(t: float, y: Array) -> Array:
+        out, R_WB = of_field(t, y), from_quaternion(y[:4]) @ axes.R_BF.T
+        out[4:] += load_B(scene.torque, scene.damping, t, R_WB, axes.R_BF @ y[4:]) @ axes.R_BF / axes.J
+        return out
+
+    return with_loads if scene.loaded else of_field
