@@ -1,0 +1,100 @@
+"""Animations: the frames on one clock, and the page that plays them."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.errors import BadInput, Diverged
+from conservative.references.exact.method import Exact
+from conservative.reports.animation import Animation, element, script
+from conservative.reports.animation.frames import THINNEST, make_panels
+
+R0 = rotation_about((0.3, -1.2, 0.7), 0.83)
+BODY = cv.RigidBody([[3.1, 0.2, -0.1], [0.2, 2.7, 0.3], [-0.1, 0.3, 1.9]])
+SCENE = cv.Scene("a <b>body</b>", BODY, R0, (0.5, -1.5, 2.5), 3.0)
+
+
+def read(text):
+    """Return the data of an element."""
+    return json.loads(re.search(r'class="data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return [cv.integrate(SCENE, dt, method) for dt, method in ((0.01, cv.Reduced()), (0.003, Exact()), (0.0125, Exact()))]
+
+
+def exact(times):
+    """Return the exact attitudes at evenly spaced times."""
+    return Exact().solve(SCENE, cv.Grid(times[1], len(times) - 1)).R_WB
+
+
+def test_frames_of_different_steps_are_the_motion_at_the_times_of_one_clock(motions):
+    clock, panels = make_panels(motions, ["a", "b", "c"], None)
+    for panel, bound in zip(panels, (7e-4, 1e-6, 2e-5), strict=True):  # measured 6.5e-4 (the method's error), 8e-7, 1.3e-5 rad
+        assert angle_between(exact(clock.times) @ BODY.R_BP, panel.R_WP).max() < bound
+        np.testing.assert_allclose(np.linalg.norm(panel.L_W, axis=1), 1, atol=1e-14)  # measured 7e-16
+    sides = panels[0].size
+    moments = (sides**2).sum() - sides**2  # of a box: m/12 (b^2 + c^2)
+    np.testing.assert_allclose(moments / moments[0], BODY.moments / BODY.moments[0], rtol=1e-13)  # measured 2e-16
+
+
+@pytest.mark.parametrize("truth", [1, 2])
+def test_attitude_errors_do_not_depend_on_the_steps_of_the_truth(motions, truth):
+    _, panels = make_panels(motions, ["a", "b", "c"], truth)
+    error = angle_between(exact(motions[0].t), motions[0].R_WB).max()
+    assert panels[0].sizes["attitude error"][-1] == pytest.approx(error, abs=3e-8)  # measured 1e-8 at 0.0125 s
+    assert "attitude error" not in panels[truth].sizes
+
+
+def test_the_data_of_a_page_is_the_motion(motions):
+    data = read(element(motions, ["<i>", "b", "c"], truth=1))
+    q = np.reshape(data["panels"][1]["q"], (-1, 4))
+    times = np.linspace(0, data["duration"], data["frames"])
+    R_WP = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
+    assert angle_between(exact(times) @ BODY.R_BP, R_WP).max() < 3e-4  # measured 1.6e-4: four digits
+    assert angle_between(exact(times), R_WP).max() > 0.1  # of the principal axes, which are not the body's
+
+
+def test_a_page_has_no_markup_of_names_and_asks_for_nothing(motions):
+    page = Animation(motions, ["<i>", "b", "c"]).render(".html").decode()
+    assert "<b>body</b>" not in page
+    assert "<i>" not in page
+    assert not re.search(r"""(src|href)="(?!data:)""", page.replace(script(), ""))
+    assert len(page) < 330e3  # measured 280 kB, of which the library is 191 kB
+
+
+def test_a_run_that_ended_early_has_fewer_frames(motions):
+    cut = replace(
+        motions[0], t=motions[0].t[:100], R_WB=motions[0].R_WB[:100], w_WB_B=motions[0].w_WB_B[:100], failure=Diverged(0.99)
+    )
+    clock, panels = make_panels([cut, motions[1]], ["a", "b"], 1)
+    assert len(panels[0].R_WP) == np.count_nonzero(clock.times <= 0.99) < len(panels[1].R_WP) == len(clock.times)
+    assert panels[0].outcome == str(cut.outcome)
+
+
+def test_the_inertia_box_of_a_planar_body_and_of_moments_without_a_box_is_thin():
+    for moments in ((1.0, 2.0, 3.0), (1.0, 2.0, 3.5)):
+        scene = cv.Scene("planar", cv.RigidBody(moments), R0, (0.1, 0.2, 0.3), 1.0)
+        _, (panel,) = make_panels([cv.integrate(scene, 0.01)], ["a"], None)
+        assert panel.size.min() / panel.size.max() == pytest.approx(THINNEST)
+
+
+def test_mistakes_name_the_argument(motions):
+    fast = SCENE.rename("fast", t_end=3000.0)
+    cases = {
+        "labels": lambda: element(motions, ["a"]),
+        "t_end": lambda: element([cv.integrate(fast, 0.1)], ["a"]),
+        "truth": lambda: element([motions[0], cv.integrate(SCENE, 0.003, Exact(), 1.0)], ["a", "b"], truth=1),
+        "path": lambda: Animation(motions, ["a", "b", "c"]).save("a.avi"),
+        "trajectories": lambda: element([], []),
+    }
+    for argument, call in cases.items():
+        with pytest.raises(BadInput) as caught:
+            call()
+        assert caught.value.argument == argument
