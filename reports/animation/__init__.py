@@ -12,7 +12,7 @@ import gzip
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 
@@ -95,7 +95,13 @@ def script() -> str:
     )
 
 
-def element(trajectories: Sequence[Trajectory], labels: Sequence[str], id: str = "motion", truth: int | None = None) -> str:
+def element(
+    trajectories: Sequence[Trajectory],
+    labels: Sequence[str],
+    id: str = "motion",
+    truth: int | None = None,
+    numbers: bool = True,
+) -> str:
     """Return the HTML of an animation with its data; `script` makes it move.
 
     Parameters
@@ -106,6 +112,9 @@ def element(trajectories: Sequence[Trajectory], labels: Sequence[str], id: str =
         Identifier of the element on the page.
     truth
         Index of the reference solution, or None. The other panels show its attitude as an outline, and their attitude error.
+    numbers
+        True to show the largest drifts and attitude error so far below each panel. The error is correct to the interpolation
+        between the samples of the truth, if the times of the samples differ.
 
     Raises
     ------
@@ -113,6 +122,8 @@ def element(trajectories: Sequence[Trajectory], labels: Sequence[str], id: str =
         A trajectory has no samples, there is not one label for each, or the body turns too often to be watched.
     """
     clock, panels = make_panels(trajectories, labels, truth)
+    if not numbers:
+        panels = [replace(panel, sizes={}) for panel in panels]
     data = {
         "duration": clock.duration,
         "frames": len(clock.times),
