@@ -106,7 +106,7 @@ class Gate:
         terminalreporter.section("gate")
         ended = self.verdict or "no verdict: " + ("no baseline" if self.without_baseline else "the run ended before the gate")
         terminalreporter.write_line(str(ended))
-        terminalreporter.write_line(f"results: {self.folder / results.FILE}")
+        terminalreporter.write_line(f"results: {self.folder / results.FILE}, for Bencher: {self.folder / results.HISTORY}")
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -123,6 +123,7 @@ def row_id(item: pytest.Item) -> str:
 def row(item: pytest.Item, report: pytest.TestReport) -> Row:
     """Return the row of a benchmark, from its `extra_info`: see benchmarks/README.md, Benchmarks of your own, for the keys."""
     benchmark = getattr(item, "funcargs", {}).get("benchmark")
+    timed = getattr(benchmark, "stats", None)  # None with --benchmark-disable
     info: dict[str, Any] = benchmark.extra_info if benchmark else {}
     spreads = {str(name): float(spread) for name, spread in info.get("spreads", {}).items()}
     return Row(
@@ -134,6 +135,7 @@ def row(item: pytest.Item, report: pytest.TestReport) -> Row:
         definition=str(info.get("definition") or source_hash(item)),
         values={name: float(info.get(name, "nan")) for name in spreads},
         spreads=spreads,
+        seconds=float(timed.stats.min) if timed else 0.0,
     )
 
 

@@ -16,6 +16,7 @@ from ..measures.measure import Measure, key
 FOLDER = Path(".benchmarks") / "gate"
 """Path of the results of a gated run, relative to the root of the project."""
 FILE = "results.json"
+HISTORY = "bencher.json"
 RUNAWAY = 1.0
 """Relative energy drift above which a run has failed, even if it ended without an error."""
 ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
@@ -49,6 +50,8 @@ class Row:
         Measures that must not get worse, and the change of each by round-off alone.
     reason
         Reason why there are no values; may be empty.
+    seconds
+        Shortest time of a call, s, which is not gated; 0 if it was not timed.
     """
 
     id: str
@@ -60,6 +63,7 @@ class Row:
     values: Mapping[str, float] = field(default_factory=dict)
     spreads: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,23 @@ def find_runaway(values: Mapping[str, float]) -> str:
 
 
 def write(results: Results, path: Path) -> None:
-    """Write results as JSON, with NaN as NaN. Raise `NotWritten` if that fails."""
+    """Write results as JSON, with NaN as NaN, and beside them the file for Bencher. Raise `NotWritten` if that fails."""
     content = {**vars(results), "rows": [vars(row) for row in results.rows.values()]}
     make_folder(path.parent, "results")
     write_text(path, json.dumps(content, indent=1) + "\n", "results")
+    write_text(path.with_name(HISTORY), json.dumps(to_bencher(results), indent=1) + "\n", "results")
+
+
+def to_bencher(results: Results) -> dict[str, dict[str, dict[str, float]]]:
+    """Return the rows that passed in Bencher's metric format: accuracy with its spread, and the time as `latency`, ns."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for row in results.rows.values():
+        if row.status is Status.PASSED:
+            metrics = found[row.id] = {"latency": {"value": 1e9 * row.seconds}} if row.seconds > 0 else {}
+            for name, value in row.values.items():
+                spread = row.spreads.get(name, 0.0)
+                metrics[name] = {"value": value, "lower_value": value - spread, "upper_value": value + spread}
+    return found
 
 
 def read(path: Path) -> Results:

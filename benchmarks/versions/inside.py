@@ -6,10 +6,12 @@ The worker calls its functions, or prepares a run whose task is in `given`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
+from importlib.metadata import entry_points
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,15 +30,21 @@ def prepare(given: SimpleNamespace) -> Callable[[], Any]:
     return {"solve": solve, "time": keep_running}[given.task](given)
 
 
-def list_methods(names: list[str]) -> Answer:
-    """List the settings of the methods `names` in the suite, by default of all methods with the role `Role.OURS`."""
+def list_methods(names: list[str], project: str = "") -> Answer:
+    """List the settings of the methods `names` in the suite.
+
+    The default is what the project registers with the role `Role.OURS`. If it registers nothing, all methods of that role are
+    listed.
+    """
     families: dict[str, Any] = dict(registry.list_families())
+    registered = {each.name for each in entry_points(group="conservative.methods") if _is_of(each.dist, project)}
     with suppress(ImportError):  # a version without programs
         from conservative.programs import list_programs
 
         families |= dict.fromkeys(set(list_programs()).difference(families))
     methods: list[Method] = []
-    for name in names or sorted(name for name, family in families.items() if family and family.role == Role.OURS):
+    ours = [name for name, family in sorted(families.items()) if family and family.role == Role.OURS]
+    for name in names or [name for name in ours if name in registered] or ours:
         if families.get(name):
             methods += _suite_settings(families[name])
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
@@ -47,6 +55,10 @@ def list_methods(names: list[str]) -> Answer:
         return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
     return {"methods": [describe(method) for method in methods]}
+
+
+def _is_of(distribution: Any, project: str) -> bool:
+    return re.sub(r"[-_.]+", "-", distribution.name if distribution else "").lower() == project
 
 
 def _suite_settings(family: Any) -> tuple[Method, ...]:

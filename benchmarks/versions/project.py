@@ -58,7 +58,7 @@ class FailedThere(IntegrationFailed):
 class ProjectSide:
     """A version and its process, with its own folder of compiled kernels.
 
-    `names` are the compared methods, by default all methods with the role `Role.OURS`.
+    `names` are the compared methods, by default those that the project registers with the role `Role.OURS`.
     """
 
     def __init__(self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None) -> None:
@@ -77,7 +77,7 @@ class ProjectSide:
     @cached_property
     def settings(self) -> list[dict[str, Any]]:
         """Name, label, order and engine (the label of a foreign method, else "") of each setting."""
-        return list(self.ask("list_methods", names=self._names)["methods"])
+        return list(self.ask("list_methods", names=self._names, project=self.version.environment.engine)["methods"])
 
     def measure(self, scene: str) -> Iterator[tuple[str, Row]]:
         """Yield a row for each setting on a scene; a failure is in its row."""
@@ -220,7 +220,7 @@ def compare_projects(
             for line in made.lines
             if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
         ]
-        times = compare_times(*sides, list(map(setting_of, good)), processes)
+        times = compare_times(*sides, list(map(setting_of, good)), processes, tell)
         return replace(made, lines=tuple(replace(line, times=times.get(setting_of(line))) for line in made.lines))
 
 

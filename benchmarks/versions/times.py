@@ -24,6 +24,7 @@ from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 
 from ..measures.timing import wall_time
+from .comparison import TIMING, Tell
 
 SLOWER = 0.05
 """Fraction by which a row may become slower."""
@@ -101,9 +102,15 @@ Times = dict[Timed, list[tuple[float, float]]]
 """Shortest times of a step, s, in both versions, for each pair of processes."""
 
 
-def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[Timed, TimeRow]:
+def compare_times(
+    base: Process,
+    head: Process,
+    rows: Sequence[Timed],
+    processes: int = PROCESSES,
+    tell: Tell = lambda share, what: None,
+) -> dict[Timed, TimeRow]:
     """Return the times of two versions; rows that are slower are measured again."""
-    clock = Clock(base, head)
+    clock = Clock(base, head, tell)
     first = settle(clock, rows, processes)
     ratios = {row: ratio_of(first[row]) for row in rows}
     slower = [row for row in rows if ratios[row].slower]
@@ -130,8 +137,8 @@ def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
 class Clock:
     """Measures rows in new processes each time. `failures` has the reasons of rows without times."""
 
-    def __init__(self, base: Process, head: Process) -> None:
-        self._sides = base, head
+    def __init__(self, base: Process, head: Process, tell: Tell = lambda share, what: None) -> None:
+        self._sides, self._tell = (base, head), tell
         self._work: dict[Timed, tuple[int, int]] = {}
         self.failures: dict[Timed, str] = {}
 
@@ -141,7 +148,9 @@ class Clock:
         for turn in range(processes if rows else 0):
             for side in self._sides:
                 side.close()
-            for row in rows:
+            for number, row in enumerate(rows):
+                share = (turn + number / len(rows)) / processes
+                self._tell(TIMING + (1 - TIMING) * share, f"times of {row.method}, process {turn + 1} of {processes}")
                 if row in self.failures:
                     continue
                 try:

@@ -13,12 +13,15 @@ import hashlib
 import os
 import re
 import tempfile
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import conservative
 from conservative.errors import BadInput
 from conservative.files import make_folder, write_bytes
+from conservative.version import VERSION
 
 from .environment import (
     LOCK,
@@ -35,12 +38,14 @@ from .lock import Source, normal_name, resolve_wheel
 
 KEPT = 8
 """Largest number of environments of a project. The least recently used ones are removed."""
-US = "conservative"
+US, PACKAGE = "conservative", "conservative-rotation"
 _WHEEL = re.compile(r"([A-Za-z0-9_.]+)-[0-9][^-]*(-[^-]+){3,4}\.whl")
 
 
 def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> Environment:
     """Return the environment of a wheel from `keep_wheel`, created if it does not exist.
+
+    If the wheel does not require this package, or a version that the source does not have, the running version is added.
 
     Parameters
     ----------
@@ -54,13 +59,32 @@ def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> 
     Raises
     ------
     BadInput
-        A package is not available, or `conservative` is not among them or cannot be imported.
+        A package is not available, or `conservative` cannot be imported.
     """
     clear_leftovers()
+    try:
+        environment = _make_environment(wheel, requirements, source)
+    except BadInput as first:
+        try:
+            environment = _make_environment(wheel, (*requirements, _running_version(source)), source)
+        except BadInput:
+            raise first from None
+    os.utime(environment.folder / RECORD)
+    records = sorted(environment.folder.parent.glob(f"*/{RECORD}"), key=lambda path: path.stat().st_mtime)
+    for record in records[:-KEPT]:
+        drop(record.parent)
+    return environment
+
+
+def _make_environment(wheel: Path, requirements: Sequence[str], source: Source) -> Environment:
     name, key = normal_name(wheel.name.partition("-")[0]), wheel.parent.name
     distribution, folder = Distribution(name, US, tuple(requirements)), folder_of_projects() / name / key
     try:
         lock = resolve_wheel(distribution, wheel, key, source)
+        with zipfile.ZipFile(wheel) as archive:
+            ours = any(re.match(rf"{US}[./]", member) for member in archive.namelist())
+        if not ours and not re.search(f"^{PACKAGE}[ =]", lock.text, re.MULTILINE):
+            raise BadInput("against", f"{wheel.name}, without {PACKAGE}", f"a version that needs {PACKAGE}")
         environment = read_environment(folder)
         if environment is None or (folder / LOCK).read_text(encoding="utf-8") != lock.text:
             environment = make(name, lock, folder, source)
@@ -70,11 +94,15 @@ def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> 
     close_environment(environment.folder)
     if trouble:
         raise BadInput("against", f"{wheel.name}, in whose environment {trouble}", f"a version that needs {US}, which imports")
-    os.utime(folder / RECORD)
-    records = sorted(folder.parent.glob(f"*/{RECORD}"), key=lambda path: path.stat().st_mtime)
-    for record in records[:-KEPT]:
-        drop(record.parent)
     return environment
+
+
+def _running_version(source: Source) -> str:
+    """Return the requirement of this package in the running version: a wheel of its sources, if it runs from a checkout."""
+    sources = Path(conservative.__file__).parents[1]
+    if not (sources / "pyproject.toml").is_file():
+        return f"{PACKAGE}=={VERSION}"
+    return f"{PACKAGE} @ {keep_wheel('', build_project(sources, source)).as_uri()}"
 
 
 def keep_wheel(key: str, make_wheel: Callable[[Path], Path]) -> Path:

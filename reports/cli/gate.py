@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..document.model import Document
 
 FILES = ("junit", "markdown", "html")
+LIMITS = ["scene", "method", "measure", "measured", "limit"]
 OF_BASELINE = ("results", "baseline", "update")
 OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "build", "find_links", "allow_build", *FILES)
 
@@ -60,7 +61,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "bui
 )
 @click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: the newer version.  [default: this folder]")
 @names_option("scenes", "With --against: scenes.  [default: the scenes of the benchmarks]", complete=completion.scenes)
-@names_option("methods", "With --against: methods.  [default: all except engines and reference solutions]")
+@names_option("methods", "With --against: methods.  [default: those that the project registers]")
 @click.option(
     "--with",
     "requirements",
@@ -124,7 +125,7 @@ def _judge(options: dict[str, Any]) -> Document:
     from conservative.benchmarks.gate import baseline, results
     from conservative.benchmarks.gate.compare import judge
 
-    from ..document.model import Document, Paragraph
+    from ..document.model import Block, Document, Paragraph, Table
 
     path = options["baseline"] or baseline.PATH
     runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
@@ -141,8 +142,14 @@ def _judge(options: dict[str, Any]) -> Document:
     entry = new.history[-1]
     changes = ", ".join(f"{len(entry[kind])} {kind}" for kind in ("added", "changed", "removed"))
     text = f"{path}: {len(new.rows)} rows from {entry['runs']} runs; {changes}"
+    limits = [
+        [new.rows[id].scene, new.rows[id].method, name, f"{allowed.value:.6g}", f"{allowed.limit:.6g}"]
+        for id in (*entry["added"], *entry["changed"])
+        for name, allowed in new.rows[id].measures.items()
+    ]
+    blocks: list[Block] = [Paragraph(text), *([Table(LIMITS, limits, "Limits that are new or changed")] if limits else [])]
     data = {"passed": True, "baseline": path, "rows": len(new.rows), "entry": entry}
-    return Document("conservative gate", "A new baseline", [Paragraph(text)], data=data)
+    return Document("conservative gate", "A new baseline", blocks, data=data)
 
 
 def _compare(options: dict[str, Any]) -> Document:

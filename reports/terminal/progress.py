@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar with the time left on a terminal, nothing elsewhere."""
+"""Progress on stderr: a bar with the time left on a terminal, elsewhere a line every ten seconds."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ Step = Callable[[float, str], None]
 """Called with the finished share of all work, 0 to 1, and a description of the next piece."""
 DELAY = 1.0
 """Time, s, after which a bar appears."""
+SILENCE = 10.0
+"""Time, s, between two lines where there is no bar."""
 
 
 def has_terminal() -> bool:
@@ -30,7 +32,16 @@ def announce(what: str) -> None:
 def progress() -> Iterator[Step]:
     """Yield the function to call before each step."""
     if not has_terminal() or find_spec("rich") is None:  # the gate runs without the extra `report`, which has rich
-        yield lambda share, what: None
+        said = start = monotonic()
+
+        def step(share: float, what: str) -> None:
+            nonlocal said
+            if (now := monotonic()) - said >= SILENCE:
+                left = f", about {(now - start) * (1 - share) / share:.0f} s left" if share > 0 else ""
+                print(f"{share:.0%}{left}: {what}", file=sys.stderr, flush=True)
+                said = now
+
+        yield step
         return
     from .bars import Bar
 

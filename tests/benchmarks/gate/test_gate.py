@@ -192,6 +192,14 @@ def test_a_baseline_with_times_is_read_only_to_be_replaced(tmp_path):
     assert baseline.read(path, also_with_times=True) == KEPT
 
 
+def test_accuracy_and_time_go_to_bencher(tmp_path):
+    results.write(changed(seconds=2e-6), tmp_path / results.FILE)
+    found = json.loads((tmp_path / results.HISTORY).read_text())[ROW.id]
+    assert found["latency"] == {"value": pytest.approx(2000)}  # ns
+    assert found["energy drift max"] == {"value": 1e-3, "lower_value": 0.00099, "upper_value": 0.00101}
+    assert results.to_bencher(changed(status=Status.FAILED)) == {}
+
+
 def test_results_come_back_from_their_file(tmp_path):
     path = tmp_path / "new" / "results.json"
     latest = changed(values={"energy drift max": math.nan})

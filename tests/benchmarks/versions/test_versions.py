@@ -173,8 +173,20 @@ def test_invalid_versions_are_refused(project, source, name):
 
 def test_a_version_without_us_is_refused(tmp_path, source):
     write_project(tmp_path / "other", "other", "other_module", "VALUE = 1\n")
-    with pytest.raises(BadInput, match=r"against: got .*No module named 'conservative'.*expected a version that needs conserv"):
+    with pytest.raises(BadInput, match=r"against: got other-1.0.*without conservative-rotation; expected a version that"):
         install_version(str(tmp_path / "other"), tmp_path, source)
+
+
+def test_a_project_that_does_not_require_us_gets_the_running_version(tmp_path, source, monkeypatch):
+    write_wheel(tmp_path, "7.0", name="conservative")
+    wheel = tmp_path / "conservative-7.0-py3-none-any.whl"
+    monkeypatch.setattr(projects, "PACKAGE", "conservative")
+    monkeypatch.setattr(projects, "_running_version", lambda source: f"conservative @ {wheel.as_uri()}")
+    write_project(tmp_path / "other", "other", "other_module", "VALUE = 1\n")
+    first = install_version(str(tmp_path / "other"), tmp_path, source)
+    assert "conservative" in str(first.packages)
+    monkeypatch.setattr(projects, "make", None)  # the second comparison uses the same environment
+    assert install_version(str(tmp_path / "other"), tmp_path, source).environment == first.environment
 
 
 def test_a_wheel_with_another_name_is_refused(tmp_path, source):
