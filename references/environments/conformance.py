@@ -26,9 +26,10 @@ from conservative.scene import Scene
 
 from ..engine import principal_axes
 from ..samples import States, to_body_axes
+from ..worker.client import EndlessAnswer, EngineTimeout, time_limit
 from .environment import worker_of
 from .plain_numbers import describe, read_states
-from .programs import program_class
+from .programs import UnusableProgram, program_class
 
 J, R0, W0 = np.array((2.1, 3.3, 4.2)), rotation_about((1, -1, 0.3), 1.1), np.array((0.9, -1.1, 0.7))
 WEIGHT, COM = 3.1, np.array((0.3, -0.2, 0.5))
@@ -38,8 +39,22 @@ GRIDS = (Grid(0.005, 4), *(Grid(0.01 / part, 100 * part, 10 * part) for part in 
 CENTRAL = RigidBody(describe(principal_axes(HEAVY), GRIDS[0])["moments_com"])
 FLOOR, PACE = 1e-6, 0.2
 """Smallest errors that are compared, above those of single precision, and wall time of the calls in a measurement, s."""
+PATIENCE = 30.0
+"""Time in s that the program may take to start, and for each answer."""
+ANSWERS = "answer each request once, in one line that ends with a newline (or one binary message), and flush stdout"
+TO_Y_UP = rotation_about((1, 0, 0), -math.pi / 2)
+"""Turns coordinates with the third axis up into those with the second axis up: (x, y, z) to (x, z, -y)."""
+SAME = np.eye(3)
+GRAVITY_ALONG_Y = "Gravity is along minus the second axis of W: the third axis of W is up"
+TURNS = {  # of the world that attitudes are relative to
+    GRAVITY_ALONG_Y: TO_Y_UP,
+    "The second axis of its world is up: attitudes are relative to W, whose third axis is up": TO_Y_UP,
+    "Its world is W turned the wrong way, by 90 degrees: attitudes are relative to W": TO_Y_UP.T,
+}
 READING: dict[str, dict[str, Any]] = {
     "": {},
+    **{reading: {} for reading in TURNS},
+    GRAVITY_ALONG_Y: {"R_WB0": TO_Y_UP.T @ R0},
     "It reads `q0` as x, y, z, w: the scalar comes first": {"R_WB0": from_quaternion(np.roll(to_quaternion(R0), 1))},
     "It reads the initial attitude transposed: v_W = R0 v_F": {"R_WB0": R0.T},
     "It reads `w0` in world axes: `w0` is in F": {"w_WB_B0": R0.T @ W0},
@@ -56,6 +71,11 @@ ATTITUDES: dict[str, Callable[[Array], Array]] = {
     "The attitudes are transposed: v_W = R v_F": lambda values: (
         values * (1, -1, -1, -1, 1, 1, 1) if values.shape[-1] == 7 else values[..., [0, 3, 6, 1, 4, 7, 2, 5, 8, 9, 10, 11]]
     ),
+    "Vectors are x, z, -y, with the second axis up: answer in W and F, whose third axis is up": lambda values: (
+        values[..., [0, 1, 3, 2, 4, 6, 5]] * (1, 1, -1, 1, 1, -1, 1)
+        if values.shape[-1] == 7
+        else values[..., [0, 2, 1, 6, 8, 7, 3, 5, 4, 9, 11, 10]] * (1, -1, 1, -1, 1, -1, 1, -1, 1, 1, -1, 1)
+    ),
 }
 W_IN_W = "Rates in W are named `w`, or rates in F `w_W`: `w` is in F"
 RATES = {"": 1.0, W_IN_W: 1.0, "Rates are in deg/s: answer in rad/s": math.pi / 180}
@@ -68,11 +88,19 @@ TIMES: dict[str, tuple[float, int, int]] = {  # unit of dt, and how much later a
 _solve = lru_cache(maxsize=256)(registry.method("taylor").solve)
 
 
-def _distance(scene: Scene, grid: Grid, seen: tuple[Array, Array], unit: float = 1, late_R: int = 0, late_w: int = 0) -> float:
+def _distance(
+    scene: Scene,
+    grid: Grid,
+    seen: tuple[Array, Array],
+    unit: float = 1,
+    late_R: int = 0,
+    late_w: int = 0,
+    turn: Array = SAME,
+) -> float:
     truth = _solve(scene, Grid(unit * grid.dt / 2, 2 * grid.n_steps + 2))
     place = 2 * grid.steps[1:].astype(int)
     rates = np.linalg.norm(truth.w_WB_B[place + late_w] - seen[1][1:], axis=-1) / np.linalg.norm(W0)
-    return float(np.nan_to_num(np.max([angle_between(truth.R_WB[place + late_R], seen[0][1:]), rates]), nan=math.inf))
+    return float(np.nan_to_num(np.max([angle_between(turn @ truth.R_WB[place + late_R], seen[0][1:]), rates]), nan=math.inf))
 
 
 def _read(states: States, attitude: str = "", rates: str = "") -> tuple[Array, Array]:
@@ -90,46 +118,58 @@ def find_mistakes(scene: Scene, answers: dict[Grid, States]) -> tuple[str, ...]:
     scenes = {reading: replace(scene, **values) for reading, values in READING.items()}
     costs = {}
     for reading, when, names in product(READING, TIMES, seen):
-        errors = [_distance(scenes[reading], grid, samples, *TIMES[when]) for grid, samples in seen[names]]
+        errors = [
+            _distance(scenes[reading], grid, samples, *TIMES[when], TURNS.get(reading, SAME)) for grid, samples in seen[names]
+        ]
         mistakes = tuple(filter(None, (reading, *names, when)))
         costs[mistakes] = math.prod(max(FLOOR, error) for error in errors) * 10 ** len(mistakes)  # each has to explain much
     return min(costs, key=lambda mistakes: costs[mistakes])
 
 
 def check(program: Program) -> Iterator[tuple[bool, str]]:
-    """Yield whether each part of the test was passed, and its result as a sentence. Raise `UnusableProgram`."""
-    method = program_class(program)()
-    worker, run = worker_of(method.environment), 0
-    yield True, f"hello: {method.maker}"
-    for scene in (FREE, HEAVY):
-        answers = dict[Grid, States]()
-        try:
-            for grid in GRIDS:
-                run = worker.ask("prepare", settings=method.settings, **describe(principal_axes(scene), grid))["run"]
-                answers[grid] = read_states(worker.ask("run", run=run), (grid.n_samples,))
-            again = read_states(worker.ask("run", run=run), (grid.n_samples,))
-        except (IntegrationFailed, NotImplementedError) as failure:
-            right = scene is HEAVY and isinstance(failure, NotImplementedError)
-            yield right, f"{scene.name}: {getattr(failure, 'outcome', f'unsupported ({failure})')}"
-            if right:
-                break
-            return
-        errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
-        text = f"error {errors[1]:.1e} at dt = {GRIDS[1].dt} s, {errors[-1]:.1e} at {grid.dt} s"
-        mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
-        if errors[-1] > 100 * FLOOR and not 2 * errors[-1] < errors[1] < 1:
-            mistakes = mistakes or (f"{text}: it does not fall with dt, and no known mistake explains it",)
-        yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
-        if mistakes:
-            return
-        yield True, f"{scene.name}: {text}"
-        same = np.array_equal(again.values, answers[grid].values)
-        yield same, f"{scene.name}: a second run has {'the same' if same else 'other samples: start from `q0` and `w0`'}"
-    calls, wall, seconds = 1, 0.0, 0.0
-    while (wall < PACE or seconds < 0.5 * wall < 5 * PACE) and calls < 1e6:  # a busy machine may delay an answer
-        calls, start = 4 * calls, perf_counter()
-        seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
-        wall = perf_counter() - start
+    """Yield whether each part of the test was passed, and its result as a sentence that names what to change."""
+    part, remedy = "hello", "build it or change it as PROTOCOL.md describes"
+    try:
+        with time_limit(PATIENCE):
+            method = program_class(program, PATIENCE)()
+            yield True, f"hello: {method.maker}"
+            worker, run = worker_of(method.environment), 0
+            for scene in (FREE, HEAVY):
+                part, answers = scene.name, dict[Grid, States]()
+                try:
+                    for grid in GRIDS:
+                        run = worker.ask("prepare", settings=method.settings, **describe(principal_axes(scene), grid))["run"]
+                        answers[grid] = read_states(worker.ask("run", run=run), (grid.n_samples,))
+                    again = read_states(worker.ask("run", run=run), (grid.n_samples,))
+                except NotImplementedError as failure:
+                    yield scene is HEAVY, f"{scene.name}: unsupported ({failure})"
+                    if scene is HEAVY:
+                        break
+                    return
+                errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
+                text = f"error {errors[1]:.1e} at dt = {GRIDS[1].dt} s, {errors[-1]:.1e} at {grid.dt} s"
+                mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
+                if errors[-1] > 100 * FLOOR and not 2 * errors[-1] < errors[1] < 1:
+                    mistakes = mistakes or (f"{text}: it does not fall with dt, and no known mistake explains it",)
+                yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
+                if mistakes:
+                    return
+                yield True, f"{scene.name}: {text}"
+                same = np.array_equal(again.values, answers[grid].values)
+                yield (
+                    same,
+                    f"{scene.name}: a second run has {'the same' if same else 'other samples: start from `q0` and `w0`'}",
+                )
+            part, calls, wall, seconds = "time", 1, 0.0, 0.0
+            while (wall < PACE or seconds < 0.5 * wall < 5 * PACE) and calls < 1e6:  # a busy machine may delay an answer
+                calls, start = 4 * calls, perf_counter()
+                seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
+                wall = perf_counter() - start
+    except (UnusableProgram, IntegrationFailed) as failure:
+        cause = getattr(failure, "cause", failure)
+        remedy = ANSWERS if isinstance(cause, (EngineTimeout, EndlessAnswer)) else remedy
+        yield False, f"{part}: {getattr(failure, 'problem', getattr(failure, 'outcome', ''))}: {remedy}"
+        return
     problem = ": `seconds` is the wall time of all calls together" if seconds < 0.5 * wall else ""
     problem = ": `seconds` is in s, and only of the calls" if seconds > wall else problem
     problem = ": `time` has to make `calls` runs" if wall < PACE else problem

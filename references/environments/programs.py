@@ -21,6 +21,7 @@ from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
 from conservative.scene_files.toml_reader import key_lines
 
+from ..worker.client import START_LIMIT
 from .engine_method import EngineMethod, engine_class
 from .environment import Environment, worker_of
 from .plain_numbers import FIELDS
@@ -31,9 +32,10 @@ class UnusableProgram(MissingEngine):
 
     def __init__(self, program: Program, error: Exception) -> None:
         self.engine = self.package = program.name
-        problem = getattr(error, "outcome", f"its answer to `hello` cannot be used ({type(error).__name__}: {error})")
+        unusable = f"its answer to `hello` cannot be used ({type(error).__name__}: {error})"
+        self.cause, self.problem = error, getattr(error, "outcome", unusable)
         remedy = f"Build it or change it as PROTOCOL.md describes, or run: conservative engines remove {program.name}"
-        ImportError.__init__(self, f"{program.name}, a program of {program.file}: {problem}. {remedy}")
+        ImportError.__init__(self, f"{program.name}, a program of {program.file}: {self.problem}. {remedy}")
 
 
 def __getattr__(name: str) -> type[EngineMethod]:
@@ -43,13 +45,13 @@ def __getattr__(name: str) -> type[EngineMethod]:
 
 
 @cache
-def program_class(program: Program) -> type[EngineMethod]:
-    """Return the class of a program, which is started for its description. Raise `UnusableProgram` if that fails."""
+def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMethod]:
+    """Return the class of a program, started for its description within a limit in s. Raise `UnusableProgram` if that fails."""
     module: Any = ModuleType(program.name, f"{program.name}, a program.")
     environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), words=program.words)
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
-        greeting = worker_of(environment).greet()
+        greeting = worker_of(environment).greet(limit)
         module.ENGINE = {**every, **greeting.get("engine", {})}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]

@@ -31,6 +31,8 @@ START_LIMIT = 120.0
 """Time in seconds that a program may take to start, on however busy a machine."""
 TIME_LIMIT = 600.0
 """Time limit of a request in seconds, unless `time_limit` sets another."""
+LARGEST_ANSWER = 1 << 30
+"""Largest answer in bytes."""
 LARGEST_FILE = 1 << 28
 """Largest file in bytes that a program with a memory limit may write, including its output."""
 _LAST_WORDS = 300
@@ -48,6 +50,13 @@ class EngineCrashed(IntegrationFailed):
         self.reason = reason
         self.outcome = Outcome(OutcomeKind.CRASHED, reason)
         super().__init__(f"The engine {self.outcome}. Use another scene or setting")
+
+
+class EndlessAnswer(EngineCrashed):
+    """The engine sent more than `LARGEST_ANSWER` as one answer."""
+
+    def __init__(self) -> None:
+        super().__init__(f"an answer of more than {LARGEST_ANSWER / (1 << 30):.3g} GiB")
 
 
 class EngineTimeout(IntegrationFailed):
@@ -140,10 +149,10 @@ class Worker:
             raise EngineCrashed(f"{answer['error']}: {answer['message']}")
         return _Answer(answer)
 
-    def greet(self) -> dict[str, Any]:
-        """Return the answer of the program to `hello`. Raise as `ask`."""
+    def greet(self, limit: float = START_LIMIT) -> dict[str, Any]:
+        """Return the answer of the program to `hello`, within a limit in s if it has to start. Raise as `ask`."""
         with self._lock:
-            self._start_if_ended()
+            self._start_if_ended(limit)
         return self._greeting
 
     def forget(self, start: int, run: int) -> None:
@@ -170,7 +179,7 @@ class Worker:
             if self._owner == os.getpid():
                 self._end()
 
-    def _start_if_ended(self) -> None:
+    def _start_if_ended(self, limit: float = START_LIMIT) -> None:
         if self.pid is not None:
             return
         self._end()
@@ -197,7 +206,7 @@ class Worker:
             os.close(life)
         self.starts += 1
         _limit_resources(self._process.pid, self._memory)
-        with self._ended_by_failure(START_LIMIT) as deadline:
+        with self._ended_by_failure(limit) as deadline:
             greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"], "life": life}
             self._greeting = self._exchange(greeting, deadline)
             if self._greeting.get("protocol") != program.PROTOCOL:
@@ -318,7 +327,9 @@ def _read_some(pipe: IO[bytes], most: int, deadline: float) -> bytes:
 
 
 def _read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
-    """Return a number of bytes. Raise EOFError if there are fewer, and TimeoutError after the deadline."""
+    """Return a number of bytes. Raise EOFError if there are fewer, TimeoutError after the deadline, and EndlessAnswer."""
+    if count > LARGEST_ANSWER:
+        raise EndlessAnswer
     parts = []
     while count:
         parts.append(_read_some(pipe, count, deadline))
@@ -327,10 +338,13 @@ def _read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
 
 
 def _read_line(pipe: IO[bytes], deadline: float) -> bytes:
-    """Return a line. Each request has one answer, so nothing can follow it."""
-    parts = [_read_some(pipe, 1 << 20, deadline)]
+    """Return a line. Each request has one answer, so nothing can follow it. Raise as `_read_exactly`."""
+    parts, room = [_read_some(pipe, 1 << 20, deadline)], LARGEST_ANSWER
     while not parts[-1].endswith(b"\n"):
         parts.append(_read_some(pipe, 1 << 20, deadline))
+        room -= len(parts[-1])
+        if room < 0:
+            raise EndlessAnswer
     return b"".join(parts)
 
 

@@ -109,9 +109,9 @@ def section(measured: Measured) -> Section:
     blocks: list[Block] = [Paragraph(words)]
     for scene in measured.plan.scenes:
         rows, name, dt = engine_rows(table, scene.name, points), scene.name, f"{scene.dt:g}"
-        if count := len({row.engine for row in rows if row.outcome.ok}):
+        if rows:
             about = (
-                f"{count} engines support this scene. {scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
+                f"{scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
                 f"relative: ✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more."
             )
             blocks.append(Section(f"{name}: as installed, and at its best", [Paragraph(about), side_by_side(rows, name)]))
@@ -122,6 +122,14 @@ def section(measured: Measured) -> Section:
     blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
     return Section("Engines", blocks, "engines")
+
+
+def tables(measured: Measured) -> list[Table]:
+    """Return the table of engines for each scene, `side_by_side`; none if the report names no engines."""
+    table = measured.rows[measured.rows["study"].isin(ENGINES)]
+    points = points_over(table, OVER_STEPS)
+    scenes = [scene.name for scene in measured.plan.scenes] if measured.plan.engines else []
+    return [side_by_side(engine_rows(table, scene, points), scene) for scene in scenes]
 
 
 def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFrame:
@@ -269,18 +277,20 @@ def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
 
 
 def side_by_side(rows: Sequence[EngineRow], scene: str) -> Table:
-    """Return each engine as installed next to its best setting, the most accurate engines first."""
+    """Return each engine as installed next to its best setting, the most accurate first; without an error, its outcome."""
     parts = ("error, rad", "energy drift", "turns over")
     sides = (AS_INSTALLED, AT_ITS_BEST)
     header = ["engine", "bits", *(f"{side}: {part}" for side in sides for part in ("setting", *parts))]
     body: list[Row] = []
-    for best in (row for row in rows if row.best):
-        cells: list[str | Cell] = [best.engine, best.cells["bits"]]
-        for row in (next((row for row in rows if row.engine == best.engine and row.as_installed), None), best):
+    for engine in dict.fromkeys(row.engine for row in rows):
+        members = [row for row in rows if row.engine == engine]
+        best = next((row for row in members if row.best), members[0])
+        cells: list[str | Cell] = [engine, best.cells["bits"]]
+        for row in (next((row for row in members if row.as_installed), None), best):
             if row is None:
                 cells += [DASH] * 4
             elif math.isnan(row.error):
-                cells += [row.setting, outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
+                cells += [row.setting, outcome_cell(row.outcome, reason=row is best), DASH, DASH]
             else:
                 cells += [row.setting, *(row.cells[part] for part in parts)]
         body.append(cells)

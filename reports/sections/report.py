@@ -55,7 +55,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         "conservative report",
         "Which integrator for a rotating body?",
         blocks,
-        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *map(Paragraph, sentences)],
+        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *engines.tables(measured), *map(Paragraph, sentences)],
         data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
         failures=failures.failures_of_ours(rows),
     )

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from conservative.references.environments import conformance
 from conservative.references.environments.conformance import check
 from conservative.references.environments.programs import read_program
+from conservative.references.worker import client
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
@@ -54,6 +55,10 @@ NAMED = {
     "no gyroscopic torque": "free body: It has no gyroscopic torque",
     "dt in ms": "free body: It reads `dt` in ms: it is in s",
     "gravity up": "heavy body: Gravity points up",
+    "gravity along y": "heavy body: Gravity is along minus the second axis of W: the third axis of W is up",
+    "world y-up": "free body: The second axis of its world is up",
+    "wrong turn": "free body: Its world is W turned the wrong way",
+    "all y-up": "free body: Vectors are x, z, -y, with the second axis up",
     "no gravity": "heavy body: It ignores gravity",
     "inertia about com": "heavy body: Its inertia is about the centre of mass",
     "time in ms": "`seconds` is in s, and only of the calls",
@@ -75,6 +80,30 @@ def test_a_mistake_is_named(mistake):
     found = failures("euler", mistake)
     assert len(found) == 1 + (mistake == "random")  # on both bodies
     assert NAMED[mistake] in found[0]
+
+
+@pytest.mark.parametrize("mistake", ["world y-up", "all y-up"])
+def test_a_mistake_in_matrices_is_named(mistake):
+    assert [NAMED[mistake] in text for text in failures("rk4", mistake, "matrices")] == [True]
+
+
+def test_a_program_that_does_not_answer_is_ended(monkeypatch):
+    monkeypatch.setattr(conformance, "PATIENCE", 2.0)
+    *right, wrong = results("rk4", "silent")
+    assert (right, wrong[0]) == ([(True, "hello: planted==1")], False)
+    assert wrong[1].startswith("free body: timeout (after 2 s): answer each request once, in one line that ends with a newline")
+    words = shlex.join([sys.executable, "-I", "-c", "import time; time.sleep(60)"])
+    assert [text.partition(": answer")[0] for _, text in check(read_program(words))] == ["hello: timeout (after 2 s)"]
+
+
+@pytest.mark.parametrize("limit", ["LARGEST_ANSWER", "PATIENCE"])
+def test_an_answer_without_an_end_is_ended_by_its_size_and_by_time(limit, monkeypatch):
+    module, value, problem = {
+        "LARGEST_ANSWER": (client, 1 << 24, "crashed (an answer of more than 0.0156 GiB)"),
+        "PATIENCE": (conformance, 0.5, "timeout (after 0.5 s)"),
+    }[limit]
+    monkeypatch.setattr(module, limit, value)
+    assert failures("rk4", "endless") == [f"free body: {problem}: {conformance.ANSWERS}"]
 
 
 def test_a_delay_of_an_accurate_method_is_named():

@@ -98,7 +98,9 @@ def test_a_crash_is_a_marked_row_and_unsupported_settings_share_one(settings):
 def test_an_engine_as_installed_is_compared_with_its_best(rows):
     table = side_by_side(list(rows.values()), SCENE)
     found = {row[0]: dict(zip(table.header, map(str, row), strict=True)) for row in table.rows}
-    assert list(found) == ["a==1", "b==2", "c==3"]
+    assert list(found) == ["a==1", "b==2", "c==3", "d==4", "e==5"]
+    reasons = [found[name]["at its best: error, rad"] for name in ("d==4", "e==5")]
+    assert reasons == ["✗ crashed: signal 11 (SIGSEGV)", "– unsupported: its adapter has free bodies"]
     assert [found["a==1"][f"{part}: error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-6"]
     assert found["b==2"]["as installed: setting"] == "–"
 

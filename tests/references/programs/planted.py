@@ -25,6 +25,20 @@ def turn(R, v):
     return [sum(a * b for a, b in zip(row, v, strict=True)) for row in R]
 
 
+TO_Y_UP, TO_Z_UP = ([math.sqrt(0.5), sign * math.sqrt(0.5), 0, 0] for sign in (-1, 1))
+
+
+def product(p, q):
+    a, b, c, d = p
+    s, x, y, z = q
+    return [
+        a * s - b * x - c * y - d * z,
+        a * x + b * s + c * z - d * y,
+        a * y - b * z + c * s + d * x,
+        a * z + b * y - c * x + d * s,
+    ]
+
+
 def derivative(y, J, m):
     a, b, c, d, x, v, z = y
     gx, gy, gz = (-each for each in matrix(a, b, c, d)[2])
@@ -74,6 +88,8 @@ def read(given):
         m = [-each for each in m]
     if "no gravity" in MISTAKES:
         m = [0, 0, 0]
+    if "gravity along y" in MISTAKES:
+        q = product(TO_Z_UP, q)
     return [*q, *w], dt, J, m
 
 
@@ -82,6 +98,15 @@ def sample(y, dt, *body):
     y = earlier if "half a step late" in MISTAKES else y
     q, w = y[:4], earlier[4:] if "rates late" in MISTAKES else y[4:]
     R = matrix(*q)
+    if "gravity along y" in MISTAKES or "world y-up" in MISTAKES:
+        q = product(TO_Y_UP, q)
+    if "wrong turn" in MISTAKES:
+        q = product(TO_Z_UP, q)
+    if "all y-up" in MISTAKES:
+        q, w = [q[0], q[1], q[3], -q[2]], [w[0], w[2], -w[1]]
+    R = matrix(*q)
+    if "matrices" in MISTAKES:
+        return {"R": R, "w": w}
     w = turn(R, w) if "w in world" in MISTAKES else w
     w = [math.degrees(each) for each in w] if "w in deg" in MISTAKES else w
     if "R transposed" in MISTAKES:
@@ -118,6 +143,10 @@ def answer(request):
             return {"error": "unsupported", "message": "only tops"}
         runs.append(request)
         return {} if "no number" in MISTAKES else {"run": len(runs) - 1}
+    if "silent" in MISTAKES and request["do"] == "run":
+        time.sleep(60)
+    while "endless" in MISTAKES and request["do"] == "run":
+        sys.stdout.write("[" * 100000)
     if request["do"] == "run":
         return integrate(runs[request["run"]])
     start = time.perf_counter()
