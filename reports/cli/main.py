@@ -72,8 +72,19 @@ def _as_click(error: Exception) -> Exception:
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 
 
+FIRST = """\
+conservative run brick_flip                      integrate a tumbling brick, and say how wrong the result is
+conservative list                                list scenes and methods
+conservative recommend brick_flip --error 1e-6   which method to use, with which step
+conservative report                              measure all methods on the paper's scenes: a page, in a minute
+conservative new > my_body.toml                  describe your own body; each command takes this file
+conservative --help                              all commands"""
+"""What can be done, for somebody who types the name of the command only."""
+
+
 @click.group(
     cls=Commands,
+    invoke_without_command=True,
     epilog=epilog(
         "conservative report                      measure the paper's two scenes, write report/",
         "conservative run brick_flip --dt 0.01    integrate a scene once",
@@ -82,11 +93,14 @@ def _as_click(error: Exception) -> Exception:
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(package_name="conservative-rotation", message="%(prog)s %(version)s")
-def main() -> None:
+@click.pass_context
+def main(context: click.Context) -> None:
     """Integrate the rotation of rigid bodies with conserved energy and momentum, and compare with physics engines.
 
     Tab completion in bash: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)". In zsh and fish: zsh_source, fish_source.
     """
+    if context.invoked_subcommand is None:
+        click.echo(FIRST)
 
 
 for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, study, judge):

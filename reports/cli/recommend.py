@@ -35,6 +35,7 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": SVG_MARK
     "--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time of a setting per simulated second, s."
 )
 @click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
+@click.option("--verbose", "-v", is_flag=True, help="Also print the probe runs and the basis of the numbers.")
 @json_option
 @click.option("--out", type=Output(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
 def recommend(
@@ -44,10 +45,11 @@ def recommend(
     engine: tuple[str, ...],
     cost_limit: float,
     time_limit: float,
+    verbose: bool,
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """List which methods reach the error on SCENE, a name or a file, at what cost and drift.
+    """Say which method and setting to use for SCENE, a name or a file, and what else reaches the error at what cost.
 
     Our method for the scene and the engines make short probe runs at several settings. Errors after the end of a probe are
     extrapolated, and the result states how.
@@ -71,6 +73,6 @@ def recommend(
         question = ask(registry.scene(scene), error, duration, names, cost_limit, time_limit)
         with output_files(out, FILES) as write:
             recommendation = answer(question, step)
-            document = build(recommendation)
+            document = build(recommendation, scene, verbose)
             write(document, svg=draw)
     show(document, as_json)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -21,12 +22,17 @@ NEGLIGIBLE = 1e-13
 """Relative drift up to which the tables show `conserved`."""
 
 
-def build(recommendation: Recommendation) -> Document:
-    """Return the document of a recommendation; its picture is in `charts.recommendation`."""
+def build(recommendation: Recommendation, scene: str, verbose: bool) -> Document:
+    """Return the document of a recommendation for a scene by its name or file; its picture is in `charts.recommendation`.
+
+    The terminal shows the answer and the settings, and with `verbose` also the probe runs and the basis of the numbers.
+    """
     conditions = recommendation.conditions
     title = f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s"
-    blocks: list[Block] = [*tables(recommendation), Section("Basis of the numbers", [Items.of(notes(recommendation))])]
-    question = Paragraph(f"{title}\n", Emphasis.LEAD)
+    settings, probes = list(tables(recommendation)), probe_table(recommendation)
+    basis = Section("Basis of the numbers", [Items.of(notes(recommendation))])
+    answer = [Paragraph(f"{title}\n", Emphasis.LEAD), Paragraph("\n".join([*answer_lines(recommendation, scene), ""]))]
+    more = [probes, basis] if verbose else [Paragraph("--verbose shows the probe runs and the basis of the numbers.")]
     truth, amplified = conditions.reference, conditions.amplification
     data = {
         "scene": conditions.scene.name,
@@ -52,7 +58,29 @@ def build(recommendation: Recommendation) -> Document:
             "by": amplified.label,
         },
     }
-    return Document("conservative recommend", title, blocks, brief=[question, *blocks], data=data)
+    blocks: list[Block] = [*settings, probes, basis]
+    return Document("conservative recommend", title, blocks, brief=[*answer, *settings, *more], data=data)
+
+
+def answer_lines(recommendation: Recommendation, scene: str) -> Iterator[str]:
+    """Yield what to use for a scene, by its name or file: the fastest setting, its command, and the fastest engine."""
+    conditions, winners = recommendation.conditions, recommendation.winners
+    best, engine = winners["cheapest"], winners["cheapest_engine"]
+    if best is None or best.best is None:
+        yield f"No method reaches it at up to {conditions.cost_limit:g} s of wall time per simulated second (--cost-limit)."
+        return
+    probe = best.best
+    yield (
+        f"Use {method_text(best)} with {setting_text(probe)}. To expect: attitude error {probe.expected:.1e} rad, drift: "
+        f"{drift_text(probe.drifts)}; {best.cost * 1e6:.3g} µs per simulated second."
+    )
+    scene = shlex.quote(scene)
+    yield f"Run: conservative run {scene} -m {probe.method.name} --dt {probe.dt:.7g} --t-end {conditions.duration:g}"
+    if engine is not None and engine is not best and engine.best is not None:
+        ratio = engine.cost / best.cost
+        yield f"Fastest engine: {method_text(engine)} with {setting_text(engine.best)}, which takes {ratio:.2g} times as long."
+    if conditions.amplification.unstable:
+        yield "The motion is unstable and amplifies errors: --verbose shows by how much."
 
 
 def _advice(advice: Advice) -> dict[str, Any]:
@@ -84,7 +112,7 @@ def _probe(probe: Probe) -> dict[str, Any]:
 
 
 def tables(recommendation: Recommendation) -> Iterator[Table]:
-    """Yield the methods that reach the error, those that do not, and the probe runs."""
+    """Yield the methods that reach the error, and those that do not."""
     reaching, failing = [], []
     for advice in sorted(recommendation.advice, key=lambda advice: advice.cost if advice.reached else 0.0):
         if (probe := advice.best) is None:
@@ -100,8 +128,12 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
     if failing:
         limit = f"Methods that do not, at up to {recommendation.conditions.cost_limit:g} s of wall time per simulated second"
         yield Table(FAILING, failing, limit)
+
+
+def probe_table(recommendation: Recommendation) -> Table:
+    """Return the probe runs."""
     probes = [row for advice in recommendation.advice for row in _probe_rows(advice)]
-    yield Table(PROBES, probes, "The probe runs; <- marks the settings of the tables above")
+    return Table(PROBES, probes, "The probe runs; <- marks the settings of the tables above")
 
 
 def notes(recommendation: Recommendation) -> list[str]:

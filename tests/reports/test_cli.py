@@ -36,6 +36,14 @@ def test_help_has_examples_and_exit_codes(command):
     assert "Exit codes:" in done.stdout
 
 
+def test_the_name_alone_says_what_can_be_done():
+    done = conservative()
+    assert done.exit_code == 0
+    for line in done.stdout.splitlines():
+        name = line.split()[1]
+        assert name in main.commands or name == "--help"
+
+
 def test_run_equals_the_known_rates():
     done = conservative("run", "brick_flip", "--method", "reduced", "--dt", "0.01", "--json")
     assert done.exit_code == 0

@@ -1,4 +1,5 @@
 import json
+import shlex
 
 import pytest
 from click.testing import CliRunner
@@ -9,7 +10,7 @@ COMMON = ("--error", "1e-4", "--duration", "0.4")
 
 
 def conservative(*arguments):
-    return CliRunner().invoke(main, ["recommend", *(str(argument) for argument in arguments)])
+    return CliRunner(env={"COLUMNS": "400"}).invoke(main, ["recommend", *(str(argument) for argument in arguments)])
 
 
 @pytest.fixture(scope="module")
@@ -55,15 +56,28 @@ def test_folder_has_the_answer_and_the_picture(answered):
         assert part in picture
 
 
+def test_the_answer_has_a_command_that_reaches_the_error(answered, tmp_path):
+    scene = answered[1].parent / "my_body.toml"
+    lines = conservative(scene, *COMMON, "--engine", "heyoka:1e-6").stdout.splitlines()
+    assert any(line.startswith("Use ") for line in lines[:4])
+    assert not any("probe runs;" in line for line in lines)
+    (command,) = [line.removeprefix("Run: conservative ") for line in lines if line.startswith("Run: ")]
+    done = CliRunner().invoke(main, [*shlex.split(command), "--json"])
+    assert json.loads(done.stdout)["error"]["attitude"] < 1e-4, done.output
+    assert "probe runs;" in conservative(scene, *COMMON, "--engine", "heyoka:1e-6", "--verbose").stdout
+
+
 def test_a_method_that_does_not_reach_the_error_has_its_limit():
-    done = conservative("brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01")
+    done = conservative(
+        "brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01", "-v"
+    )
     assert done.exit_code == 0, done.output
     assert "Methods that do not, at up to 0.01 s of wall time per simulated second" in done.stdout
     assert "anything finer costs more than 0.01 s" in " ".join(done.stdout.split())
 
 
 def test_an_unstable_motion_is_reported():
-    text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20").stdout.split())
+    text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20", "-v").stdout.split())
     assert "and by any angle after that" in text
     assert "the motion is unstable and amplifies errors" in text
 
