@@ -5,8 +5,10 @@ The argument `trajectory` is always a `Trajectory`, whose file imports this one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from html import escape
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -81,6 +83,15 @@ def picture(trajectory: Any) -> altair.VConcatChart:
         _lines(trajectory, drifts, "relative drift", "log"),
     ]
     return _offline(alt.vconcat(*rows, title=title).resolve_scale(color="independent"))
+
+
+def animation(trajectories: Sequence[Any], labels: Sequence[str] | None, truth: Any) -> Any:
+    """Return the animation of trajectories (`Trajectory.animate`)."""
+    if truth is not None and not any(each is truth for each in trajectories):
+        trajectories = [*trajectories, truth]
+    index = next((number for number, each in enumerate(trajectories) if each is truth), None)
+    room = import_module(f"{__package__}.reports.animation")  # a room above this one, only when a user asks for it
+    return room.Animation(trajectories, labels or [each.label for each in trajectories], index)
 
 
 def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -144,6 +145,22 @@ class Trajectory:
             Altair or pandas, of the extra `report`, is not installed.
         """
         return presentation.picture(self)
+
+    def animate(self, *others: Trajectory, labels: Sequence[str] | None = None, truth: Trajectory | None = None) -> Any:
+        """Return an animation of this motion, and of others beside it on the same clock (`conservative.reports.animation`).
+
+        A notebook shows it. Its method `save(path)` writes a page (.html), or with the extra `video` a .gif or .mp4.
+
+        Parameters
+        ----------
+        others
+            Trajectories of the same scene; their steps can differ.
+        labels
+            Titles of the panels; default: the labels of the trajectories.
+        truth
+            The reference solution, which has a panel, and is an outline in the others; these show their attitude error.
+        """
+        return presentation.animation([self, *others], labels, truth)
 
     def _repr_html_(self) -> str:
         return presentation.card(self)

@@ -11,7 +11,7 @@ import base64
 import gzip
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -59,8 +59,8 @@ class Animation:
         """
         write_bytes(Path(path), self.render(Path(path).suffix), "path")
 
-    def render(self, kind: str) -> bytes:
-        """Return the contents of a file with an ending of `KINDS`. Raises as `save` does."""
+    def render(self, kind: str, progress: Callable[[float], None] = lambda share: None) -> bytes:
+        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the share of a video."""
         if kind not in KINDS:
             raise BadInput("path", f"a file that ends in {kind!r}", f"one that ends in {', '.join(KINDS)}")
         if kind == ".html":
@@ -68,7 +68,7 @@ class Animation:
         from .video import draw
 
         clock, panels = make_panels(self.trajectories, self.labels, self.truth)
-        return draw(clock, panels, self.truth, kind, MARK)
+        return draw(clock, panels, self.truth, kind, MARK, progress)
 
     def _page(self) -> str:
         title = escape(self.trajectories[0].scene.name)

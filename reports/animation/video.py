@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,9 @@ _CORNERS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1
 _SIDES = [np.flatnonzero(_CORNERS[:, axis] == sign / 2)[[0, 1, 3, 2]] for axis in range(3) for sign in (1, -1)]
 
 
-def draw(clock: Clock, panels: Sequence[Panel], truth: int | None, kind: str, mark: str) -> bytes:
+def draw(
+    clock: Clock, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
+) -> bytes:
     """Return a video with an ending of `RATES`, at the default speed, with `mark` as its comment.
 
     Raises
@@ -40,7 +42,7 @@ def draw(clock: Clock, panels: Sequence[Panel], truth: int | None, kind: str, ma
         matplotlib, or for .mp4 imageio-ffmpeg, is not installed.
     """
     require_extra(f"Writing {kind}", "video", "matplotlib", *["imageio_ffmpeg"] * (kind == ".mp4"))
-    images = _images(clock, panels, truth, RATES[kind])
+    images = _images(clock, panels, truth, RATES[kind], progress)
     if kind == ".gif":
         from PIL import Image
 
@@ -65,7 +67,9 @@ def draw(clock: Clock, panels: Sequence[Panel], truth: int | None, kind: str, ma
         return file.read_bytes()
 
 
-def _images(clock: Clock, panels: Sequence[Panel], truth: int | None, rate: float) -> Iterator[Any]:
+def _images(
+    clock: Clock, panels: Sequence[Panel], truth: int | None, rate: float, progress: Callable[[float], None]
+) -> Iterator[Any]:
     """Yield the images (height, width, 3) of a video, bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -77,7 +81,8 @@ def _images(clock: Clock, panels: Sequence[Panel], truth: int | None, rate: floa
     axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
     figure.subplots_adjust(0, 0.64 / (SIDE + 0.64) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=0.2)
     count = max(2, round(clock.duration / clock.speed * rate))
-    for frame in np.linspace(0, len(clock.times) - 1, count).round().astype(int):
+    for number, frame in enumerate(np.linspace(0, len(clock.times) - 1, count).round().astype(int)):
+        progress(number / count)
         for axis, panel in zip(axes, panels, strict=True):
             outline = (
                 None if truth is None or panel is panels[truth] else panels[truth].R_WP[min(frame, len(panels[truth].R_WP) - 1)]

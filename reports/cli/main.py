@@ -23,6 +23,7 @@ from .run import run
 from .study import study
 from .sweep import sweep
 from .track import track
+from .watch import watch
 
 
 class _UserError(click.ClickException):
@@ -103,5 +104,5 @@ def main(context: click.Context) -> None:
         click.echo(FIRST)
 
 
-for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, study, judge):
+for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge):
     main.add_command(command)

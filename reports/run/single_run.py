@@ -68,7 +68,7 @@ def run_once(
     with ExitStack() as stack:
         stream = stack.enter_context(text_file(csv_file, "csv")) if csv_file else None
         binary = stack.enter_context(text_file(parquet_file, "parquet")).buffer if parquet_file else None
-        trajectory = _integrate(scene, method, grid)
+        trajectory = run_on(scene, method, grid)
         if stream is not None:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(header())
@@ -125,11 +125,11 @@ def compare(
     summaries = []
     for number, (method, grid) in enumerate(runs):
         step(number / len(runs), method.name)
-        _integrate(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
+        run_on(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
         wall_time, begin = math.inf, perf_counter()
         while wall_time == math.inf or perf_counter() - begin < TIMED:
             start = perf_counter()
-            trajectory = _integrate(scene, method, grid)
+            trajectory = run_on(scene, method, grid)
             wall_time = min(wall_time, perf_counter() - start)
         errors = find_errors(trajectory, grid, truth)
         summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, "wall_time": wall_time})
@@ -149,7 +149,8 @@ def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | 
     return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
 
 
-def _integrate(scene: Scene, method: Method, grid: Grid) -> Trajectory:
+def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
+    """Return the trajectory on a grid; a failure ends it early."""
     return integrate(scene, grid.dt, method, grid.dt * grid.n_steps, grid.every, on_failure="return")
 
 

@@ -3,16 +3,20 @@
 import json
 import re
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import conservative as cv
+from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.errors import BadInput, Diverged
 from conservative.references.exact.method import Exact
 from conservative.reports.animation import Animation, element, script
 from conservative.reports.animation.frames import THINNEST, make_panels
+from conservative.reports.cli.main import main
 
 R0 = rotation_about((0.3, -1.2, 0.7), 0.83)
 BODY = cv.RigidBody([[3.1, 0.2, -0.1], [0.2, 2.7, 0.3], [-0.1, 0.3, 1.9]])
@@ -98,3 +102,47 @@ def test_mistakes_name_the_argument(motions):
         with pytest.raises(BadInput) as caught:
             call()
         assert caught.value.argument == argument
+
+
+def test_a_trajectory_is_animated_beside_others_and_the_truth(motions, tmp_path):
+    reduced, truth, _ = motions
+    shown = reduced.animate(truth=truth)
+    assert (shown.labels, shown.truth) == ([reduced.label, truth.label], 1)
+    assert reduced.animate(truth, truth=truth).truth == 1
+    assert reduced.animate().truth is None
+    shown.save(tmp_path / "brick.html")
+    page = (tmp_path / "brick.html").read_text()
+    assert read(page)["frames"] == read(page.replace(script(), ""))["frames"] == 200
+    assert escape(page) in shown._repr_html_()
+
+
+def watch(*words):
+    return CliRunner().invoke(main, ["watch", *map(str, words)])
+
+
+def test_watch_writes_a_page_at_the_steps_of_users_and_replaces_its_own_files_only(tmp_path):
+    out = tmp_path / "brick.html"
+    done = watch("brick_flip", "-m", "mujoco:Euler,reduced", "-m", "exact", "--t-end", "2", "--out", out, "--json")
+    assert done.exit_code == 0, done.output
+    steps = [(run["method"], run["dt"]) for run in json.loads(done.stdout)["runs"]]
+    assert steps == [("mujoco:integrator=Euler", 0.002), ("reduced", 0.01), ("exact", 0.01)]
+    data = read(out.read_text())
+    assert data["truth"] == 2
+    run = cv.integrate(registry.scene("brick_flip"), 0.002, registry.method("mujoco:Euler"), 2.0)
+    wanted = [abs(run.drift("energy")).max(), run.error(cv.integrate(run.scene, 0.002, Exact(), 2.0)).max()]  # 0.019, 0.06 rad
+    last = [data["panels"][0]["sizes"][name][-1] for name in ("energy drift", "attitude error")]
+    np.testing.assert_allclose(last, wanted, rtol=0.05)  # two digits
+    assert wanted[1] > 0.01
+    assert watch("brick_flip", "--t-end", "1", "--out", out).exit_code == 0  # its own file
+    foreign = tmp_path / "foreign.html"
+    foreign.write_text("<p>of a user</p>")
+    assert watch("brick_flip", "--out", foreign).exit_code == 2
+    assert foreign.read_text() == "<p>of a user</p>"
+
+
+@pytest.mark.parametrize("words", [("--out", "a.avi"), ("--dt", "0"), ("--t-end", "1e4"), ("-m", "lame"), ("--dt", "nan")])
+def test_watch_refuses_before_a_file_exists(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = watch("brick_flip", *words)
+    assert done.exit_code == 2, done.output
+    assert list(tmp_path.iterdir()) == []
