@@ -1,3 +1,3 @@
 """The version, part of the label of every method here."""
 
-VERSION = "0.2.0"
+VERSION = "0.3.0"

@@ -71,6 +71,25 @@ def test_an_extra_is_checked_for_its_own_packages(requirements, extra):
     assert set(EXTRAS[extra]) == {IMPORTED_AS.get(package, package) for package in requirements[extra]}
 
 
+def check_schema(name, *paths):
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{name}", *map(str, paths)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_citation_and_workflows_follow_their_schemas(tmp_path):
+    for name, paths in {
+        "citation-file-format": [ROOT / "CITATION.cff"],
+        "github-workflows": [*(ROOT / ".github" / "workflows").glob("*.yml"), *(ROOT / "tests/example_package").glob("*.yml")],
+        "github-actions": [ROOT / ".github/actions/gate/action.yml"],
+    }.items():
+        assert paths
+        done = check_schema(name, *paths)
+        assert done.returncode == 0, done.stdout
+    broken = tmp_path / "CITATION.cff"
+    broken.write_text((ROOT / "CITATION.cff").read_text().replace("title: ", "heading: "))
+    assert check_schema("citation-file-format", broken).returncode == 1
+
+
 def test_the_commands_in_the_readme_name_extras_that_exist():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     texts = [(ROOT / name).read_text() for name in ("README.md", ".github/CONTRIBUTING.md", ".ci/run")]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.version import VERSION
 from conservative.integration import blocks, store
 from conservative.integration.inputs import read_bodies
 
@@ -274,7 +275,7 @@ def test_scenes_with_functions_are_identified_by_their_code(tmp_path):
 
 CHANGES = {
     "dt": ({"dt": 0.02}, "dt 0.05 there, 0.02 here; n_steps 10 there, 25 here"),
-    "method": ({"method": "reduced"}, "method 'conservative==0.2.0/convected' there, 'conservative==0.2.0/reduced"),
+    "method": ({"method": "reduced"}, f"method 'conservative=={VERSION}/convected' there, 'conservative=={VERSION}/reduced"),
     "start": ({"w_WB_B0": starts() * (1 + 1e-15)}, "another w_WB_B0;"),
     "parameters": ({"parameters": {"weight": np.linspace(1.0, 2.1, N)}}, "another weight;"),
     "inertia": ({"inertia": np.ones((N, 3))}, "another inertia;"),
