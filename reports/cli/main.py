@@ -75,7 +75,7 @@ def _as_click(error: Exception) -> Exception:
 
 FIRST = """\
 conservative run brick_flip                      integrate a tumbling brick, and say how wrong the result is
-conservative list                                list scenes and methods
+conservative watch brick_flip                    see it move, beside other methods
 conservative recommend brick_flip --error 1e-6   which method to use, with which step
 conservative report                              measure all methods on the paper's scenes: a page, in a minute
 conservative new > my_body.toml                  describe your own body; each command takes this file

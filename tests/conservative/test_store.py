@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.version import VERSION
 from conservative.integration import blocks, store
 from conservative.integration.inputs import read_bodies
+from conservative.version import VERSION
 
 zarr = pytest.importorskip("zarr")
 
