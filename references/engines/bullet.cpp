@@ -31,10 +31,10 @@ struct Bodies : World {
     explicit Bodies(const Json &given)
         : body(given["mass"], nullptr, &shape, vector(given["moments_com"])), axes(quaternion(given["q_com"])), dt(given["dt"]) {
         world.setGravity({0, 0, -given["gravity"].get<double>()});
-        const btTransform start(quaternion(given["q0"]) * axes, vector(given["position"]));
+        const btTransform start(quaternion(given["q0"]) * axes, vector(given["x0"]));
         body.setCenterOfMassTransform(start);
         body.setAngularVelocity(vector(given["w0_W"]));
-        body.setLinearVelocity(vector(given["velocity"]));
+        body.setLinearVelocity(vector(given["v0"]));
         body.setFlags(FLAGS.at(given["gyroscopic"]));
         if (!given["as_installed"]) {
             body.setActivationState(DISABLE_DEACTIVATION);
@@ -45,9 +45,7 @@ struct Bodies : World {
         joint = std::make_unique<btPoint2PointConstraint>(body, start.inverse() * btVector3(0, 0, 0));
         world.addConstraint(joint.get());
     }
-    void advance(long done, long to) override {
-        for (; done < to; done++) world.stepSimulation(dt, 0); // 0: not in steps of 1/60 s
-    }
+    void step() override { world.stepSimulation(dt, 0); } // 0: not in steps of 1/60 s
     void read(double *q, double *w_W) override {
         const btQuaternion turn = body.getWorldTransform().getRotation() * axes.inverse();
         for (int i = 0; i < 4; i++) q[i] = turn[(i + 3) % 4];

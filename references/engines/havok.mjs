@@ -7,7 +7,7 @@ import { readFileSync } from 'fs';
 export const ENGINE = {"package": "@babylonjs/havok", "rate_limit": 100.0};
 export const start = (havok, url) => havok({ wasmBinary: readFileSync(new URL('HavokPhysics.wasm', url)) });
 
-export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, free, as_installed, central }, H, own) {
+export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, free, as_installed, v0 }, H, own) {
   const origin = [0, 0, 0], anchor = [origin, [1, 0, 0], [0, 1, 0]], last = ([s, ...v]) => [...v, s];
   const call = (name, ...values) => {
     const [result, value] = [H[`HP_${name}`](...values)].flat();
@@ -36,7 +36,7 @@ export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, fr
     call('World_AddBody', world, each, false);
     own(() => call('World_RemoveBody', world, each));
   }
-  set('Body', body, { LinearVelocity: [central.velocity], AngularVelocity: [w0_W] });
+  set('Body', body, { LinearVelocity: [v0], AngularVelocity: [w0_W] });
   const joint = make('Constraint'), { ConstraintAxis: axes, ConstraintAxisLimitMode: modes } = H;
   set('Constraint', joint, { ParentBody: [support], ChildBody: [body], AnchorInParent: anchor, AnchorInChild: anchor });
   for (const name of ['X', 'Y', 'Z']) set('Constraint', joint, { AxisMode: [axes[`LINEAR_${name}`], modes.LOCKED] });

@@ -19,14 +19,14 @@ export function build(given, J, own) {
   system.SetGravity(vector([0, 0, -given.gravity]));
   const shape = new J.OffsetCenterOfMassShape(new J.SphereShape(0.05), vector(given.com)), turn = own(new J.Quat(x, y, z, s));
   const settings = own(new J.BodyCreationSettings(shape, origin, turn, J.EMotionType_Dynamic, 0));
-  for (const i of [0, 1, 2]) inertia.SetColumn3(i, vector(given.inertia_com.slice(3 * i, 3 * i + 3)));
+  for (const i of [0, 1, 2]) inertia.SetColumn3(i, vector(given.inertia_com[i]));
   settings.mOverrideMassProperties = J.EOverrideMassProperties_MassAndInertiaProvided;
   Object.assign(settings.mMassPropertiesOverride, { mMass: given.mass, mInertia: inertia });
   const still = { mLinearDamping: 0, mAngularDamping: 0, mMaxLinearVelocity: 1e6, mMaxAngularVelocity: 1e6 };
   if (!given.as_installed) Object.assign(settings, still, { mApplyGyroscopicForce: true, mAllowSleeping: false });
   const body = bodies.CreateBody(settings);
   bodies.AddBody(body.GetID(), J.EActivation_Activate);
-  bodies.SetLinearAndAngularVelocity(body.GetID(), vector(given.central.velocity), vector(given.w0_W));
+  bodies.SetLinearAndAngularVelocity(body.GetID(), vector(given.v0), vector(given.w0_W));
   const joint = Object.assign(own(new J.PointConstraintSettings()), { mPoint1: origin, mPoint2: origin });
   if (!given.free) system.AddConstraint(joint.Create(J.Body.prototype.sFixedToWorld, body));
   const read = () => {

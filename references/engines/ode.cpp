@@ -18,10 +18,11 @@ struct Bodies : World {
     const double dt;
 
     explicit Bodies(const Json &given) : dt(given["dt"]) {
-        const Numbers I = given["inertia_com"], q = given["q0"], w = given["w0_W"], x = given["position"], v = given["velocity"];
+        const std::vector<Numbers> I = given["inertia_com"];
+        const Numbers q = given["q0"], w = given["w0_W"], x = given["x0"], v = given["v0"];
         dWorldSetGravity(world, 0, 0, -given["gravity"].get<double>());
         dMass mass;
-        dMassSetParameters(&mass, given["mass"], 0, 0, 0, I[0], I[4], I[8], I[1], I[2], I[5]);
+        dMassSetParameters(&mass, given["mass"], 0, 0, 0, I[0][0], I[1][1], I[2][2], I[0][1], I[0][2], I[1][2]);
         dBodySetMass(body, &mass);
         dBodySetQuaternion(body, q.data());
         dBodySetAngularVel(body, w[0], w[1], w[2]);
@@ -34,9 +35,7 @@ struct Bodies : World {
         dJointSetBallAnchor(joint, 0, 0, 0);
     }
     ~Bodies() override { dWorldDestroy(world); }
-    void advance(long done, long to) override {
-        for (; done < to; done++) dWorldStep(world, dt);
-    }
+    void step() override { dWorldStep(world, dt); }
     void read(double *q, double *w_W) override {
         std::copy_n(dBodyGetQuaternion(body), 4, q);
         std::copy_n(dBodyGetAngularVel(body), 3, w_W);

@@ -4,18 +4,18 @@
  */
 export const ENGINE = {"package": "oimo", "precision": "f64"};
 
-export function build({ mass, gravity, moments_com, q_com, w0_W, dt, free, as_installed, central }, O) {
-  const { q: [s, x, y, z], position, velocity, point } = central, diagonal = ([a, b, c]) => [a, 0, 0, 0, b, 0, 0, 0, c];
+export function build({ mass, gravity, moments_com, q_com, w0_W, x0, v0, dt, free, as_installed, q_P, point_P }, O) {
+  const [s, x, y, z] = q_P, diagonal = ([a, b, c]) => [a, 0, 0, 0, b, 0, 0, 0, c];
   const world = new O.World({ timestep: dt, gravity: [0, 0, -gravity] });
-  const body = world.add({ type: 'sphere', size: [0.05], pos: position, move: true });
+  const body = world.add({ type: 'sphere', size: [0.05], pos: x0, move: true });
   body.localInertia.elements = diagonal(moments_com); // the shape's until here
   body.inverseLocalInertia.elements = diagonal(moments_com.map((moment) => 1 / moment));
   Object.assign(body, { mass, inverseMass: 1 / mass, allowSleep: as_installed });
   body.orientation.set(x, y, z, s);
-  body.linearVelocity.set(...velocity);
+  body.linearVelocity.set(...v0);
   body.angularVelocity.set(...w0_W);
   body.syncShapes();
   const support = world.add({ type: 'sphere', size: [0.05] });
-  if (!free) world.add({ type: 'jointBall', body1: body, body2: support, pos1: point });
+  if (!free) world.add({ type: 'jointBall', body1: body, body2: support, pos1: point_P });
   return { step: () => world.step(), read: () => [body.orientation, body.angularVelocity], axes: q_com };
 }

@@ -19,7 +19,7 @@ export async function start(PhysX, url) {
   return Object.assign(P, { top, scale, physics, cpuDispatcher, filterShader: top.DefaultFilterShader() });
 }
 
-export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, free, solver, as_installed, central }, P, own) {
+export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, free, solver, as_installed, v0 }, P, own) {
   const vector = (v) => own(new P.PxVec3(...v)), quaternion = ([s, x, y, z]) => own(new P.PxQuat(x, y, z, s));
   const pose = (v, q) => own(new P.PxTransform(vector(v), quaternion(q))), origin = pose([0, 0, 0], [1, 0, 0, 0]);
   const released = (object) => (own(() => object.release()), object), { top, physics, scale, cpuDispatcher, filterShader } = P;
@@ -33,7 +33,7 @@ export function build({ mass, gravity, com, moments_com, q_com, q0, w0_W, dt, fr
     set({ LinearDamping: 0, AngularDamping: 0, MaxAngularVelocity: 1e6, SleepThreshold: 0 });
   }
   world.addActor(body);
-  set({ LinearVelocity: vector(central.velocity), AngularVelocity: vector(w0_W) });
+  set({ LinearVelocity: vector(v0), AngularVelocity: vector(w0_W) });
   if (!free) released(top.SphericalJointCreate(physics, P.NULL, origin, body, origin));
   const read = () => [body.getGlobalPose().q, body.getAngularVelocity()];
   return { step: () => world.simulate(dt) && world.fetchResults(true), read };

@@ -18,8 +18,6 @@ Sleeping, gyroscopic forces: https://rapier.rs/docs/user_guides/python/rigid_bod
 Joints: https://rapier.rs/docs/user_guides/python/joints
 """
 
-import numpy as np
-
 from .shared import sample
 
 ENGINE = {
@@ -43,7 +41,7 @@ def prepare(given):
 
     place = rp.Rotation3(*map(float, given.q0)).scaled_axis
     spin = tuple(map(float, given.w0_W))
-    drift = tuple(map(float, np.cross(given.w0_W, given.R0 @ given.com)))  # velocity of the centre of mass
+    drift = tuple(map(float, given.v0))
     com, moments, axes = ([float(number) for number in numbers] for numbers in (given.com, given.moments_com, given.q_com))
     mass = rp.MassProperties(tuple(com), float(given.mass), tuple(moments), rp.Rotation3(*axes))
 

@@ -1,6 +1,6 @@
 /* Rapier's official build for JavaScript, in single precision. `substeps` are iterations of its solver.
- * A body about a fixed point is on a spherical impulse joint. The gyroscopic force is always on. Unless `as_installed`,
- * sleeping is off. https://rapier.rs/docs/user_guides/javascript/rigid_bodies
+ * A body about a fixed point is on a spherical impulse joint. The gyroscopic force is on in 0.20.0 and later. Unless
+ * `as_installed`, sleeping is off. https://rapier.rs/docs/user_guides/javascript/rigid_bodies
  */
 export const ENGINE = {
   "package": "@dimforge/rapier3d-compat", "oldest": "0.12.0", "settings": {"substeps": 4, "as_installed": false}
@@ -14,7 +14,7 @@ export function build(given, R, own) {
   Object.assign(world, { timestep: given.dt, numSolverIterations: given.substeps });
   const settings = R.RigidBodyDesc.dynamic().setRotation(quaternion(given.q0)).setAngvel(vector(given.w0_W));
   settings.setAdditionalMassProperties(given.mass, vector(given.com), vector(given.moments_com), quaternion(given.q_com));
-  const body = world.createRigidBody(settings.setLinvel(...given.central.velocity).setCanSleep(given.as_installed));
+  const body = world.createRigidBody(settings.setLinvel(...given.v0).setCanSleep(given.as_installed));
   const support = world.createRigidBody(R.RigidBodyDesc.fixed());
   if (!given.free) world.createImpulseJoint(R.JointData.spherical(origin, origin), support, body, true);
   return { step: () => world.step(), read: () => [body.rotation(), body.angvel()] };

@@ -61,7 +61,7 @@ def prepare(given):
         entity.add_component(_hold(sapien, body))
     scene.add_entity(entity)
     start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
-    drift = np.cross(given.w0_W, given.R0 @ given.com).astype(np.float32)  # velocity of the centre of mass
+    drift = given.v0.astype(np.float32)
 
     def run():
         entity.set_pose(start)

@@ -27,10 +27,11 @@ struct Bodies : World {
     double dt;
 
     explicit Bodies(const Json &given) : dt(given["dt"]) {
-        const Numbers I = given["inertia_com"], q = given["q0"], c = given["com"], w = given["w0_W"];
+        const std::vector<Numbers> I = given["inertia_com"];
+        const Numbers q = given["q0"], c = given["com"], w = given["w0_W"];
         const double mass = given["mass"], gravity = given["gravity"], accuracy = given["accuracy"];
         const Vec3 com(c[0], c[1], c[2]);
-        const Inertia inertia = Inertia(Vec3(I[0], I[4], I[8]), Vec3(I[1], I[2], I[5])).shiftFromMassCenter(com, mass);
+        const Inertia inertia = Inertia(Vec3(I[0][0], I[1][1], I[2][2]), Vec3(I[0][1], I[0][2], I[1][2])).shiftFromMassCenter(com, mass);
         const Body::Rigid rigid(MassProperties(mass, com, inertia)); // about the origin of F
         if (gravity != 0) Force::UniformGravity(forces, matter, Vec3(0, 0, -gravity));
         if (given["free"]) body = MobilizedBody::Free(matter.Ground(), rigid);

@@ -6,7 +6,7 @@ The mistakes that explain the samples best are named. The short run tells a cons
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -65,18 +65,10 @@ READING: dict[str, dict[str, Any]] = {
     'It ignores gravity: use it, or answer "unsupported" if `free` is false': {"potential": None},
     "Its inertia is about the centre of mass: `moments` are about the fixed point": {"body": CENTRAL},
 }
-ATTITUDES: dict[str, Callable[[Array], Array]] = {
-    "": lambda values: values,
-    "`q` is x, y, z, w: the scalar comes first": lambda values: values[..., [3, 0, 1, 2, *range(4, values.shape[-1])]],
-    "The attitudes are transposed: v_W = R v_F": lambda values: (
-        values * (1, -1, -1, -1, 1, 1, 1) if values.shape[-1] == 7 else values[..., [0, 3, 6, 1, 4, 7, 2, 5, 8, 9, 10, 11]]
-    ),
-    "Vectors are x, z, -y, with the second axis up: answer in W and F, whose third axis is up": lambda values: (
-        values[..., [0, 1, 3, 2, 4, 6, 5]] * (1, 1, -1, 1, 1, -1, 1)
-        if values.shape[-1] == 7
-        else values[..., [0, 2, 1, 6, 8, 7, 3, 5, 4, 9, 11, 10]] * (1, -1, 1, -1, 1, -1, 1, -1, 1, 1, -1, 1)
-    ),
-}
+SCALAR_LAST = "`q` is x, y, z, w: the scalar comes first"
+TRANSPOSED = "The attitudes are transposed: v_W = R v_F"
+Y_UP = "Vectors are x, z, -y, with the second axis up: answer in W and F, whose third axis is up"
+ATTITUDES = ("", SCALAR_LAST, TRANSPOSED, Y_UP)
 W_IN_W = "Rates in W are named `w`, or rates in F `w_W`: `w` is in F"
 RATES = {"": 1.0, W_IN_W: 1.0, "Rates are in deg/s: answer in rad/s": math.pi / 180}
 TIMES: dict[str, tuple[float, int, int]] = {  # unit of dt, and how much later attitudes and rates are, in half steps
@@ -88,15 +80,8 @@ TIMES: dict[str, tuple[float, int, int]] = {  # unit of dt, and how much later a
 _solve = lru_cache(maxsize=256)(registry.method("taylor").solve)
 
 
-def _distance(
-    scene: Scene,
-    grid: Grid,
-    seen: tuple[Array, Array],
-    unit: float = 1,
-    late_R: int = 0,
-    late_w: int = 0,
-    turn: Array = SAME,
-) -> float:
+def _distance(scene: Scene, grid: Grid, seen: tuple[Array, Array], when: str = "", turn: Array = SAME) -> float:
+    unit, late_R, late_w = TIMES[when]
     truth = _solve(scene, Grid(unit * grid.dt / 2, 2 * grid.n_steps + 2))
     place = 2 * grid.steps[1:].astype(int)
     rates = np.linalg.norm(truth.w_WB_B[place + late_w] - seen[1][1:], axis=-1) / np.linalg.norm(W0)
@@ -104,11 +89,16 @@ def _distance(
 
 
 def _read(states: States, attitude: str = "", rates: str = "") -> tuple[Array, Array]:
-    values = ATTITUDES[attitude](states.values)
-    values = np.concatenate([values[..., :-3], RATES[rates] * values[..., -3:]], -1)
-    corrected = replace(states, values=values, rates_in_world=states.rates_in_world != (rates == W_IN_W))
-    R_WB, w_WB_B, _ = to_body_axes(np.empty(values.shape[1]), corrected, np.eye(3)[None])
-    return R_WB[0], w_WB_B[0]
+    values, in_world = states.values, states.rates_in_world != (rates == W_IN_W)
+    if attitude == SCALAR_LAST and values.shape[-1] == 7:
+        values = values[..., [3, 0, 1, 2, 4, 5, 6]]
+    alone = replace(states, values=values, rates_in_world=False)
+    R, w = (each[0] for each in to_body_axes(np.empty(values.shape[1]), alone, SAME[None])[:2])
+    if attitude == TRANSPOSED:
+        R = R.swapaxes(1, 2)
+    elif attitude == Y_UP:
+        R, w = TO_Y_UP.T @ R @ TO_Y_UP, w @ TO_Y_UP
+    return R, RATES[rates] * ((w[:, None] @ R)[:, 0] if in_world else w)
 
 
 def find_mistakes(scene: Scene, answers: dict[Grid, States]) -> tuple[str, ...]:
@@ -118,9 +108,8 @@ def find_mistakes(scene: Scene, answers: dict[Grid, States]) -> tuple[str, ...]:
     scenes = {reading: replace(scene, **values) for reading, values in READING.items()}
     costs = {}
     for reading, when, names in product(READING, TIMES, seen):
-        errors = [
-            _distance(scenes[reading], grid, samples, *TIMES[when], TURNS.get(reading, SAME)) for grid, samples in seen[names]
-        ]
+        turn = TURNS.get(reading, SAME)
+        errors = [_distance(scenes[reading], grid, samples, when, turn) for grid, samples in seen[names]]
         mistakes = tuple(filter(None, (reading, *names, when)))
         costs[mistakes] = math.prod(max(FLOOR, error) for error in errors) * 10 ** len(mistakes)  # each has to explain much
     return min(costs, key=lambda mistakes: costs[mistakes])

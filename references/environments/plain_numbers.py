@@ -54,12 +54,15 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
     """Return a scene and a grid as the numbers of a `prepare` request, in SI units."""
     mass = mass_model(axes)
     assert mass is not None  # checked by `unsupported`
+    w0_W, x0 = axes.R_WF0 @ axes.w0, axes.R_WF0 @ mass.com
     return {
         "moments": axes.J,
         "q0": axes.q0,
         "R0": axes.R_WF0,
         "w0": axes.w0,
-        "w0_W": axes.R_WF0 @ axes.w0,
+        "w0_W": w0_W,
+        "x0": x0,
+        "v0": np.cross(w0_W, x0),
         "mass": mass.mass,
         "com": mass.com,
         "gravity": mass.gravity,

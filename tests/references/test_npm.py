@@ -175,23 +175,24 @@ def test_a_run_and_what_it_owns(worker, trial):
     for _ in range(3):  # objects of a call are destroyed before the next one is built
         for run in runs:
             answer = worker.ask("run", run=run)
-    assert np.array_equal(answer["w_W"][1:, 0], np.arange(1, 6))
-    assert np.array_equal(answer["w_W"][0], SCENE.w_WB_B0)
-    assert answer["w_W"][1, 1] == 2  # alive: one world for each run
+    rates = np.array(answer["w_W"])
+    assert np.array_equal(rates[1:, 0], np.arange(1, 6))
+    assert np.array_equal(rates[0], SCENE.w_WB_B0)
+    assert rates[1, 1] == 2  # alive: one world for each run
     assert worker.ask("time", run=runs[0], calls=3)["seconds"] > 0
     worker.forget(worker.starts, runs[1])
-    assert worker.ask("run", run=runs[0])["w_W"][1, 1] == 1
+    assert worker.ask("run", run=runs[0])["w_W"][1][1] == 1
 
 
 def test_failures_are_reported(worker, trial):
     with pytest.raises(EngineCrashed, match="RangeError: too large"):
         worker.ask("run", run=prepare(worker, trial, "throw"))
-    assert np.isnan(worker.ask("run", run=prepare(worker, trial, "diverge"))["w_W"]).sum() == 9
+    assert np.isnan(np.array(worker.ask("run", run=prepare(worker, trial, "diverge"))["w_W"], float)).sum() == 9
     with pytest.raises(NotImplementedError, match="many bodies"):
         worker.ask("prepare", adapter=str(trial), settings={}, rows=["q0"])
     with pytest.raises(EngineCrashed, match="out of memory"):
         worker.ask("run", run=prepare(worker, trial, "grow"))
-    assert worker.ask("run", run=prepare(worker, trial))["q"].shape == (6, 4)
+    assert worker.ask("run", run=prepare(worker, trial))["q"][5] == worker.ask("run", run=prepare(worker, trial))["q"][0]
 
 
 def test_it_ends_with_its_client(trial):

@@ -10,12 +10,16 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.attitude import angle_between, from_quaternion, rotation_about, to_quaternion
 from conservative.errors import BadInput
+from conservative.grid import grid_for
+from conservative.references.engine import principal_axes
 from conservative.references.environments import apt
-from conservative.references.environments.environment import Distribution
+from conservative.references.environments.environment import Distribution, worker_of
 from conservative.references.environments.install import install
 from conservative.references.environments.lock import Source
+from conservative.references.environments.plain_numbers import describe, read_states
+from conservative.references.samples import to_body_axes
 
 from .test_fields_of_any_kind import IN_ENGINES, check_order, scene_in
 
@@ -283,6 +287,29 @@ ERRORS = {
     ("oimo", ""): (WITHOUT_GYROSCOPIC, 0),
     ("havok", ""): (WITHOUT_GYROSCOPIC, 0),
 }
+FREE_ERRORS = {
+    ("jolt", ""): (3.45e-3, 1),
+    ("jolt", "substeps=2"): (1.72e-3, 1),
+    ("rapier_js", ""): (9.3e-4, 1),
+    ("physx_js", "PGS"): (3.46e-3, 1),
+    ("physx_js", "TGS"): (3.43e-3, 1),
+    ("havok", ""): (0.731, 0),  # that of a body whose angular velocity does not change
+    ("cannon_es", ""): (0.731, 0),
+    ("oimo", ""): (0.731, 0),
+    ("ammo", ""): (3.58e-3, 1),
+    ("mujoco_js", "RK4"): (6.79e-6, 2),
+    ("mujoco_js", "Euler"): (3.75e-3, 1),
+    ("ode", "finite"): (7.23e-3, 1),
+    ("ode", "infinitesimal"): (7.24e-3, 1),
+    ("bullet", "body"): (3.58e-3, 1),
+    ("bullet", "world"): (3.58e-3, 1),
+    ("bullet", "explicit"): (3.75e-3, 1),
+    ("simbody", "RungeKuttaMerson"): (1.37e-10, 4),
+    ("simbody", "Verlet"): (3.86e-5, 2),
+    ("lammps", "nve"): (4.05e-5, 2),
+    ("lammps", "rigid"): (6.29e-5, 2),
+}
+"""Errors on the generic free body after 2 s: engines whose scripts are not in Python, and LAMMPS."""
 LARGEST_ERROR = max(error for error, order in ERRORS.values() if order != 0)
 FREE_ONLY = [
     ("brax", "", "Brax reads no ball joint"),
@@ -307,6 +334,32 @@ def test_errors_on_a_heavy_top(heavy, end, engine, setting, error, order):
     wrong = [float(angle_between(cv.integrate(heavy, dt, method=method).R_WB[-1], end)) for dt in (0.02, 0.01)]
     assert 0.5 < wrong[1] / error < 2
     assert order is None or abs(np.log2(wrong[0] / wrong[1]) - order) < 0.3
+
+
+@pytest.mark.parametrize(("engine", "setting", "error", "order"), [of(*key, *figures) for key, figures in FREE_ERRORS.items()])
+def test_errors_on_a_free_body(free, engine, setting, error, order):
+    environment = install(engine).environment
+    method = registry.method(f"{environment.engine}@{environment.version}:{setting}")
+    wrong = [find_error(method, free, dt) for dt in (0.02, 0.01)]
+    assert 0.5 < wrong[1] / error < 2
+    assert order is None or abs(np.log2(wrong[0] / wrong[1]) - order) < 0.3
+
+
+def find_error(method, scene, dt):
+    """Return the error of a free body of another mass, in axes that are not principal; in LAMMPS those of F, which it needs."""
+    grid, axes = grid_for(scene, dt), principal_axes(scene)
+    T = np.eye(3) if method.data.package.startswith("lammps") else rotation_about((1, 2, -1), 0.6)  # to F from other axes
+    com, R0, w0_W = (0, 0, 0) if T[0, 0] == 1 else (0.1, -0.2, 0.15), axes.R_WF0 @ T, axes.R_WF0 @ axes.w0
+    numbers = describe(axes, grid) | {"mass": 2.5, "com": np.array(com), "q0": to_quaternion(R0), "R0": R0, "w0": T.T @ axes.w0}
+    numbers |= {"x0": R0 @ com, "v0": np.cross(w0_W, R0 @ com), "q_com": to_quaternion(T.T)}
+    numbers |= {"inertia_com": T.T @ np.diag(axes.J) @ T}
+    worker = worker_of(method.environment)
+    given = {"adapter": str(method.adapter.__file__), "settings": method.settings, **numbers}
+    states = read_states(worker.ask("run", run=worker.ask("prepare", **given)["run"]), (grid.n_samples,))
+    R, w, _ = to_body_axes(grid.t, states, np.eye(3)[None])
+    truth = cv.integrate(scene, dt, method=registry.method("exact"))
+    assert np.abs(w[0, 0] - T.T @ axes.w0).max() < 1e-6
+    return float(angle_between(R[0, -1] @ T.T, truth.R_WB[-1] @ axes.R_BF))
 
 
 def test_a_wrong_weight_or_centre_of_mass_is_detected(heavy, end):
