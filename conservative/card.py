@@ -114,6 +114,8 @@ class Card:
         True if potentials that depend on time are supported. If not, `Method.unsupported` reports them.
     loads
         True if a torque and damping are supported. If not, `Method.unsupported` reports them.
+    flight
+        True if an engine integrates the translation in free flight as well. If not, `Method.unsupported` reports it.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -134,6 +136,7 @@ class Card:
     structure: Callable[[Any], Structure | None] = lambda method: None
     time_dependent: bool = False
     loads: bool = False
+    flight: bool = False
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

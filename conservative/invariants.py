@@ -44,7 +44,7 @@ class Invariant:
     name: str
     unit: str
     scale: float
-    evaluate: Callable[[Array, Array], Array]
+    evaluate: Callable[..., Array]
     supplied: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ Run = Callable[[], Trajectory]
 
 
 def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
-    """Extend `Method.unsupported` by the reasons for potentials that depend on time, and for loads."""
+    """Extend `Method.unsupported` by the reasons for potentials that depend on time, for loads, and for engines in flight."""
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
@@ -30,6 +30,8 @@ def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[A
             return "it is for fields that do not depend on time; integrate(scene, error=1e-9) chooses a method for others"
         if scene.loaded and not method.card.loads:
             return "it does not take a torque or damping; reduced, projected and scipy do"
+        if scene.flight and method.role == Role.ENGINE and not method.card.flight:
+            return "its adapter has no free flight; those of mujoco, pinocchio, drake and pybullet have"
         return unsupported(method, scene)
 
     return reason

@@ -30,8 +30,10 @@ COLUMNS = (
     *(f"momentum_W_{axis}" for axis in "123"),
 )
 """Columns of a table of samples: attitudes by rows and as quaternions, rates in body axes, momentum in world axes."""
+FLIGHT_COLUMNS = tuple(f"{name}_{axis}" for name in ("p_WB", "v_WB") for axis in "123")
+"""Further columns in free flight, world axes."""
 
-UNITS = {"t": "s", "w": "rad/s", "energy": "J", "momentum": "kg m^2/s"}
+UNITS = {"t": "s", "w": "rad/s", "energy": "J", "momentum": "kg m^2/s", "p": "m", "v": "m/s"}
 """Units of the columns, by the first part of their names; attitudes have none."""
 
 LEAST_DRAWN = 1e-17
@@ -44,24 +46,29 @@ _WIDTH, _HEIGHT = 480, 160
 
 
 def samples(trajectory: Any) -> Array:
-    """Return a row for each of n samples under `COLUMNS`, (n, 21): s, rad/s, J and kg m^2/s."""
+    """Return a row for each of n samples under `columns`, (n, 21) or (n, 27), in SI units."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
-    attitudes = R_by_rows, trajectory.quaternion_wxyz
-    return np.column_stack([trajectory.t, *attitudes, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
+    state = trajectory.t, R_by_rows, trajectory.quaternion_wxyz, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W
+    return np.column_stack([*state, *trajectory.place])
 
 
-def header() -> list[str]:
+def columns(trajectory: Any) -> list[str]:
+    """Return the columns of a table of samples: `COLUMNS` and, in free flight, `FLIGHT_COLUMNS`."""
+    return [*COLUMNS, *FLIGHT_COLUMNS] if trajectory.scene.flight else list(COLUMNS)
+
+
+def header(trajectory: Any) -> list[str]:
     """Return the columns with their units, such as `w_WB_B_1 (rad/s)`."""
-    units = {name: UNITS.get(name.split("_")[0]) for name in COLUMNS}
+    units = {name: UNITS.get(name.split("_")[0]) for name in columns(trajectory)}
     return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
 
 
 def table(trajectory: Any) -> pandas.DataFrame:
-    """Return the samples as a table with `COLUMNS`; its `attrs` contain scene, method and outcome (`Trajectory.to_pandas`)."""
+    """Return the samples as a table with `columns`; its `attrs` contain scene, method and outcome (`Trajectory.to_pandas`)."""
     require_extra("Trajectory.to_pandas", "report", "pandas")
     import pandas as pd
 
-    frame = pd.DataFrame(samples(trajectory), columns=list(COLUMNS))
+    frame = pd.DataFrame(samples(trajectory), columns=columns(trajectory))
     frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "outcome": str(trajectory.outcome)}
     return frame
 

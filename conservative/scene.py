@@ -15,10 +15,12 @@ from .attitude import Array
 from .body import RigidBody
 from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation, set_fields
 from .errors import BadInput
+from .flight import Flight, read_flight
 from .invariants import Invariant, axial_direction, balance_of, invariants_of
 from .potentials.load import Damping, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.turning import Turning
+from .shapes import MassDistribution
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -32,7 +34,7 @@ MOST_DERIVATIONS = 64
 
 @dataclass(frozen=True, eq=False, init=False)
 class Scene:
-    """A rigid body that rotates about a fixed point: body, potential, initial state and duration.
+    """A rigid body that rotates about a fixed point, or flies freely: body, potential, initial state and duration.
 
     Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component. In that range our
     methods are correct or report a failure. Engines get the numbers unchanged.
@@ -42,7 +44,7 @@ class Scene:
     name
         Name in tables and charts.
     body
-        The body.
+        The body. In free flight a `MassDistribution`, whose inertia about the centre of mass becomes the attribute `body`.
     R_WB0
         Attitude at t = 0: a rotation matrix (3, 3), body to world, or a SciPy `Rotation`.
     w_WB_B0
@@ -50,7 +52,8 @@ class Scene:
     t_end
         Duration, s.
     potential
-        The field that acts on the body; None for a free body. `Turning` and functions of attitude and time depend on time.
+        The field that acts on the body; None for a free body. `Turning` and functions of attitude and time depend on time. In
+        free flight None or the gravity of the body; the attribute `potential` is then None, because it exerts no torque.
     torque, damping
         Loads that act beside the potential. Energy and momenta then obey balances with their work and impulse.
     dt
@@ -59,6 +62,12 @@ class Scene:
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
         Heading of the scene in `conservative list` (default "your own"), and its source.
+    p_WB0, v_WB0
+        Position (3,), m, and velocity (3,), m/s, of the origin of the body frame at t = 0, world axes. They make the scene a
+        free flight: the frame can be off the centre of mass, and trajectories have `p_WB` and `v_WB`. One alone means that
+        the other is 0.
+    flight
+        The translation in free flight, as an earlier scene has it, for copies (`rename`).
 
     Raises
     ------
@@ -78,11 +87,12 @@ class Scene:
     extra_invariants: tuple[Invariant, ...] = ()
     group: str = "your own"
     source: str = ""
+    flight: Flight | None = None
 
     def __init__(
         self,
         name: str,
-        body: RigidBody,
+        body: RigidBody | MassDistribution,
         R_WB0: ArrayLike | Rotation,
         w_WB_B0: ArrayLike,
         t_end: float,
@@ -94,17 +104,26 @@ class Scene:
         extra_invariants: Iterable[Invariant] = (),
         group: str = "your own",
         source: str = "",
+        p_WB0: ArrayLike | None = None,
+        v_WB0: ArrayLike | None = None,
+        flight: Flight | None = None,
     ) -> None:
         if not printable_text("name", name, _NAME):
             raise BadInput("name", "''", _NAME)
+        if p_WB0 is not None or v_WB0 is not None:
+            (body, flight), potential = read_flight(body, potential, p_WB0, v_WB0), None
         if not isinstance(body, RigidBody):
-            raise BadInput("body", describe(body), "a RigidBody")
+            raise BadInput("body", describe(body), "a RigidBody, or a MassDistribution together with p_WB0 or v_WB0")
+        if flight is not None and (not isinstance(flight, Flight) or potential is not None):
+            raise BadInput("flight", describe(flight), "None, or the flight of a scene, and no potential")
         if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
             raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
         if not isinstance(torque, Torque | None):
             raise BadInput("torque", describe(torque), "None or a Torque, such as Torque((0, 0, 1.5))")
         if not isinstance(damping, Damping | None):
             raise BadInput("damping", describe(damping), "None or a Damping, such as Damping(0.1 * np.eye(3))")
+        if flight is not None and not torque is damping is None:
+            raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
         if torque is not None:
@@ -132,6 +151,7 @@ class Scene:
             extra_invariants=given,
             group=printable_text("group", group, "a text"),
             source=printable_text("source", source, "a text"),
+            flight=flight,
         )
 
     @property
@@ -181,11 +201,14 @@ class Scene:
 
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
-        """Conserved quantities of the exact motion: energy, momenta or their balances, and `extra_invariants`."""
+        """Conserved quantities of the exact motion: energy, momenta or their balances, and `extra_invariants`.
+
+        In free flight, energy and momentum are those of the rotation about the centre of mass, and those of `flight` follow.
+        """
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
         if self.loaded:
             own = tuple(balance_of(each, self.potential) for each in own)
-        return (*own, *self.extra_invariants)
+        return (*own, *self.extra_invariants, *(self.flight.invariants(self) if self.flight else ()))
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
         """Return attitudes (n, 3, 3) at times (n,), s, relative to the axes in which the field is fixed."""
@@ -222,4 +245,5 @@ class Scene:
 
     def __repr__(self) -> str:
         start = f"R_WB0={self.R_WB0.tolist()}, w_WB_B0={self.w_WB_B0.tolist()}"
-        return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r})"
+        flight = f", flight={self.flight!r}" if self.flight else ""
+        return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r}{flight})"

@@ -13,6 +13,7 @@ from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest
+from .flight import FlightInvariant
 from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
@@ -46,6 +47,8 @@ class Trajectory:
     supplied
         Work, J, and impulse, N m s, world axes, of torque and damping up to each sample (n, 4), as the method's own steps sum
         them; None for scenes without them and for methods that do not provide it.
+    frame
+        Positions (n, 3), m, and velocities (n, 3), m/s, as an engine integrated them in free flight, otherwise None.
     """
 
     scene: Scene
@@ -57,6 +60,7 @@ class Trajectory:
     failure: IntegrationFailed | None = None
     choice: Choice | None = None
     supplied: Array | None = None
+    frame: tuple[Array, Array] | None = None
 
     @property
     def outcome(self) -> Outcome:
@@ -68,14 +72,39 @@ class Trajectory:
         """True if the run reached its end."""
         return self.failure is None
 
+    @property
+    def p_WB(self) -> Array | None:
+        """Positions (n, 3), m, world axes, of the origin of the body frame in free flight, otherwise None.
+
+        They are those of the engine. If the method integrates the rotation only, they follow from its attitudes and the
+        exact parabola of the centre of mass.
+        """
+        return self.place[0] if self.scene.flight else None
+
+    @property
+    def v_WB(self) -> Array | None:
+        """Velocities (n, 3), m/s, world axes, of the origin of the body frame in free flight, otherwise None; as `p_WB`."""
+        return self.place[1] if self.scene.flight else None
+
+    @cached_property
+    def place(self) -> tuple[Array, ...]:
+        """`p_WB` and `v_WB` in free flight, otherwise ()."""
+        flight = self.scene.flight
+        if self.frame or not flight:
+            return self.frame or ()
+        return flight.follow(flight.fall(self.scene, self.t), self.R_WB, self.w_WB_B)
+
     @cached_property
     def energy(self) -> Array:
-        """Kinetic plus potential energy (n,), J. It is not conserved in a field that depends on time."""
+        """Kinetic plus potential energy (n,), J. It is not conserved in a field that depends on time.
+
+        In free flight it is the energy of the rotation about the centre of mass.
+        """
         return invariants.energy(self.scene.body, self.scene.potential, self.R_WB, self.w_WB_B, self.t)
 
     @cached_property
     def momentum_W(self) -> Array:
-        """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
+        """Angular momentum about the fixed point, or a free body's centre of mass (n, 3), kg m^2/s, world axes."""
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
 
     @property
@@ -105,9 +134,11 @@ class Trajectory:
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
-        start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
-        R = self.scene.in_field_axes(self.R_WB, self.t)
-        change = invariant.evaluate(R, self.w_WB_B) - start
+        scene, now, before = self.scene, tuple[Array, ...](), tuple[Array, ...]()
+        if (flight := scene.flight) and isinstance(invariant, FlightInvariant):
+            now, before = (*self.place, self.t), (flight.p_WB0[None], flight.v_WB0[None], np.zeros(1))
+        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None], *before)
+        change = invariant.evaluate(scene.in_field_axes(self.R_WB, self.t), self.w_WB_B, *now) - start
         if invariant.supplied is not None:
             change = change - (np.nan if self.supplied is None else invariant.supplied(self.supplied))
         return np.asarray(change / invariant.scale)
@@ -212,6 +243,9 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
             return f"{name} as a {type(values).__name__}"
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
+    frame: Any = result.frame
+    if frame is not None and (scene.flight is None or [np.shape(each) for each in frame] != [(n, 3)] * 2):
+        return "positions and velocities that are not two arrays (n, 3) in free flight"
     return None
 
 
@@ -222,7 +256,12 @@ def find_misplaced(result: Trajectory, grid: Grid) -> str | None:
         return "samples at times that are not in the grid"
     R_off = np.abs(result.R_WB[:1] - scene.R_WB0) > START_TOLERANCE
     w_off = np.abs(result.w_WB_B[:1] - scene.w_WB_B0) > START_TOLERANCE * np.abs(scene.w_WB_B0).max()
-    return "a first sample that is not the start" if R_off.any() or w_off.any() else None
+    off = bool(R_off.any() or w_off.any())
+    if scene.flight and result.frame:
+        arm = np.linalg.norm(scene.flight.com_B) * np.array([1.0, np.linalg.norm(scene.w_WB_B0)])
+        for values, start, size in zip(result.frame, (scene.flight.p_WB0, scene.flight.v_WB0), arm, strict=True):
+            off |= bool((np.abs(values[:1] - start) > START_TOLERANCE * (np.abs(start).max() + size)).any())
+    return "a first sample that is not the start" if off else None
 
 
 def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds) -> Trajectory:
@@ -260,5 +299,6 @@ def _count_within(values: Array, bound: float) -> int:
 
 
 def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
-    supplied = None if result.supplied is None else result.supplied[:n]
-    return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], failure=failure, supplied=supplied)
+    changes: dict[str, Any] = {"supplied": None if result.supplied is None else result.supplied[:n], "failure": failure}
+    changes["frame"] = result.frame and (result.frame[0][:n], result.frame[1][:n])
+    return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], **changes)

@@ -117,16 +117,26 @@ class EngineAxes:
         return potential.moment_B @ self.R_BF if isinstance(potential, UniformGravity) else np.zeros(3)
 
     def trajectory(
-        self, grid: Grid, label: str, states: States, work: Counters, reason: str = "the state is not finite"
+        self,
+        grid: Grid,
+        label: str,
+        states: States,
+        work: Counters,
+        reason: str = "the state is not finite",
+        *,
+        frame: tuple[Array, Array] | None = None,
     ) -> Trajectory:
-        """Return the samples in body axes from states of this body.
+        """Return the samples in body axes from states of this body and, in free flight, `frame` as `Trajectory` has it.
 
         Samples end before the first that is not finite or missing; `reason` is the reason.
         """
         R_WB, w_WB_B, finite = to_body_axes(grid.t, states, self.R_BF[None])
         good = int(finite[0])
+        if frame:
+            good = min(good, *(int(np.append(np.isfinite(each).all(axis=1), False).argmin()) for each in frame))
+            frame = frame[0][:good], frame[1][:good]
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
-        return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure)
+        return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure, frame=frame)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +209,9 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
     second = axes.J.sum() / 2 - axes.J
     if second.min() < -1e-15 * axes.J.max():
         return None
-    potential = axes.scene.potential
+    potential, flight = axes.scene.potential, axes.scene.flight
+    if flight:
+        return MassModel(flight.mass, flight.com_B @ axes.R_BF, flight.g, RigidBody(axes.J))
     if not isinstance(potential, UniformGravity) or not np.any(axes.moment):
         return MassModel(1.0, np.zeros(3), 0.0, RigidBody(axes.J))
     com = potential.com_B @ axes.R_BF

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.flight import rotation_only
 from conservative.invariants import kinetic_energy, sizes
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -26,7 +27,7 @@ def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str,
     The exact motion starts in the first row, or as the scene does. The summary has the largest errors, of attitudes, rad, and
     of rates, relative to the largest; the unit of each in the file and its size, 0 if the file has none; and the diagnosis.
     """
-    whole = Case(scene, recording.t, (None, None), from_row)
+    whole = Case(rotation_only(scene), recording.t, (None, None), from_row)
     case, notes = whole.read(*recording.data), [f"{len(recording.t):,} of {recording.rows:,} rows are compared."]
     if not recording.order_known and (R := recording.data[0]) is not None:
         other = whole.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), recording.data[1])

@@ -24,9 +24,9 @@ CONSERVED, SMALL = 1e-10, 1e-4
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     """Return every measure of a trajectory; `blanks(trajectory.scene)` returns the same measures without values.
 
-    Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity also the
-    error of the centre of mass, m. For each invariant of the scene: |I - I0| / scale with its initial value I0, and the slope
-    of (I - I0) / scale over time. Orthonormality: the largest component of |R'R - 1|.
+    Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity and in free
+    flight also the error of the centre of mass, m. For each invariant of the scene: |I - I0| / scale with its initial value
+    I0, and the slope of (I - I0) / scale over time. Orthonormality: the largest component of |R'R - 1|.
 
     Parameters
     ----------
@@ -59,9 +59,13 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
         Value(Measure.RATES_MAX, float(rates.max())),
         Value(Measure.RATES_FINAL, float(rates[-1])),
     ]
-    potential = trajectory.scene.potential
+    potential, flight, position = trajectory.scene.potential, trajectory.scene.flight, None
     if isinstance(potential, UniformGravity):
         position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=1)
+    elif flight:
+        c, _ = flight.centre(trajectory.R_WB, trajectory.w_WB_B, *trajectory.place)
+        position = np.linalg.norm(c - flight.fall(trajectory.scene, trajectory.t)[0], axis=1)
+    if position is not None:
         measured += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
     return measured + measure_drifts(trajectory)
 

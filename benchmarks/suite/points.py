@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,9 @@ def motion_numbers(scene: Scene) -> list[list[float]]:
     energies = (
         [] if scene.potential is None else [float(energy_at(scene.potential, *at)) for at in zip(PROBES, times, strict=True)]
     )
-    values = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
+    values: tuple[Any, ...] = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
+    if flight := scene.flight:
+        values = (*values, [flight.mass, flight.g], flight.com_B, flight.p_WB0, flight.v_WB0)
     return [_digits(each) for each in values]
 
 

@@ -15,6 +15,7 @@ from ..batch import Batch
 from ..check import describe, positive_integer
 from ..drifts import list_drifts
 from ..errors import BadInput
+from ..flight import rotation_only
 from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
 from ..method import Method
 from ..outcome import ChoiceForMany, ProgressOfMany
@@ -105,6 +106,7 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
+    scene = rotation_only(scene)
     _check_options(threads, progress, path, resume)
     only_scene = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(Batch.of) if only_scene else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..check import build_unchecked, describe, read_only
 from ..errors import BadInput
+from ..flight import rotation_only
 from ..scene import Scene
 
 _PACKAGE = __name__.partition(".")[0]
@@ -45,6 +46,7 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
         raise BadInput("scene", describe(scene), "None, or the Scene of the run")
     if not record["fields"]["extra_invariants"]["tuple"]:
         scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
+    scene = rotation_only(scene)
     if not is_same_motion(record, record_scene(scene)):
         raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
     return scene
@@ -66,7 +68,9 @@ def record_scene(value: Any) -> Any:
         return {"tuple": [record_scene(each) for each in value]}
     kind = type(value)
     if is_dataclass(value) and kind.__module__.partition(".")[0] == _PACKAGE and "<" not in kind.__qualname__:
-        named = {field.name: record_scene(getattr(value, field.name)) for field in fields(value)}
+        # Fields without a value are left out, so that records of versions without these fields are the same.
+        given = ((field, getattr(value, field.name)) for field in fields(value))
+        named = {field.name: record_scene(each) for field, each in given if each is not None or field.default is not None}
         return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
     return {"digest": hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()[:16]}
 
@@ -84,7 +88,8 @@ def _restore(record: Any) -> Any:
     kind = getattr(import_module(module), name) if module.partition(".")[0] == _PACKAGE else None
     if not (isinstance(kind, type) and is_dataclass(kind)):
         raise TypeError(f"no value of {record['type']}")
-    if record["fields"].keys() != {field.name for field in fields(kind)}:
+    names, optional = ({field.name for field in fields(kind) if some or field.default is None} for some in (True, False))
+    if not names - optional <= record["fields"].keys() <= names:
         raise TypeError(f"not the fields of {record['type']}")
     return build_unchecked(kind, **{field: _restore(value) for field, value in record["fields"].items()})
 

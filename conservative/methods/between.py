@@ -121,7 +121,11 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     row, gaps = row[:n], gaps[:n]
     R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
-    samples = replace(found, t=t[:done].copy(), R_WB=R_WB[:done], w_WB_B=w_WB_B[:done], failure=failure)
+    R_WB, w_WB_B, frame, flight = R_WB[:done], w_WB_B[:done], found.frame, found.scene.flight
+    if frame and flight:
+        first = (each[row[:done]] for each in (found.R_WB, found.w_WB_B, *frame))
+        frame = flight.follow(flight.fall_from(*flight.centre(*first), gaps[:done]), R_WB, w_WB_B)
+    samples = replace(found, t=t[:done].copy(), R_WB=R_WB, w_WB_B=w_WB_B, failure=failure, frame=frame)
     return cut_at_failure(samples, method.conserves, method.bounds(found.scene, grid))
 
 

@@ -20,6 +20,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from ..check import read_only, replace_unchecked
+from ..flight import Flight
 from ..grid import Grid
 from ..method import Method, Run
 from ..potentials.potential import depends_on_time
@@ -58,7 +59,12 @@ class Units:
             damping=scene.damping and scene.damping.in_units(energy, self.time),
             dt=scene.dt / self.time,
             extra_invariants=(),
+            flight=scene.flight and self._convert_flight(scene.flight),
         )
+
+    def _convert_flight(self, flight: Flight) -> Flight:
+        mass, g, v_WB0 = flight.mass / self.moment, flight.g * self.time**2, read_only(flight.v_WB0 * self.time)
+        return replace_unchecked(flight, mass=mass, g=g, v_WB0=v_WB0)
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
@@ -66,7 +72,9 @@ class Units:
         w_WB_B = found.w_WB_B / self.time
         momentum = self.moment / self.time
         supplied = None if found.supplied is None else found.supplied * np.repeat([momentum / self.time, momentum], [1, 3])
-        return replace(found, scene=scene, t=grid.t[: len(found)], w_WB_B=w_WB_B, failure=failure, supplied=supplied)
+        frame = found.frame and (found.frame[0], found.frame[1] / self.time)
+        changes: dict[str, Any] = {"w_WB_B": w_WB_B, "failure": failure, "supplied": supplied, "frame": frame}
+        return replace(found, scene=scene, t=grid.t[: len(found)], **changes)
 
 
 SI = Units(1.0, 1.0)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,16 +79,19 @@ def load(path: str | Path) -> Scene:
     t_end = top.value("t_end", "a finite duration above 0, s")
     body, mass = _body(top.table("body", "inertia, a shape or another file; `conservative new` shows them"))
     potential = _field(top, body, mass)
-    R_WB0, w_WB_B0 = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
+    R_WB0, w_WB_B0, flight = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
-    with top.blame():
-        return Scene(name, body, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path))
+    if flight and mass is None:
+        raise top.bad("body", "the inertia alone", "inertia_com, mass and com_B, or a shape, together with p_WB or v_WB")
+    with top.blame(p_WB0="start", v_WB0="start"):
+        moving = mass if flight and mass else body
+        return Scene(name, moving, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path), **flight)
 
 
 def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
     """Return the body, and its mass and centre of mass if the file has them."""
-    sources = ("inertia", "shape", *list_entries(BODY_FILES))
+    sources = ("inertia", "inertia_com", "shape", *list_entries(BODY_FILES))
     given = [key for key in table.values if key in sources]
     if not given:
         table.only({*sources, "name", *_PLACEMENT, *(key for shape in SHAPES.values() for key in keys_of(shape))})
@@ -98,7 +102,10 @@ def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
         table.only(("inertia",))
         return table.call(RigidBody), None
     (kind,) = given
-    if kind == "shape":
+    if kind == "inertia_com":
+        table.only(keys_of(MassDistribution))
+        mass = table.call(MassDistribution)
+    elif kind == "shape":
         name = table.choice("shape", SHAPES)
         table.only(("shape", *keys_of(SHAPES[name]), *_PLACEMENT))
         mass = table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
@@ -108,7 +115,7 @@ def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
         name = table.text("name", f"the name of the body in {path}")
         with table.blame(path=kind):
             mass = load_entry(BODY_FILES, "kind of file", kind)(path, name)
-    if "com_B" in table:
+    if "com_B" in table and kind != "inertia_com":
         mass = table.call(mass.about)
     with table.blame(inertia=kind):
         return mass.body, mass
@@ -153,12 +160,16 @@ def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None)
     return table.call(_POTENTIALS[kind])
 
 
-def _start(table: TomlTable) -> tuple[Array, Array]:
-    table.only(("R_WB", "w_WB_B"))
-    allowed = "three finite rates (3,), rad/s"
-    with table.blame():
-        rates = finite_array("w_WB_B", table.value("w_WB_B", allowed), ((3,),), allowed)
-    return _attitude(table, "R_WB"), rates
+def _start(table: TomlTable) -> tuple[Array, Array, dict[str, Any]]:
+    """Return attitude, rates and, in free flight, position or velocity of the frame."""
+    table.only(("R_WB", "w_WB_B", "p_WB", "v_WB"))
+    vectors = {}
+    for name, unit in (("w_WB_B", "rates (3,), rad/s"), ("p_WB", "numbers (3,), m"), ("v_WB", "numbers (3,), m/s")):
+        if name in table or name == "w_WB_B":
+            allowed = f"three finite {unit}"
+            with table.blame():
+                vectors[f"{name}0"] = finite_array(name, table.value(name, allowed), ((3,),), allowed)
+    return _attitude(table, "R_WB"), vectors.pop("w_WB_B0"), vectors
 
 
 def _attitude(table: TomlTable, key: str) -> Array:

@@ -11,11 +11,13 @@ from .free_bodies import hairer_vilmart as hairer_vilmart
 from .free_bodies import near_intermediate_box as near_intermediate_box
 from .free_bodies import near_separatrix as near_separatrix
 from .free_bodies import needle as needle
+from .free_bodies import offset_brick as offset_brick
 from .free_bodies import planar_body as planar_body
 from .free_bodies import separatrix as separatrix
 from .free_bodies import spherical_body as spherical_body
 from .free_bodies import stable_spin as stable_spin
 from .free_bodies import symmetric_body as symmetric_body
+from .free_bodies import thrown_box as thrown_box
 from .free_bodies import tumbling_box as tumbling_box
 from .free_bodies import turned_brick as turned_brick
 from .free_bodies import unstable_spin as unstable_spin

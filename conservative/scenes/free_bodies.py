@@ -16,6 +16,7 @@ from ..body import RigidBody
 from ..check import choice, finite_number, positive_number
 from ..errors import BadInput
 from ..scene import Scene
+from ..shapes import MassDistribution, box
 from .transforms import in_body_frame, slow_motion
 
 _BRICK = (13.0, 5.0, 10.0)
@@ -51,6 +52,43 @@ def turned_brick(angle: float = 0.7, t_end: float | None = None) -> Scene:
     F = rotation_about((1.0, 2.0, 3.0), finite_number("angle", angle, "a finite angle, rad"))
     turned = in_body_frame(brick_flip(), F, "turned_brick")
     return turned if t_end is None else turned.rename("turned_brick", t_end=t_end)
+
+
+def offset_brick(t_end: float = 6.0) -> Scene:
+    """Return the brick with its body frame off its centre of mass, which is at rest: free flight without gravity.
+
+    The exact centre of mass does not move. That of an engine drifts if its free joint couples translation and rotation.
+    """
+    body, rates = MassDistribution(12.0, (0.3, -0.2, 0.4), _BRICK), (0.0, 0.05, 10.0)
+    return Scene(
+        "offset_brick",
+        body,
+        np.eye(3),
+        rates,
+        t_end,
+        dt=0.01,
+        group="free flight",
+        source="Krenk & Nielsen, 5.1, in another frame",
+        v_WB0=np.cross(body.com_B, rates),
+    )
+
+
+def thrown_box(t_end: float = 2.0) -> Scene:
+    """Return a box 0.1 x 0.2 x 0.3 of 2 kg that tumbles in gravity, with its body frame off its centre of mass."""
+    body = box((0.1, 0.2, 0.3), mass=2.0).rotate(rotation_about((1.0, 2.0, -1.0), 0.7)).about((0.1, 0.05, -0.02))
+    return Scene(
+        "thrown_box",
+        body,
+        rotation_about((1.0, -1.0, 0.3), 1.1),
+        (1.0, 2.0, 3.0),
+        t_end,
+        body.gravity(9.81),
+        dt=0.01,
+        group="free flight",
+        source="ours",
+        p_WB0=(0.3, -0.2, 1.0),
+        v_WB0=(3.0, 1.0, 4.0),
+    )
 
 
 def stable_spin(revolutions: float = 100.0, spin: float = 10.0, disturbance: float = 0.1) -> Scene:

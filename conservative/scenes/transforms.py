@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..attitude import Array
 from ..body import RigidBody
 from ..check import positive_number, rotation
@@ -25,7 +27,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         `slow` is not a finite number above 0, the field is not uniform gravity, or the scene has extra invariants, whose
         scaling is unknown.
     """
-    factor, field = positive_number("slow", slow), scene.potential
+    factor, field, flight = positive_number("slow", slow), scene.potential, scene.flight
     if factor == 1:
         return scene
     if isinstance(field, UniformGravity):
@@ -37,6 +39,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
     return scene.rename(
         f"{scene.name}:slow={factor:g}",
         w_WB_B0=scene.w_WB_B0 / factor,
+        flight=flight and replace(flight, v_WB0=flight.v_WB0 / factor, g=flight.g / factor**2),
         t_end=scene.t_end * factor,
         potential=field,
         dt=scene.dt * factor,
@@ -62,6 +65,6 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
         field = UniformGravity(field.weight, F @ field.com_B)
     elif field is not None:
         raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
-    return scene.rename(
-        name, body=RigidBody(F @ scene.body.inertia @ F.T), R_WB0=scene.R_WB0 @ F.T, w_WB_B0=F @ scene.w_WB_B0, potential=field
-    )
+    flight = scene.flight and replace(scene.flight, com_B=F @ scene.flight.com_B)
+    start = {"R_WB0": scene.R_WB0 @ F.T, "w_WB_B0": F @ scene.w_WB_B0}
+    return scene.rename(name, body=RigidBody(F @ scene.body.inertia @ F.T), potential=field, flight=flight, **start)

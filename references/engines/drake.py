@@ -46,6 +46,7 @@ ENGINE = {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
         "suite": ("discrete", "runge_kutta5"),
         "as_installed": ("default",),
+        "flight": True,
     },
 }
 
@@ -63,7 +64,7 @@ def prepare(given):
     times = given.steps * given.dt
 
     def run():
-        R, w = np.full((len(times), 3, 3), np.nan), np.full((len(times), 3), np.nan)
+        R, (w, p, v) = np.full((len(times), 3, 3), np.nan), np.full((3, len(times), 3), np.nan)
         reason = ""
         try:
             context.SetTime(0.0)
@@ -72,13 +73,14 @@ def prepare(given):
             for sample, time in enumerate(times.tolist()):
                 if sample:  # AdvanceTo(0) would update a discrete plant
                     simulator.AdvanceTo(time)
-                R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
-                w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
+                pose, velocity = plant.EvalBodyPoseInWorld(inner, body), plant.EvalBodySpatialVelocityInWorld(inner, body)
+                R[sample], w[sample], p[sample] = pose.rotation().matrix(), velocity.rotational(), pose.translation()
+                v[sample] = velocity.translational()
         except RuntimeError as error:
             if "singularity" not in str(error):
                 raise
             reason = "Drake's BallRpyJoint has reached a singularity"
-        return {"R": R, "w_W": w, "reason": reason}
+        return {"R": R, "w_W": w, "reason": reason, **({"p": p, "v": v} if hasattr(given, "p0") else {})}
 
     return run
 
@@ -87,7 +89,8 @@ def _start(drake, plant, body, context, given):
     """Return a function that sets the initial state."""
     turn = drake.RotationMatrix(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)))
     if given.free:
-        pose, spin = drake.RigidTransform(turn, np.zeros(3)), drake.SpatialVelocity(given.w0_W, np.zeros(3))
+        p0, v0 = getattr(given, "p0", np.zeros(3)), getattr(given, "v0", np.zeros(3))
+        pose, spin = drake.RigidTransform(turn, p0), drake.SpatialVelocity(given.w0_W, v0)
 
         def start():
             plant.SetFreeBodyPose(context, body, pose)

@@ -1,10 +1,11 @@
 """MuJoCo with one of its integrators, in its own loop.
 
 The loop is `mujoco.rollout` if samples are close, and `mj_step(m, d, nstep)` from sample to sample otherwise. The body's
-principal axes are MuJoCo's body axes. A free body has a free joint at its centre of mass, as in the models of MuJoCo's users. A
-body in a field has a ball joint at its fixed point. A spring is a spatial tendon between two sites. An attraction, a gravity
-gradient and fields that turn are a passive force: a C function that MuJoCo calls in each evaluation, `mjcb_passive`, made by
-numba. Switched off: every part of a step that such a body does not need.
+principal axes are MuJoCo's body axes. A free body has a free joint at its centre of mass, as in the models of MuJoCo's users.
+In free flight the joint is at the origin of the body frame. A body in a field has a ball joint at its fixed point. A spring is
+a spatial tendon between two sites. An attraction, a gravity gradient and fields that turn are a passive force: a C function
+that MuJoCo calls in each evaluation, `mjcb_passive`, made by numba. Switched off: every part of a step that such a body does
+not need.
 
 Parameters
 ----------
@@ -46,6 +47,7 @@ ENGINE = {
         "as_installed": ("Euler",),
         "usual_dt": 0.002,
         "colour": "vermilion",
+        "flight": True,
     },
 }
 
@@ -78,8 +80,9 @@ def prepare(given):
 
     def run():
         with _quiet(mj, _ignore), _passive(mj, field) if field else nullcontext():
-            q, w, reason = march(mj, model, data, start, given)
-        return {"q": q, "w": w, "reason": reason, "evaluations": evaluations}
+            qpos, qvel, reason = march(mj, model, data, start, given)
+        samples = {"q": qpos[:, -4:], "w": qvel[:, -3:], "reason": reason, "evaluations": evaluations}
+        return samples | {"p": qpos[:, :3], "v": qvel[:, :3]} if hasattr(given, "p0") else samples
 
     return run
 
@@ -192,17 +195,20 @@ def _start(mj, model, data, given):
     """Return MuJoCo's state vector (time, qpos, qvel) at the start.
 
     qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
-    joint as for the ball joint (the free joint's translation, ahead of them, is zero).
+    joint as for the ball joint. The free joint's position and velocity, both of its origin in world axes, are ahead of them:
+    those of a free flight, otherwise 0.
     """
     mj.mj_resetData(model, data)
     data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0
+    if hasattr(given, "p0"):
+        data.qpos[:3], data.qvel[:3] = given.p0, given.v0
     state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
     mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)
     return state
 
 
 def _roll_out(mj, model, data, start, given):
-    """Return quaternions, rates and a reason, from one call that stores every step."""
+    """Return qpos, qvel and a reason, from one call that stores every step."""
     from mujoco.rollout import rollout
 
     mj.mj_resetData(model, data)
@@ -214,22 +220,21 @@ def _roll_out(mj, model, data, start, given):
         # After a failure the rollout repeats the last state, including its time.
         states[1:][np.diff(states[:, 0]) <= 0] = np.nan
     states = states[given.steps]
-    nq = 1 + model.nq
-    return states[:, nq - 4 : nq], states[:, nq + model.nv - 3 : nq + model.nv], reason
+    return states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv], reason
 
 
 def _step_to_samples(mj, model, data, start, given):
-    """Return quaternions, rates and a reason, stepping from sample to sample inside the engine."""
+    """Return qpos, qvel and a reason, stepping from sample to sample inside the engine."""
     mj.mj_resetData(model, data)
     mj.mj_setState(model, data, start, mj.mjtState.mjSTATE_FULLPHYSICS)
-    q, w = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
-    q[0], w[0] = data.qpos[-4:], data.qvel[-3:]
+    q, w = np.full((len(given.steps), model.nq), np.nan), np.full((len(given.steps), model.nv), np.nan)
+    q[0], w[0] = data.qpos, data.qvel
     for sample, n_steps in enumerate(np.diff(given.steps), start=1):
         mj.mj_step(model, data, int(n_steps))
         reason = _warning(mj, data)
         if reason:
             return q, w, reason
-        q[sample], w[sample] = data.qpos[-4:], data.qvel[-3:]
+        q[sample], w[sample] = data.qpos, data.qvel
     return q, w, ""
 
 

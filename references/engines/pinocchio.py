@@ -1,14 +1,15 @@
 """Pinocchio's `aba` and `integrate`, stepped from Python.
 
 Pinocchio is a library of algorithms without a time loop, so this loop is Python's. The library's eight calls take a sixth of a
-step of RK4. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free. The torque of a field
-other than gravity is the joint's torque, in each call of `aba`; numba compiles it where it is installed.
+step of RK4. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free. In free flight it is
+on a free flyer at the origin of its frame. The torque of a field other than gravity is the joint's torque, in each call of
+`aba`; numba compiles it where it is installed.
 
 Parameters
 ----------
 scheme
     "Euler": semi-implicit, v += dt aba(q, v), then q = integrate(q, dt v). "RK4": Munthe-Kaas's Runge-Kutta method of
-    order 4 on the rotation group (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
+    order 4 on the group of rotations, or of motions (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
 
 References
 ----------
@@ -33,6 +34,7 @@ ENGINE = {
         "many": ("RK4",),
         "pictures": ("Euler",),
         "colour": "purple",
+        "flight": True,
     },
 }
 
@@ -45,8 +47,11 @@ def prepare(given):
     evaluations = given.n_steps * (4 if given.scheme == "RK4" else 1)
 
     def run():
-        q, w = _march(step, given)
-        return {"q": q, "w": w, "evaluations": evaluations}
+        q, v = _march(step, given)
+        samples = {"q": np.roll(q[:, -4:], 1, axis=1), "w": v[:, -3:], "evaluations": evaluations}
+        if hasattr(given, "p0"):  # velocities of the free flyer are in body axes
+            samples |= {"p": q[:, :3], "v": np.array([pin.Quaternion(a) * b for a, b in zip(q[:, 3:], v[:, :3], strict=True)])}
+        return samples
 
     return run
 
@@ -59,15 +64,17 @@ def prepare_many(bodies):
 
     def run():
         q, w = zip(*(_march(step, body) for step, body in zip(steps, bodies, strict=True)), strict=True)
-        return {"q": np.stack(q), "w": np.stack(w)}
+        return {"q": np.roll(np.stack(q), 1, axis=-1), "w": np.stack(w)}
 
     return run
 
 
 def _march(step, given):
-    """Return samples of quaternions (n, 4), scalar first, and rates (n, 3); nan after the end of a run that diverges."""
+    """Return samples of Pinocchio's coordinates (n, 4 or 7) and velocities (n, 3 or 6), nan after a run has diverged."""
     q, v, count = np.roll(given.q0, -1), given.w0, 0  # Pinocchio has the scalar last; velocities are in body axes
-    qs, vs = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
+    if hasattr(given, "p0"):
+        q, v = np.concatenate([given.p0, q]), np.concatenate([given.R0.T @ given.v0, v])
+    qs, vs = np.full((len(given.steps), len(q)), np.nan), np.full((len(given.steps), len(v)), np.nan)
     qs[0], vs[0] = q, v
     with np.errstate(all="ignore"):
         for sample, n_steps in enumerate(np.diff(given.steps), start=1):
@@ -77,7 +84,7 @@ def _march(step, given):
             if not np.isfinite(v).all():
                 break
             qs[sample], vs[sample] = q, v
-    return np.roll(qs, 1, axis=1), vs
+    return qs, vs
 
 
 def _stepper(pin, given):
@@ -87,12 +94,13 @@ def _stepper(pin, given):
     that acts from the right, q' = q v, with v in body axes.
     """
     model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "body")
+    kind = pin.JointModelFreeFlyer() if hasattr(given, "p0") else pin.JointModelSpherical()
+    joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
     # The inertia about the centre of mass, in the axes of the joint.
     model.appendBodyToJoint(joint, pin.Inertia(given.mass, given.com, given.inertia_com), pin.SE3.Identity())
     model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
     aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
-    field, torque = pack_field(given), compile_torque()
+    field, torque, bracket = pack_field(given), compile_torque(), _cross_motions if model.nv == 6 else _cross
     no_field = not field.any()
 
     def acceleration(q, v, t):
@@ -109,13 +117,18 @@ def _stepper(pin, given):
         v2 = v + a1 / 2
         k2, a2 = dt * v2, dt * acceleration(integrate(model, q, k1 / 2), v2, t + dt / 2)
         v3 = v + a2 / 2
-        k3, a3 = dt * v3, dt * acceleration(integrate(model, q, k2 / 2 + _cross(k1, k2) / 8), v3, t + dt / 2)
+        k3, a3 = dt * v3, dt * acceleration(integrate(model, q, k2 / 2 + bracket(k1, k2) / 8), v3, t + dt / 2)
         v4 = v + a3
         k4, a4 = dt * v4, dt * acceleration(integrate(model, q, k3), v4, t + dt)
-        u = (k1 + 2 * (k2 + k3) + k4 + _cross(k1, k4) / 2) / 6
+        u = (k1 + 2 * (k2 + k3) + k4 + bracket(k1, k4) / 2) / 6
         return integrate(model, q, u), v + (a1 + 2 * (a2 + a3) + a4) / 6
 
     return rk4 if given.scheme == "RK4" else euler
+
+
+def _cross_motions(a, b):
+    """Return the commutator of twists: linear velocity first, in body axes."""
+    return np.concatenate([_cross(a[3:], b[:3]) + _cross(a[:3], b[3:]), _cross(a[3:], b[3:])])
 
 
 def _cross(a, b):

@@ -34,6 +34,7 @@ ENGINE = {
         "variants": ("", "maximal", "as_installed=true"),
         "as_installed": ("as_installed=true",),
         "usual_dt": 1 / 240,
+        "flight": True,
     },
 }
 
@@ -43,6 +44,7 @@ def prepare(given):
     import pybullet as bullet
 
     bullet.connect(bullet.DIRECT)
+    flies = hasattr(given, "p0")
     build, look = (_build_free, _look_at_free) if given.free else (_build_held, _look_at_held)
 
     def run():
@@ -53,9 +55,13 @@ def prepare(given):
 
         def read():
             (x, y, z, s), w = look(bullet, body)
-            return {"q": (s, x, y, z), "w_W": w}
+            place = {"p": bullet.getBasePositionAndOrientation(body)[0], "v": bullet.getBaseVelocity(body)[0]} if flies else {}
+            return {"q": (s, x, y, z), "w_W": w, **place}
 
         samples = sample(given, bullet.stepSimulation, read)
+        if flies:  # Bullet's frame is at the centre of mass
+            arm = np.array([_matrix(q) for q in samples["q"]]) @ given.com
+            samples |= {"p": samples["p"] - arm, "v": samples["v"] - np.cross(samples["w_W"], arm)}
         return samples if given.free else _to_axes(samples["q"], samples["w_W"], given)
 
     return run
@@ -65,11 +71,14 @@ def _build_free(bullet, given):
     maximal = given.body == "maximal"
     # In maximal coordinates, a body without a shape does not move.
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
-    body = bullet.createMultiBody(given.mass, shape, baseOrientation=_x_first(given.q0), useMaximalCoordinates=maximal)
-    bullet.changeDynamics(body, -1, localInertiaDiagonal=given.moments.tolist())
+    arm = given.R0 @ given.com if hasattr(given, "p0") else np.zeros(3)
+    place = (getattr(given, "p0", 0) + arm).tolist()
+    body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
+    # Without its mass, a body in maximal coordinates would have a position that is not finite.
+    bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments.tolist())
     if not given.as_installed:
         _switch_off(bullet, body, -1)
-    bullet.resetBaseVelocity(body, [0, 0, 0], given.w0_W.tolist())
+    bullet.resetBaseVelocity(body, (getattr(given, "v0", 0) + np.cross(given.w0_W, arm)).tolist(), given.w0_W.tolist())
     return body
 
 

@@ -55,6 +55,7 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
     mass = mass_model(axes)
     assert mass is not None  # checked by `unsupported`
     w0_W, x0 = axes.R_WF0 @ axes.w0, axes.R_WF0 @ mass.com
+    flight = axes.scene.flight
     return {
         "moments": axes.J,
         "q0": axes.q0,
@@ -75,6 +76,7 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
         "n_steps": grid.n_steps,
         "every": grid.every,
         "steps": grid.steps.astype(int),
+        **({"p_WB0": flight.p_WB0, "v_WB0": flight.v_WB0} if flight else {}),
     }
 
 
@@ -131,7 +133,11 @@ def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Tra
         if isinstance(answer, IntegrationFailed):
             return Trajectory(axes.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
         work = Counters(answer.get("steps", grid.n_steps), evaluations=answer.get("evaluations"))
-        reason = answer.get("reason") or "the state is not finite"
-        return axes.trajectory(grid, label, read_states(answer, (grid.n_samples,)), work, reason)
+        reason, frame = answer.get("reason") or "the state is not finite", None
+        if axes.scene.flight:
+            frame = np.asarray(answer.get("p"), float), np.asarray(answer.get("v"), float)
+            if any(each.shape != (grid.n_samples, 3) for each in frame):
+                raise EngineCrashed(f"it returned positions {frame[0].shape} and velocities {frame[1].shape} in free flight")
+        return axes.trajectory(grid, label, read_states(answer, (grid.n_samples,)), work, reason, frame=frame)
 
     return read

@@ -71,10 +71,10 @@ def run_once(
         trajectory = run_on(scene, method, grid)
         if stream is not None:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(header())
+            writer.writerow(header(trajectory))
             writer.writerows(samples_of(trajectory).tolist())
         if binary is not None:
-            binary.write(trajectory.to_pandas().set_axis(header(), axis=1).to_parquet(index=False))
+            binary.write(trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False))
     return summarize(trajectory, method, grid.dt) | {"error": find_errors(trajectory, grid, truth)}
 
 
