@@ -122,7 +122,7 @@ class Scene:
             raise BadInput("torque", describe(torque), "None or a Torque, such as Torque((0, 0, 1.5))")
         if not isinstance(damping, Damping | None):
             raise BadInput("damping", describe(damping), "None or a Damping, such as Damping(0.1 * np.eye(3))")
-        if flight is not None and not torque is damping is None:
+        if flight is not None and (torque is not None or damping is not None):
             raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
