@@ -15,7 +15,7 @@ from .attitude import Array
 from .body import RigidBody
 from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation, set_fields
 from .errors import BadInput
-from .flight import Flight, read_flight
+from .flight import Flight, FlightInvariant, read_flight
 from .invariants import Invariant, axial_direction, balance_of, invariants_of
 from .potentials.load import Damping, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
@@ -209,6 +209,13 @@ class Scene:
         if self.loaded:
             own = tuple(balance_of(each, self.potential) for each in own)
         return (*own, *self.extra_invariants, *(self.flight.invariants(self) if self.flight else ()))
+
+    def initial_value(self, invariant: Invariant) -> Array:
+        """Return the value of an invariant in the initial state, (1,) or (1, 3)."""
+        flight, place = self.flight, tuple[Array, ...]()
+        if flight and isinstance(invariant, FlightInvariant):
+            place = flight.p_WB0[None], flight.v_WB0[None], np.zeros(1)
+        return invariant.evaluate(self.R_WB0[None], self.w_WB_B0[None], *place)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
         """Return attitudes (n, 3, 3) at times (n,), s, relative to the axes in which the field is fixed."""

@@ -134,11 +134,9 @@ class Trajectory:
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
-        scene, now, before = self.scene, tuple[Array, ...](), tuple[Array, ...]()
-        if (flight := scene.flight) and isinstance(invariant, FlightInvariant):
-            now, before = (*self.place, self.t), (flight.p_WB0[None], flight.v_WB0[None], np.zeros(1))
-        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None], *before)
-        change = invariant.evaluate(scene.in_field_axes(self.R_WB, self.t), self.w_WB_B, *now) - start
+        place = (*self.place, self.t) if isinstance(invariant, FlightInvariant) else ()
+        R = self.scene.in_field_axes(self.R_WB, self.t)
+        change = invariant.evaluate(R, self.w_WB_B, *place) - self.scene.initial_value(invariant)
         if invariant.supplied is not None:
             change = change - (np.nan if self.supplied is None else invariant.supplied(self.supplied))
         return np.asarray(change / invariant.scale)

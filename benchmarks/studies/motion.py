@@ -87,7 +87,7 @@ def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
     for invariant in case.scene.invariants:
         drift = trajectory.drift(invariant)
         if drift.ndim > 1:  # relative to the initial value, which is the scale of a vector that is not zero
-            start = invariant.evaluate(trajectory.R_WB[:1], trajectory.w_WB_B[:1]) / invariant.scale
+            start = case.scene.initial_value(invariant) / invariant.scale
             drift = sizes(drift + start) - sizes(start)
         yield line(SIGNED + invariant.name, drift, POINTS)
     yield from (line(axis, values, SAMPLES) for axis, values in zip(AXES, project_on_sphere(trajectory).T, strict=True))

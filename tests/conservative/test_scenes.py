@@ -44,7 +44,7 @@ def test_a_registered_scene_is_complete_and_conserves_its_energy(name):
     assert (scene.name, scene.group != "your own", bool(scene.source)) == (name, True, True)
     assert 5 <= scene.t_end / scene.dt <= 3e4  # a run with the defaults is short
     for invariant in scene.invariants:
-        value = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
+        value = scene.initial_value(invariant)
         assert np.abs(value).max() < 1e3 * invariant.scale < math.inf
     method = cv.Projected() if isinstance(scene.potential, cv.Turning) else cv.Reduced()
     trajectory = cv.integrate(scene, scene.dt, method, t_end=20 * scene.dt)
