@@ -80,7 +80,7 @@ def prepare(given):
             if "singularity" not in str(error):
                 raise
             reason = "Drake's BallRpyJoint has reached a singularity"
-        return {"R": R, "w_W": w, "reason": reason, **({"p": p, "v": v} if hasattr(given, "p0") else {})}
+        return {"R": R, "w_W": w, "reason": reason, **({"p": p, "v": v} if hasattr(given, "p_WB0") else {})}
 
     return run
 
@@ -89,7 +89,7 @@ def _start(drake, plant, body, context, given):
     """Return a function that sets the initial state."""
     turn = drake.RotationMatrix(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)))
     if given.free:
-        p0, v0 = getattr(given, "p0", np.zeros(3)), getattr(given, "v0", np.zeros(3))
+        p0, v0 = getattr(given, "p_WB0", np.zeros(3)), getattr(given, "v_WB0", np.zeros(3))
         pose, spin = drake.RigidTransform(turn, p0), drake.SpatialVelocity(given.w0_W, v0)
 
         def start():

@@ -82,7 +82,7 @@ def prepare(given):
         with _quiet(mj, _ignore), _passive(mj, field) if field else nullcontext():
             qpos, qvel, reason = march(mj, model, data, start, given)
         samples = {"q": qpos[:, -4:], "w": qvel[:, -3:], "reason": reason, "evaluations": evaluations}
-        return samples | {"p": qpos[:, :3], "v": qvel[:, :3]} if hasattr(given, "p0") else samples
+        return samples | {"p": qpos[:, :3], "v": qvel[:, :3]} if hasattr(given, "p_WB0") else samples
 
     return run
 
@@ -200,8 +200,8 @@ def _start(mj, model, data, given):
     """
     mj.mj_resetData(model, data)
     data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0
-    if hasattr(given, "p0"):
-        data.qpos[:3], data.qvel[:3] = given.p0, given.v0
+    if hasattr(given, "p_WB0"):
+        data.qpos[:3], data.qvel[:3] = given.p_WB0, given.v_WB0
     state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
     mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)
     return state

@@ -49,7 +49,7 @@ def prepare(given):
     def run():
         q, v = _march(step, given)
         samples = {"q": np.roll(q[:, -4:], 1, axis=1), "w": v[:, -3:], "evaluations": evaluations}
-        if hasattr(given, "p0"):  # velocities of the free flyer are in body axes
+        if hasattr(given, "p_WB0"):  # velocities of the free flyer are in body axes
             samples |= {"p": q[:, :3], "v": np.array([pin.Quaternion(a) * b for a, b in zip(q[:, 3:], v[:, :3], strict=True)])}
         return samples
 
@@ -72,8 +72,8 @@ def prepare_many(bodies):
 def _march(step, given):
     """Return samples of Pinocchio's coordinates (n, 4 or 7) and velocities (n, 3 or 6), nan after a run has diverged."""
     q, v, count = np.roll(given.q0, -1), given.w0, 0  # Pinocchio has the scalar last; velocities are in body axes
-    if hasattr(given, "p0"):
-        q, v = np.concatenate([given.p0, q]), np.concatenate([given.R0.T @ given.v0, v])
+    if hasattr(given, "p_WB0"):
+        q, v = np.concatenate([given.p_WB0, q]), np.concatenate([given.R0.T @ given.v_WB0, v])
     qs, vs = np.full((len(given.steps), len(q)), np.nan), np.full((len(given.steps), len(v)), np.nan)
     qs[0], vs[0] = q, v
     with np.errstate(all="ignore"):
@@ -94,7 +94,7 @@ def _stepper(pin, given):
     that acts from the right, q' = q v, with v in body axes.
     """
     model = pin.Model()
-    kind = pin.JointModelFreeFlyer() if hasattr(given, "p0") else pin.JointModelSpherical()
+    kind = pin.JointModelFreeFlyer() if hasattr(given, "p_WB0") else pin.JointModelSpherical()
     joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
     # The inertia about the centre of mass, in the axes of the joint.
     model.appendBodyToJoint(joint, pin.Inertia(given.mass, given.com, given.inertia_com), pin.SE3.Identity())

@@ -44,7 +44,7 @@ def prepare(given):
     import pybullet as bullet
 
     bullet.connect(bullet.DIRECT)
-    flies = hasattr(given, "p0")
+    flies = hasattr(given, "p_WB0")
     build, look = (_build_free, _look_at_free) if given.free else (_build_held, _look_at_held)
 
     def run():
@@ -71,14 +71,14 @@ def _build_free(bullet, given):
     maximal = given.body == "maximal"
     # In maximal coordinates, a body without a shape does not move.
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
-    arm = given.R0 @ given.com if hasattr(given, "p0") else np.zeros(3)
-    place = (getattr(given, "p0", 0) + arm).tolist()
+    arm = given.R0 @ given.com if hasattr(given, "p_WB0") else np.zeros(3)
+    place = (getattr(given, "p_WB0", 0) + arm).tolist()
     body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
     # Without its mass, a body in maximal coordinates would have a position that is not finite.
     bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments.tolist())
     if not given.as_installed:
         _switch_off(bullet, body, -1)
-    bullet.resetBaseVelocity(body, (getattr(given, "v0", 0) + np.cross(given.w0_W, arm)).tolist(), given.w0_W.tolist())
+    bullet.resetBaseVelocity(body, (getattr(given, "v_WB0", 0) + np.cross(given.w0_W, arm)).tolist(), given.w0_W.tolist())
     return body
 
 
