@@ -13,6 +13,7 @@ import click
 from ..terminal.interrupts import notes, received
 from .engines import engines
 from .gate import gate
+from .importers import importers
 from .judge import judge
 from .list import list_all
 from .new import new
@@ -104,5 +105,5 @@ def main(context: click.Context) -> None:
         click.echo(FIRST)
 
 
-for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge):
+for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge, importers):
     main.add_command(command)

@@ -1,0 +1,286 @@
+"""The body that an engine has after loading a file, from its accelerations, and the mistake that explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+
+from conservative.attitude import Array, hat
+from conservative.check import choice
+
+from ..engine import version
+from ..environments.environment import find_environment, list_environments
+from ..worker.calls import python_worker
+from ..worker.client import EngineCrashed, EngineTimeout, time_limit
+from . import loaders
+from .description import Link, Part, join_links, kind_of, make_pose, read_links
+from .loaders import LOADERS
+
+LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
+"""Engines that run in this interpreter if no version is named: package and name."""
+SINGLE = ("mjwarp", "newton", "sapien", "genesis")
+"""Engines in single precision."""
+LIMIT, MEMORY = 300.0, 2**33
+"""Time in seconds and memory in bytes that a loader may take."""
+CASES = 24
+RATE = 3.0
+"""Number of cases, half of them without force and torque, and their typical rate, rad/s."""
+CATALOGUE = Path(__file__).parent / "models"
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """The answer of an engine for a file.
+
+    Attributes
+    ----------
+    engine, file
+        Label such as "mujoco 3.13.0", and name of the file.
+    outcome
+        "right", "wrong", "refused", "crashed", or "" if the engine has no loader for this format.
+    words
+        What is wrong, or the words of the engine.
+    seen
+        The body that explains its accelerations best.
+    error
+        Largest difference of its accelerations from those of the file's body, relative to the largest one.
+    """
+
+    engine: str
+    file: str
+    outcome: str
+    words: str = ""
+    seen: Part | None = None
+    error: float = 0.0
+
+
+def _each(change: Callable[[Link], Link]) -> Callable[[list[Link]], list[Link]]:
+    return lambda links: [change(link) for link in links]
+
+
+def _children(change: Callable[[Link], Link]) -> Callable[[list[Link]], list[Link]]:
+    return lambda links: [links[0], *(change(link) for link in links[1:])]
+
+
+def _turned(link: Link, R: Array, inertia: Array) -> Link:
+    return replace(link, frame=make_pose(link.frame[:3, 3], R), inertia=inertia)
+
+
+def _axes(link: Link, order: tuple[int, ...], transposed: bool = False) -> Link:
+    """Return the link with its ascending principal moments in another order about the same axes, or about transposed ones."""
+    moments, axes = np.linalg.eigh(link.inertia)
+    axes = axes.T if transposed else axes
+    return replace(link, inertia=(axes * moments[list(order)]) @ axes.T)
+
+
+def _shift(link: Link, sign: float) -> Link:
+    c = link.frame[:3, :3].T @ link.frame[:3, 3]
+    return replace(link, inertia=link.inertia + sign * link.mass * (c @ c * np.eye(3) - np.outer(c, c)))
+
+
+def _from_geometry(link: Link, density: float | None, com: bool) -> Link:
+    if not link.geometry.mass:
+        return link
+    part = link.geometry.scale(link.mass / link.geometry.mass if density is None else density / 1000)
+    filled = link.filled(part)
+    return filled if com else replace(filled, frame=make_pose(link.frame[:3, 3]))
+
+
+MISTAKES: dict[str, Callable[[list[Link]], list[Link]]] = {
+    "the rotation of the inertial frame is ignored": _each(lambda k: _turned(k, np.eye(3), k.inertia)),
+    "R I instead of R I R'": _each(lambda k: _turned(k, np.eye(3), k.frame[:3, :3] @ k.inertia)),
+    "the rotation of the inertial frame is inverted": _each(lambda k: _turned(k, k.frame[:3, :3].T, k.inertia)),
+    "the products of inertia are dropped": _each(lambda k: replace(k, inertia=np.diag(np.diag(k.inertia)))),
+    "the products of inertia have the other sign": _each(
+        lambda k: replace(k, inertia=2 * np.diag(np.diag(k.inertia)) - k.inertia)
+    ),
+    "the principal axes are transposed": _each(lambda k: _axes(k, (0, 1, 2), True)),
+    **{
+        f"the principal moments are about the wrong axes ({order})": _each(lambda k, order=order: _axes(k, order))  # type: ignore[misc]
+        for order in ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
+    },
+    "the inertia is that of the geometry": _each(lambda k: _from_geometry(k, None, False)),
+    "inertia and centre of mass are those of the geometry": _each(lambda k: _from_geometry(k, None, True)),
+    "mass, centre of mass and inertia are those of the geometry at 1000 kg/m^3": _each(lambda k: _from_geometry(k, 1000, True)),
+    "the inertia is taken about the origin of the link": _each(lambda k: _shift(k, -1)),
+    "the inertia is moved away from the centre of mass": _each(lambda k: _shift(k, 1)),
+    "the centre of mass is at the origin of the link": _each(lambda k: replace(k, frame=make_pose(R=k.frame[:3, :3]))),
+    "the mass of fixed children is lost": _children(lambda k: replace(k, mass=0.0, inertia=np.zeros((3, 3)))),
+    "the inertia of fixed children is lost": _children(lambda k: replace(k, inertia=np.zeros((3, 3)))),
+    "the rotation of fixed children is ignored": _children(lambda k: replace(k, pose=make_pose(k.pose[:3, 3]))),
+    "the place of fixed children is ignored": _children(lambda k: replace(k, pose=make_pose(R=k.pose[:3, :3]))),
+    "the inertia is the unit matrix": _each(lambda k: replace(k, inertia=np.eye(3))),
+    "mass and inertia are 1": _each(lambda k: replace(k, mass=1.0, inertia=np.eye(3))),
+    "the three moments are made equal": _each(lambda k: replace(k, inertia=np.trace(k.inertia) / 3 * np.eye(3))),
+}
+"""Known mistakes of loaders, as functions from the links of a file to the links that a loader makes of them."""
+
+
+def accelerations(part: Part, cases: Array) -> Array:
+    """Return angular accelerations and accelerations of the origin (n, 6) of a body, for cases (n, 12) as in `loaders`.
+
+    Newton and Euler about the centre of mass c: m a_c = F, J w' = T - c x F - w x J w, a = a_c - w' x c - w x (w x c).
+    """
+    w, _, force, torque = np.moveaxis(np.reshape(cases, (-1, 4, 3)), 1, 0)
+    moment = torque - np.cross(part.com, force) - np.cross(w, w @ part.inertia.T)
+    turn = np.linalg.solve(part.inertia, moment.T).T
+    return np.hstack([turn, force / part.mass - np.cross(turn, part.com) - np.cross(w, np.cross(w, part.com))])
+
+
+def make_cases(part: Part) -> Array:
+    """Return generic rates, velocities, forces and torques (n, 12) for a body, so that all terms are of one order."""
+    rng, size = np.random.default_rng(2026), np.sqrt(np.trace(part.inertia) / part.mass)
+    w, force, torque = (
+        rng.normal(size=(3, CASES, 3))
+        * RATE
+        * np.array((1, part.mass * size * RATE, part.mass * size**2 * RATE))[:, None, None]
+    )
+    force[::2] = torque[::2] = 0
+    return np.hstack([w, -np.cross(w, part.com), force, torque + np.cross(part.com, force)])
+
+
+def identify(cases: Array, measured: Array, near: Part) -> Part:
+    """Return the body that explains accelerations (n, 6) best, by least squares about the centre of mass of a body `near` it.
+
+    With a the acceleration of the point P, d = c - P, and L = m d: F = m a + w' x L + w x (w x L), and
+    T = L x a + J_P w' + w x J_P w. All nine entries of J_P are free, because a wrong loader may make it unsymmetric.
+    """
+    rows, right = [], []
+    size = np.sqrt(abs(np.trace(near.inertia) / near.mass))
+    units = near.mass, near.mass * size, near.mass * size**2
+    for (w, _, force, torque), given in zip(np.reshape(cases, (-1, 4, 3)), measured, strict=True):
+        turn, P = given[:3], near.com
+        a = given[3:] + np.cross(turn, P) + np.cross(w, np.cross(w, P))
+        W = hat(w)
+        A = np.zeros((6, 13))
+        A[:3, 0], A[:3, 1:4] = a * units[0] / units[1], hat(turn) + W @ W
+        A[3:, 1:4] = -hat(a) * units[1] / units[2]
+        A[3:, 4:] = np.kron(np.eye(3), turn) + W @ np.kron(np.eye(3), w)
+        rows.append(A)
+        right.append(np.concatenate([force / units[1], (torque - np.cross(P, force)) / units[2]]))
+    x = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0]
+    mass, d = x[0] * units[0], x[1:4] / x[0] * size
+    inertia = x[4:].reshape(3, 3) * units[2] - mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Part(float(mass), near.com + d, inertia)
+
+
+def distance(part: Part, other: Part) -> float:
+    """Return the largest relative difference of mass, centre of mass and inertia from those of `part`."""
+    size = np.sqrt(abs(np.trace(part.inertia) / part.mass))
+    return float(
+        np.nan_to_num(
+            max(
+                abs(other.mass / part.mass - 1),
+                np.linalg.norm(other.com - part.com) / size,
+                np.linalg.norm(other.inertia - part.inertia) / np.linalg.norm(part.inertia),
+            ),
+            nan=np.inf,
+        )
+    )
+
+
+def _list(values: Array) -> str:
+    return ", ".join(f"{value:.3g}" for value in values.ravel())
+
+
+def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
+    """Return the mistake, or the pair of mistakes, that turns the links of a file into the body that an engine has."""
+    wanted = join_links(links)
+    for names in [*combinations(MISTAKES, 1), *combinations(MISTAKES, 2)]:
+        changed = links
+        for name in names:
+            changed = MISTAKES[name](changed)
+        part = join_links(changed)
+        if part.mass and np.linalg.det(part.inertia) and distance(part, seen) < tolerance:
+            return ", and ".join(names)
+    for factor, name in ((np.pi / 180, "degrees are read as radians"), (180 / np.pi, "radians are read as degrees")):
+        if kind_of(path) != "usd" and distance(join_links(read_links(path, 1 / factor)), seen) < tolerance:
+            return name
+    ratio = np.trace(seen.inertia) / np.trace(wanted.inertia)
+    if distance(replace(wanted, mass=seen.mass, inertia=ratio * wanted.inertia), seen) < tolerance:
+        return f"mass times {seen.mass / wanted.mass:.6g}, inertia times {ratio:.6g}"
+    moments, axes = np.linalg.eigh(wanted.inertia)
+    raised = np.maximum(moments, np.diag(axes.T @ seen.inertia @ axes))
+    if distance(replace(wanted, inertia=(axes * raised) @ axes.T), seen) < tolerance:
+        return f"small principal moments are raised: {_list(raised)} instead of {_list(moments)} kg m^2"
+    differences = []
+    for name, part in (
+        ("mass", lambda b: np.array([b.mass])),
+        ("centre of mass", lambda b: b.com),
+        ("inertia", lambda b: b.inertia),
+    ):
+        right, found = part(wanted), part(seen)
+        if np.abs(found - right).max() > tolerance * np.abs(right).max():
+            differences.append(f"{name} {_list(found)} instead of {_list(right)}")
+    return f"no known mistake explains {'; '.join(differences)}"
+
+
+def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[[float, str], None]) -> list[Finding]:
+    """Return the answers of engines, by default of those that are installed, for files, by default for the catalogue.
+
+    Raise `BadInput` for a file that is not one rigid body, before any engine starts, and `MissingEngine`.
+    """
+    paths = list(files) or sorted(path for path in CATALOGUE.iterdir() if path.suffix != ".obj")
+    models = [(path, read_links(path)) for path in paths]
+    installed = {each.engine for each in list_environments()} | {name for name in LOCAL if find_spec(name)}
+    findings: list[Finding] = []
+    with ExitStack() as stack:
+        programs = [Program(name) for name in engines or [name for name in LOADERS if name in installed]]
+        for program in programs:
+            stack.callback(program.worker.close)
+        for program, (path, links) in product(programs, models):
+            tell(len(findings) / len(programs) / len(models), f"{program.label}: {path.name}")
+            findings.append(program.check(path, links))
+    return findings
+
+
+class Program:
+    """The process in which an engine loads files; a name such as "mujoco" or "newton==1.0.0". Raise `MissingEngine`."""
+
+    def __init__(self, name: str) -> None:
+        self.engine, _, wanted = name.partition("==")
+        choice("engines", self.engine, tuple(LOADERS))
+        if self.engine in LOCAL and not wanted:
+            self.label = f"{self.engine} {version(*LOCAL[self.engine])}"
+            self.worker, self._adapter = python_worker(memory=MEMORY), f"{__package__}.loaders"
+        else:
+            environment = find_environment(self.engine, wanted)
+            self.label = f"{self.engine} {environment.version}"
+            self.worker = environment.start_worker({"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": "1"}, MEMORY)
+            self._adapter = str(Path(loaders.__file__).resolve())
+
+    def check(self, path: Path, links: list[Link]) -> Finding:
+        """Return the answer of the engine for a file, whose links are given."""
+        wanted = join_links(links)
+        cases, flaw, answer = make_cases(wanted), wanted.flaw, partial(Finding, self.label, path.name)
+        try:
+            with time_limit(LIMIT):
+                given = {"engine": self.engine, "path": str(path.resolve()), "kind": kind_of(path), "cases": cases}
+                result = self.worker.ask("call", adapter=self._adapter, function="probe", **given)
+        except NotImplementedError:
+            return answer("")
+        except (EngineCrashed, EngineTimeout) as failure:
+            return answer("crashed", str(failure.outcome))
+        if words := result.get("refused", ""):
+            return answer("right" if flaw else "refused", words)
+        measured = result["accelerations"]
+        if not np.isfinite(measured).all():
+            return answer("wrong", "accelerations that are not finite")
+        seen = identify(cases, measured, wanted)
+        expected = accelerations(wanted, cases)
+        error = float(np.abs(measured - expected).max() / np.abs(expected).max())
+        tolerance = 1e-2 if self.engine in SINGLE else 1e-4
+        if distance(wanted, seen) < tolerance and not flaw:
+            return answer("right", "", seen, error)
+        said = f"; it prints: {result['output'][:200]}" if result["output"] else ""
+        if flaw and said and seen.flaw == "":
+            return answer("right", f"it repairs the inertia{said}", seen, error)
+        what = f"{flaw}, and it does not say so" if flaw else explain(path, links, seen, tolerance)
+        return answer("wrong", what + said, seen, error)

@@ -1,0 +1,44 @@
+"""`conservative importers`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from conservative.errors import require_extra
+
+from .options import FilePath, Output, OutputCommand, epilog, json_option, names_option, output_files, show, split_names
+
+
+@click.command(
+    cls=OutputCommand,
+    short_help="Compare the body that an engine loads with its file.",
+    epilog=epilog(
+        "conservative importers my_body.urdf",
+        "conservative importers my_body.sdf --engines drake,pybullet --junit importers.xml",
+        "conservative importers --engines newton==1.0.0,newton==1.1.0",
+    ),
+)
+@click.argument("files", nargs=-1, type=FilePath())
+@names_option("engines", "Engines: NAME or NAME==VERSION.  [default: those that are installed]", "E,F")
+@json_option
+@click.option("--junit", type=Output('name="conservative importers"'), help="Write a JUnit report.")
+@click.option("--markdown", type=Output("# Importers: "), help="Write the tables as Markdown.")
+def importers(files: tuple[Path, ...], engines: tuple[str, ...], as_json: bool, **outputs: Path | None) -> None:
+    """Load each of FILES (URDF, SDF, MJCF or USD) in each engine, and compare its motion with that of the body in the file.
+
+    Without FILES: small models of this package, each with one trap. The engine's own loader reads the file. If its motion is
+    wrong, the mistake that explains it is named. The exit code is 1 if an engine is wrong, or refuses a valid file.
+    """
+    require_extra("conservative importers", "report")
+    from conservative.references.importers.compare import compare_files
+
+    from ..sections.importers import build
+    from ..terminal.progress import progress
+
+    with output_files(None, (), **outputs) as write:
+        with progress() as step:
+            document = build(compare_files(files, split_names("engines", engines), step))
+        write(document)
+    show(document, as_json, silent=True)

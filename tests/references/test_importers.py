@@ -1,0 +1,264 @@
+"""The bodies of model files, the bodies that engines make of them, and the mistakes between the two."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+from conservative.errors import BadInput
+from conservative.references.importers import compare, loaders
+from conservative.references.importers.compare import (
+    CATALOGUE,
+    MISTAKES,
+    accelerations,
+    distance,
+    explain,
+    identify,
+    make_cases,
+)
+from conservative.references.importers.description import Part, join_links, read_links, weigh
+from conservative.reports.cli.main import main
+
+GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
+TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix != ".obj")
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["importers", *map(str, arguments)])
+
+
+def write_urdf(rng, path):
+    """Write a chain of two to four random links on fixed joints."""
+    links = []
+    for number in range(rng.integers(2, 5)):
+        moments = rng.uniform(0.1, 1, 3)
+        R = Rotation.random(random_state=rng).as_matrix()
+        J = R @ (np.diag([moments.sum()] * 3) - np.diag(moments)) @ R.T
+        inertia = " ".join(f'i{a}{b}="{J["xyz".index(a), "xyz".index(b)]!r}"' for a, b in ("xx", "xy", "xz", "yy", "yz", "zz"))
+        origins = ['<origin xyz="{} {} {}" rpy="{} {} {}"/>'.format(*rng.uniform(-3, 3, 6).tolist()) for _ in range(2)]
+        links.append(
+            f'<link name="l{number}"><inertial>{origins[0]}<mass value="{rng.uniform(0.1, 5)!r}"/><inertia {inertia}/>'
+        )
+        links.append("</inertial></link>")
+        if number:
+            ends = f'<parent link="l{rng.integers(number)}"/><child link="l{number}"/>'
+            links.append(f'<joint name="j{number}" type="fixed">{ends}{origins[1]}</joint>')
+    path.write_text(f'<robot name="r">{"".join(links)}</robot>'.replace("np.float64(", "").replace(')"', '"'))
+    return path
+
+
+# ------------------------------------------------------------------------------------------------------- the body of a file
+
+
+def test_the_body_of_a_urdf_file_is_that_of_pinocchio_and_yourdfpy(tmp_path):
+    pin = pytest.importorskip("pinocchio")
+    yourdfpy = pytest.importorskip("yourdfpy")
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        path = write_urdf(rng, tmp_path / "body.urdf")
+        links = read_links(path)
+        inertia = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()).inertias[1]
+        assert distance(join_links(links), Part(inertia.mass, inertia.lever, inertia.inertia)) < 1e-12  # measured: 6e-15
+        robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False).robot
+        for link, other in zip(links, robot.links, strict=True):
+            assert np.abs(link.frame - other.inertial.origin).max() < 1e-12
+            assert np.abs(link.inertia - other.inertial.inertia).max() < 1e-12
+
+
+def test_all_formats_of_a_trap_have_the_same_body():
+    """MJCF is read by MuJoCo and USD by usd-core, so this compares the readers. USD has single precision: 6e-8."""
+    own = {"degrees", "nested_frames"}  # other bodies in other formats
+    for name in {path.stem for path in TRAPS} - own:
+        first, *others = [join_links(read_links(path)) for path in TRAPS if path.stem == name]
+        for other in others:
+            assert distance(first, other) < 1e-6, name
+
+
+def test_shapes_have_the_inertia_of_their_points():
+    rng = np.random.default_rng(3)
+    pose = np.eye(4)
+    pose[:3] = rng.normal(size=(3, 4))  # turns, shears and scales
+    points = rng.uniform(-1, 1, size=(400_000, 3))
+    a, h = 0.4, 0.9
+    r, z = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
+    inside = {
+        ("box", (0.5, 0.7, 1.1)): (2 * np.abs(points) < (0.5, 0.7, 1.1)).all(axis=1),
+        ("sphere", 0.8): (points**2).sum(axis=1) < 0.64,
+        ("ellipsoid", (0.5, 0.7, 0.9)): ((points / (0.5, 0.7, 0.9)) ** 2).sum(axis=1) < 1,
+        ("cylinder", (a, h)): (r < a) & (z < h / 2),
+        ("capsule", (a, h)): np.hypot(r, np.maximum(z - h / 2, 0)) < a,
+    }
+    for (kind, sizes), chosen in inside.items():
+        (part,) = weigh(kind, sizes, pose, 700.0)
+        x = points[chosen] @ pose[:3, :3].T + pose[:3, 3]
+        mass = 700 * 8 * chosen.mean() * abs(np.linalg.det(pose[:3, :3]))
+        d = x - x.mean(axis=0)
+        sampled = mass * ((d**2).sum(axis=1).mean() * np.eye(3) - d.T @ d / len(d))
+        assert distance(part, Part(mass, x.mean(axis=0), sampled)) < 0.02, kind  # measured: 2e-3 to 9e-3
+
+
+# ------------------------------------------------------------------------------------- the body that an engine's motion shows
+
+
+def test_accelerations_obey_momentum_and_give_the_body_back():
+    rng = np.random.default_rng(5)
+    for scale in 10.0 ** rng.uniform(-15, 3, 50):
+        R = Rotation.random(random_state=rng).as_matrix()
+        part = Part(rng.uniform(0.5, 2) * scale**0.6, rng.normal(size=3) * scale**0.2, scale * (R * (1.1, 2.0, 2.7)) @ R.T)
+        cases = make_cases(part)
+        found = accelerations(part, cases)
+        w, _, _, torque = np.reshape(cases, (-1, 4, 3)).transpose(1, 0, 2)
+        J = part.inertia + part.mass * (part.com @ part.com * np.eye(3) - np.outer(part.com, part.com))
+        about_origin = found[:, :3] @ J + np.cross(w, w @ J) + part.mass * np.cross(part.com, found[:, 3:])
+        assert np.abs(about_origin - torque).max() < 1e-11 * np.abs(torque).max()  # measured: 5e-14
+        near = replace(part, mass=1.3 * part.mass, com=1.1 * part.com, inertia=part.inertia + 0.3 * scale * np.eye(3))
+        assert distance(part, identify(cases, found, near)) < 1e-9  # measured: 2e-12
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_loader_with_a_mistake_is_named(name):
+    path = CATALOGUE / ("shape_that_disagrees.urdf" if "geometry" in name else GENERIC.name)
+    links = read_links(path)
+    links = [
+        replace(link, inertia=compare.join_links(read_links(CATALOGUE / "products_of_inertia.urdf")).inertia) for link in links
+    ]
+    wanted, made = join_links(links), join_links(MISTAKES[name](links))
+    cases = make_cases(wanted)
+    seen = identify(cases, accelerations(made, cases), wanted)
+    assert distance(wanted, seen) > 1e-3
+    assert explain(path, links, seen, 1e-6) == name
+
+
+def test_other_wrong_bodies_are_described(tmp_path):
+    links = read_links(GENERIC)
+    wanted = join_links(links)
+    for seen, words in (
+        (join_links(read_links(GENERIC, np.pi / 180)), "radians are read as degrees"),
+        (replace(wanted, mass=1000 * wanted.mass, inertia=1000 * wanted.inertia), "mass times 1000, inertia times 1000"),
+        (
+            replace(wanted, inertia=0.3 * np.eye(3)),
+            "small principal moments are raised: 0.3, 0.3, 0.3 instead of 0.0932, 0.167, 0.194",
+        ),
+        (replace(wanted, com=wanted.com + 0.01), "no known mistake explains centre of mass"),
+    ):
+        assert words in explain(GENERIC, links, seen, 1e-6)
+
+
+# ------------------------------------------------------------------------------------------------------------- the command
+
+
+def test_local_engines_read_the_catalogue(tmp_path):
+    pytest.importorskip("pinocchio")
+    done = run("--engines", "mujoco,pinocchio", "--json", "--junit", tmp_path / "out.xml")
+    assert done.exit_code == 1, done.output
+    answers = {(each["engine"].split()[0], each["file"]): each["outcome"] for each in json.loads(done.stdout)["findings"]}
+    for trap in ("turned_inertial_frame", "products_of_inertia", "turned_fixed_child", "shape_that_disagrees", "moments_1e-12"):
+        assert answers["mujoco", f"{trap}.urdf"] == answers["pinocchio", f"{trap}.urdf"] == "right"
+    assert answers["mujoco", "triangle_inequality.urdf"] == "right"  # it refuses the file
+    assert answers["pinocchio", "triangle_inequality.urdf"] == "wrong"
+    assert answers["mujoco", "density.sdf"] == ""
+    suite = ElementTree.parse(tmp_path / "out.xml").find("testsuite")
+    assert int(suite.get("failures")) == sum(outcome not in ("right", "") for outcome in answers.values())
+
+
+def test_a_file_that_is_read_right_passes():
+    done = run(GENERIC, "--engines", "mujoco")
+    assert done.exit_code == 0, done.output
+    assert "right" in done.stdout
+
+
+def test_a_loader_that_crashes_or_hangs_is_that_engines_answer(monkeypatch, tmp_path):
+    monkeypatch.setattr(compare, "LIMIT", 3.0)
+    bad = tmp_path / "bad.py"
+    bad.write_text("import os, time\ndef probe(engine, path, **_):\n    os.abort() if 'turned' in path else time.sleep(60)\n")
+    monkeypatch.setattr(loaders, "__file__", str(bad))
+    program = compare.Program("mujoco")
+    program._adapter = str(bad)
+    for path, words in ((CATALOGUE / "turned_inertial_frame.urdf", "SIGABRT"), (GENERIC, "timeout")):
+        finding = program.check(path, read_links(path))
+        assert finding.outcome == "crashed"
+        assert words in finding.words
+    program.worker.close()
+
+
+LINK = '<link name="a"><inertial><origin xyz="0 0 0"/><mass value="1"/><inertia {}/></inertial>{}</link>'
+MOMENTS = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"'
+JOINT = '<link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/></joint>'
+MESH = '<collision><geometry><mesh filename="none.stl"/></geometry></collision>'
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text", "words"),
+    [
+        ("urdf", '<robot name="r"><link name="a"/></robot>', "no mass"),
+        ("urdf", f'<robot name="r">{LINK.format("", "")}{JOINT}</robot>', "'j', which moves (revolute)"),
+        ("urdf", f'<robot name="r">{LINK.format(MOMENTS, MESH)}</robot>', "none.stl"),
+        ("urdf", f'<robot name="r">{LINK.format(MOMENTS.replace("1", "one"), "")}</robot>', "one"),
+        ("urdf", f'<robot name="r">{LINK.format(MOMENTS, "")}<link name="b"/></robot>', "2 root links"),
+        ("urdf", "<robot", "XML"),
+        ("xml", "<svg/>", "'svg'"),
+        ("sdf", '<sdf><model name="m"><link name="a"/></model></sdf>', "'a' without inertia"),
+        ("usda", '#usda 1.0\n\ndef Xform "W" {}\n', "metersPerUnit"),
+        ("usda", "#usda 1.0\n(", "usd-core"),
+        ("xml", '<mujoco><worldbody><body><joint name="k"/><geom size="1"/></body></worldbody></mujoco>', "'k', which moves"),
+    ],
+)
+def test_a_file_that_is_not_one_rigid_body_is_refused_in_a_sentence(tmp_path, suffix, text, words):
+    path = tmp_path / f"bad.{suffix}"
+    path.write_text(text)
+    with pytest.raises(BadInput, match="file: got") as caught:
+        read_links(path)
+    assert words in str(caught.value)
+    done = run(path, "--engines", "mujoco")
+    assert done.exit_code == 2
+    assert "\n" not in done.stderr.strip()
+
+
+def test_unknown_files_and_engines_are_named():
+    assert "none.urdf" in run("none.urdf").stderr
+    assert "expected one of" in run(GENERIC, "--engines", "nothing").stderr
+    assert "conservative engines install" in run(GENERIC, "--engines", "mujoco==0.1").stderr
+
+
+# ------------------------------------------------------------------------------------------------------- known bugs of engines
+
+
+def outcomes(name):
+    """The answers of an engine for the URDF files of the catalogue, by trap."""
+    program = compare.Program(name)
+    try:
+        return {path.stem: program.check(path, read_links(path)) for path in TRAPS if path.suffix == ".urdf"}
+    finally:
+        program.worker.close()
+
+
+def wrong(answers, words):
+    return {name for name, each in answers.items() if each.outcome == "wrong" and words in each.words}
+
+
+@pytest.mark.engine("mujoco==3.13.0")
+def test_mujoco_lost_the_rotation_of_inertial_frames_until_3_14():
+    """Issue 3559 of MuJoCo, fixed by its pull request 3560."""
+    before, after = outcomes("mujoco==3.13.0"), outcomes("mujoco==3.14.0")
+    lost = wrong(before, "the rotation of the inertial frame is ignored")
+    assert {"turned_inertial_frame", "large_angles", "gimbal_lock", "turned_frame_with_products"} <= lost
+    assert not wrong(after, "")
+
+
+@pytest.mark.engine("newton==1.0.0")
+def test_newton_turned_inertia_on_one_side_until_1_1():
+    """Pull request 2245 of Newton."""
+    before, after = outcomes("newton==1.0.0"), outcomes("newton==1.1.0")
+    lost = wrong(before, "R I instead of R I R'")
+    assert {"turned_inertial_frame", "large_angles", "gimbal_lock", "turned_frame_with_products"} <= lost
+    assert not lost & wrong(after, "")
+
+
+def test_the_catalogue_has_more_than_twenty_traps():
+    assert len({path.stem for path in TRAPS}) >= 25
+    assert all(Path(path).stat().st_size < 5000 for path in TRAPS)
