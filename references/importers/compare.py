@@ -211,12 +211,12 @@ def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
     if distance(replace(wanted, inertia=(axes * raised) @ axes.T), seen) < tolerance:
         return f"small principal moments are raised: {_list(raised)} instead of {_list(moments)} kg m^2"
     differences = []
-    for name, part in (
+    for name, value in (
         ("mass", lambda b: np.array([b.mass])),
         ("centre of mass", lambda b: b.com),
         ("inertia", lambda b: b.inertia),
     ):
-        right, found = part(wanted), part(seen)
+        right, found = value(wanted), value(seen)
         if np.abs(found - right).max() > tolerance * np.abs(right).max():
             differences.append(f"{name} {_list(found)} instead of {_list(right)}")
     return f"no known mistake explains {'; '.join(differences)}"
