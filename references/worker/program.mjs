@@ -10,13 +10,22 @@
  * `given` has the numbers of a run, the settings, and those of P, axes that are principal at the centre of mass: their
  * initial attitude `q_P`, and the fixed point `point_P` in them.
  */
-import { writeSync } from 'fs';
-import { createInterface } from 'readline';
+import { readSync, writeSync } from 'fs';
 import { pathToFileURL } from 'url';
 import { Worker } from 'worker_threads';
 
 const WARM_UP = 20; // ms in unmeasured calls before a run is measured
 const { find } = await import(pathToFileURL(`${process.argv[2]}/find.mjs`));
+
+function receive() { // 60 us faster than by events
+  let line = '';
+  for (const part = Buffer.alloc(1 << 16); !line.endsWith('\n');) {
+    const count = readSync(0, part);
+    if (count === 0) process.kill(process.pid, 'SIGKILL'); // the client is gone
+    line += part.latin1Slice(0, count);
+  }
+  return JSON.parse(line);
+}
 
 const product = ([a, b, c, d], [s, x, y, z]) => [
   a * s - b * x - c * y - d * z, a * x + b * s + c * z - d * y, a * y - b * z + c * s + d * x, a * z + b * y - c * x + d * s,
@@ -80,8 +89,8 @@ const operations = {
 };
 
 Object.defineProperty(process, 'stdout', { value: process.stderr }); // engines print
-for await (const line of createInterface({ input: process.stdin })) {
-  const { do: name, forget = [], ...values } = JSON.parse(line);
+for (;;) {
+  const { do: name, forget = [], ...values } = receive();
   let answer;
   try {
     for (const run of forget) if (runs.has(run)) free(runs.get(run)), runs.delete(run);
@@ -91,4 +100,3 @@ for await (const line of createInterface({ input: process.stdin })) {
   }
   writeSync(1, `${JSON.stringify(answer ?? {})}\n`);
 }
-process.kill(process.pid, 'SIGKILL'); // the client is gone

@@ -76,6 +76,12 @@ def test_errors_and_unsupported_scenes_are_reported(command, start):
     assert run_of(worker, 0.01)().ok
 
 
+def test_a_measured_time_is_that_of_the_program_alone(start):
+    """The exchange of messages takes time as well."""
+    code = (PROGRAMS / "engine.py").read_text().replace("time.perf_counter() - start", "0.0")
+    assert run_of(start(sys.executable, "-I", "-c", code), 0.01).own_loop.wall_time(3) == 0
+
+
 def test_numbers_that_are_not_finite_travel(start):
     trajectory = run_of(start(*COMMANDS[0].values[0]), 0.01, lose_samples=True)()
     assert trajectory.outcome.kind is OutcomeKind.DIVERGED
