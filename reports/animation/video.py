@@ -19,12 +19,10 @@ from .frames import Clock, Panel
 FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")
 """Colours of the faces +x, -x, +y, -y, +z and -z, as in the page."""
 ARROW, TRACE, OUTLINE, INK = "#009e73", "#cc3399", "#808890", "#202428"
-RATES = {".gif": 100 / 6, ".mp4": 30.0}
+RATES = {".gif": 12.5, ".mp4": 30.0}
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, DPI = 2.24, 100
+SIDE, DPI = 1.92, 100
 """Side of a panel, inches, and pixels per inch: multiples of 16 pixels, which encoders ask for."""
-COLOURS = 48
-"""Colours in the palette of a GIF."""
 EYE = np.array([math.cos(0.35) * math.cos(0.6), math.cos(0.35) * math.sin(0.6), math.sin(0.35)])
 """Direction from the body to the eye, world axes, as in the page."""
 _CORNERS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)]) / 2
@@ -46,12 +44,22 @@ def draw(
     if kind == ".gif":
         from PIL import Image
 
-        pictures = [Image.fromarray(image) for image in images]
-        strip = Image.fromarray(np.concatenate([np.asarray(each) for each in pictures[:: max(1, len(pictures) // 8)]]))
-        palette = strip.quantize(COLOURS)  # of moments over the whole motion, which show every face
-        first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures)
+        inks = np.array([_rgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
+        shades = np.concatenate([[np.full(3, 255)], inks, (inks + 255) / 2, (inks + _rgb(INK)) / 2])  # blended at their edges
+        palette = Image.new("P", (1, 1))
+        palette.putpalette(shades.astype(np.uint8).ravel().tolist())
+        first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
         out = io.BytesIO()
-        first.save(out, "GIF", save_all=True, append_images=rest, duration=round(1000 / RATES[kind]), loop=0, comment=mark)
+        first.save(
+            out,
+            "GIF",
+            save_all=True,
+            append_images=rest,
+            duration=round(1000 / RATES[kind]),
+            loop=0,
+            comment=mark,
+            optimize=True,
+        )
         return out.getvalue()
     import imageio_ffmpeg
 
@@ -105,12 +113,12 @@ def _draw_panel(axes: Any, panel: Panel, frame: int, outline: Array | None) -> N
     R = panel.R_WP[frame]
     corners = (_CORNERS * panel.size) @ R.T
     normals = np.repeat(R.T, 2, axis=0) * np.tile([1.0, -1.0], 3)[:, None]
-    light = 0.85 + 0.25 * normals @ np.array([0.49, 0.32, 0.81])
     faces = [corners[side] for side in _SIDES]
     seen = [k for k in range(6) if normals[k] @ EYE > 0]  # of a convex body, no face that is seen hides another one
-    shades = [np.array([int(FACES[k][i : i + 2], 16) / 255 for i in (1, 3, 5)]) * min(light[k], 1) for k in seen]
     axes.add_collection3d(
-        Poly3DCollection([faces[k] for k in seen], facecolors=shades, edgecolors=INK, linewidths=0.6, zorder=2)
+        Poly3DCollection(
+            [faces[k] for k in seen], facecolors=[FACES[k] for k in seen], edgecolors=INK, linewidths=0.6, zorder=2
+        )
     )
     # What lies nearer to the eye than the fixed point is drawn after the box, the rest before it.
     trace = panel.R_WP[: frame + 1] @ panel.tip
@@ -126,8 +134,8 @@ def _draw_panel(axes: Any, panel: Panel, frame: int, outline: Array | None) -> N
         corners = (_CORNERS * panel.size) @ outline.T
         edges = [corners[side] for side in _SIDES]
         axes.add_collection3d(Poly3DCollection(edges, facecolors="none", edgecolors=OUTLINE, linewidths=0.7, zorder=4))
-    values = [f"{name} {_text(series[frame])}" for name, series in panel.sizes.items()]
-    axes.text2D(0.5, 0.0, panel.label, transform=axes.transAxes, ha="center", va="top", size=9, weight="bold", color=INK)
+    values = [f"{name}{', rad:' * (name == 'attitude error')} {_text(series[frame])}" for name, series in panel.sizes.items()]
+    axes.text2D(0.5, 0.0, panel.label, transform=axes.transAxes, ha="center", va="top", size=8, weight="bold", color=INK)
     axes.text2D(0.5, -0.08, "\n".join(values), transform=axes.transAxes, ha="center", va="top", size=7, color=INK)
 
 
@@ -136,6 +144,10 @@ def _outside(end: Array, R_WP: Array, size: Array) -> Array:
     with np.errstate(divide="ignore"):
         leaves = float(np.min(size / 2 / np.abs(end @ R_WP)))
     return np.stack([min(leaves, 1.0) * end, end])[None]
+
+
+def _rgb(colour: str) -> Array:
+    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], dtype=float)
 
 
 def _text(value: float) -> str:

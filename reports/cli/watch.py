@@ -71,7 +71,7 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
         for number, (method, grid) in enumerate(zip(chosen, grids, strict=True)):
             step(0.5 * number / len(chosen), method.name)
             runs.append(run_on(body, method, grid))
-        drawn = Animation(runs, [f"{name}, {grid.dt:.3g} s" for name, grid in zip(names, grids, strict=True)], truth)
+        drawn = Animation(runs, [f"{name}, dt = {grid.dt:.3g} s" for name, grid in zip(names, grids, strict=True)], truth)
         stream.buffer.write(drawn.render(out.suffix, lambda share: step(0.5 + share / 2, "drawing")))
     data = [summarize(*each) for each in zip(runs, chosen, (grid.dt for grid in grids), strict=True)]
     failures = [f"{name} on {body.name}: {run.outcome}" for name, run in zip(names, runs, strict=True) if not run.ok]

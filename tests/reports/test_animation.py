@@ -5,18 +5,23 @@ import re
 from dataclasses import replace
 from html import escape
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image, ImageSequence
 
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.errors import BadInput, Diverged
 from conservative.references.exact.method import Exact
-from conservative.reports.animation import Animation, element, script
+from conservative.reports.animation import MARK, Animation, element, script, video
 from conservative.reports.animation.frames import THINNEST, make_panels
 from conservative.reports.cli.main import main
+from conservative.reports.cli.options import HEAD
+
+from ..pages import ROOT
 
 R0 = rotation_about((0.3, -1.2, 0.7), 0.83)
 BODY = cv.RigidBody([[3.1, 0.2, -0.1], [0.2, 2.7, 0.3], [-0.1, 0.3, 1.9]])
@@ -146,3 +151,62 @@ def test_watch_refuses_before_a_file_exists(words, tmp_path, monkeypatch):
     done = watch("brick_flip", *words)
     assert done.exit_code == 2, done.output
     assert list(tmp_path.iterdir()) == []
+
+
+def counts(image):
+    """Return the number of pixels of each colour of an image (height, width, 3), as #rrggbb."""
+    colours, numbers = np.unique(image.reshape(-1, 3), axis=0, return_counts=True)
+    return {f"#{r:02x}{g:02x}{b:02x}": int(n) for (r, g, b), n in zip(colours, numbers, strict=True)}
+
+
+def read_frames(file):
+    """Return the images of a GIF (n, height, width, 3), or of an MP4."""
+    if file.suffix == ".gif":
+        with Image.open(file) as images:
+            return np.stack([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(images)])
+    reader = imageio_ffmpeg.read_frames(str(file))
+    width, height = next(reader)["size"]
+    return np.stack([np.frombuffer(each, np.uint8).reshape(height, width, 3) for each in reader])
+
+
+def test_a_gif_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(motions, tmp_path, monkeypatch):
+    monkeypatch.setitem(video.RATES, ".gif", 2.0)
+    motions[0].animate(labels=["a", "b"], truth=motions[1]).save(tmp_path / "a.gif")
+    images = read_frames(tmp_path / "a.gif")
+    clock, panels = make_panels(motions[1:2], ["b"], None)
+    assert len(images) == 30  # 3 s at 0.2 simulated s per s
+    chosen = np.linspace(0, len(clock.times) - 1, len(images)).round().astype(int)
+    for image, R in zip(images, panels[0].R_WP[chosen], strict=True):
+        found = counts(image[:, image.shape[1] // 2 :])
+        towards = np.repeat(R.T @ video.EYE, 2) * np.tile([1, -1], 3)
+        areas = towards * np.repeat(panels[0].size.prod() / panels[0].size, 2)
+        for colour, area in zip(video.FACES, areas, strict=True):
+            if abs(area) > 0.15:  # an edge on its own has pixels of blended colours
+                assert (found.get(colour, 0) > 30) == (area > 0)
+        assert found[video.ARROW] > 30  # measured 51
+
+
+@pytest.mark.parametrize("kind", [".gif", ".mp4"])
+def test_watch_writes_a_video_and_replaces_its_own(kind, tmp_path, monkeypatch):
+    monkeypatch.setitem(video.RATES, kind, 1.0)
+    out = tmp_path / f"brick{kind}"
+    for _ in range(2):
+        done = watch("brick_flip", "-m", "reduced,exact", "--t-end", "1", "--out", out)
+        assert done.exit_code == 0, done.output
+    images = read_frames(out)
+    assert len(images) == 10
+    assert images.shape[1] % 16 == images.shape[2] % 16 == 0
+    assert np.abs(images[0].astype(float) - images[-1]).mean() > 1  # measured 10: it moves
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():
+    file = ROOT / "reports" / "pictures" / "brick_flip.gif"
+    assert MARK.encode() in file.read_bytes()[:HEAD]
+    assert file.stat().st_size < 1e6  # 971 kB
+    images = read_frames(file)
+    last = [counts(part) for part in np.split(images[-1], 4, axis=1)]
+    shown = [[each.get(colour, 0) for colour in video.FACES] for each in last]
+    assert np.abs(np.subtract(shown[2], shown[3])).sum() < 0.3 * sum(shown[3])  # the paper's map, below the outline
+    for engine in shown[:2]:  # measured 0.65 and 0.9
+        assert np.abs(np.subtract(engine, shown[3])).sum() > 0.5 * sum(shown[3])

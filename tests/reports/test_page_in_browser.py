@@ -57,7 +57,7 @@ def open_drawn(file, profile):
         browser.quit()
 
 
-def start(profile):
+def start(profile, *arguments):
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -67,7 +67,7 @@ def start(profile):
     options = webdriver.ChromeOptions()
     options.binary_location = browser
     root = ["--no-sandbox"] if os.geteuid() == 0 else []  # chromium's sandbox refuses root, as CI's container has it
-    for argument in (*ARGUMENTS, *root, f"--user-data-dir={profile}"):
+    for argument in (*ARGUMENTS, *root, f"--user-data-dir={profile}", *arguments):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     return webdriver.Chrome(options=options, service=Service(driver))
