@@ -11,8 +11,10 @@ import math
 import numpy as np
 
 from . import entry, kernel
+from .fields import no_supply
 from .lanes import FOUR
-from .projected import near_unit, take_step
+from .projected import near_unit, sum_supply, take_step
+from .protocol import record_supply
 from .signals import call_handlers
 
 AGREED = 2.0**-44
@@ -25,15 +27,15 @@ BLOCK = 2**8
 
 @kernel
 def cross_gap(n, gap, t, J_inverse, field, table, q, L, room):
-    """Return the state (q, L) that follows on one at t, s, after a gap, s, in n steps."""
+    """Return the state (q, L) that follows on one at t, s, after a gap, s, in n steps, and what the loads supplied in it."""
     (weights, columns, starts, nodes), (scaled, slopes) = table, room
-    h = gap / n
+    h, supplied = gap / n, no_supply(field)
     for i in range(len(weights)):
         scaled[i] = h * weights[i] if i < starts[-2] else weights[i]
     for step in range(n):
         q, L = take_step(h, t + step * h, J_inverse, field, scaled, columns, starts, nodes, q, L, slopes)
-        q = near_unit(q)
-    return q, L
+        q, supplied = near_unit(q), sum_supply(h, weights, columns, starts, slopes, supplied)
+    return q, L, supplied
 
 
 @kernel
@@ -51,10 +53,12 @@ def difference(q0, L0, q1, L1, size):
 def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, gaps, q, L):
     """Move the states q (n, 4), of length one, and L (n, 3), kg m^2/s, principal axes, at t (n,), s, on by gaps (n,), s.
 
+    With loads, L has four more columns, filled with the work, J, and the impulse, N m s, world axes, of the gap.
+
     First steps are at most `longest`, s; momenta are relative to `size`, kg m^2/s. Returns how many states were moved: all, or
     those before the first for which the crossings do not agree.
     """
-    table, room = (weights, columns, starts, nodes), (np.empty(len(weights)), np.empty(2 * FOUR * (len(starts) - 2)))
+    table, room = (weights, columns, starts, nodes), (np.empty(len(weights)), np.empty(3 * FOUR * (len(starts) - 2)))
     for i in range(len(t)):
         if i % BLOCK == BLOCK - 1:
             call_handlers()
@@ -72,4 +76,5 @@ def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, ga
             coarse = fine
         q[i, 0], q[i, 1], q[i, 2], q[i, 3] = coarse[0]
         L[i, 0], L[i, 1], L[i, 2] = coarse[1]
+        record_supply(i, coarse[2], L)
     return len(t)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arithmetic import accumulate, add
+from ..arithmetic import accumulate, add, dot
 from . import small
 from .lanes import load_rows, save_rows
 from .traced import trace
@@ -58,7 +58,7 @@ def no_supply(field):
 @trace
 def supply(field, h, q, a, supplied):
     """Return the sums `supplied` with work and impulse of a step from the quaternion q."""
-    return add_supply(supplied, field.supply(h, q, a)) if supplied else supplied
+    return add_supply(supplied, 1.0, field.supply(h, q, a)) if supplied else supplied
 
 
 @trace
@@ -68,10 +68,20 @@ def supply_rate(field, q, w):
 
 
 @trace
-def add_supply(supplied, gained):
-    """Return compensated sums with work and impulse `gained`."""
-    pairs = [accumulate(*each) for each in zip(supplied[:4], supplied[4:], gained, strict=True)] if supplied else []
+def add_supply(supplied, factor, gained):
+    """Return compensated sums with `factor` times work and impulse `gained`."""
+    pairs = [accumulate(a, c, factor * b) for a, c, b in zip(supplied[:4], supplied[4:], gained, strict=False)]
     return (*(total for total, _ in pairs), *(carry for _, carry in pairs))
+
+
+@trace
+def shift_invariants(kept, axis, turn, supplied):
+    """Return energy, J, or Jacobi integral, and momentum about the axis, kg m^2/s, with what the loads supplied."""
+    if not supplied:
+        return kept
+    impulse = supplied[1:4]
+    gained = supplied[0] if turn is None else supplied[0] - dot(turn, impulse)
+    return kept[0] + gained, kept[1] if axis is None else kept[1] + dot(axis, impulse)
 
 
 @trace

@@ -7,7 +7,8 @@ The state is the attitude as a quaternion q and the momentum L, principal axes: 
 Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is
 restored, and then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
 Wanner, IV.4): by Newton's method along their gradients with respect to L and to a turn of the body, so that the state moves
-least. An invariant that is met to round-off is left alone, and nothing can accumulate.
+least. With loads these values change by work and impulse, which the step sums as it does q and L. An invariant that is met to
+round-off is left alone, and nothing can accumulate.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .fields import at_time, body_torque, energy
-from .lanes import FOUR, join, lane_of, load, save, splat
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .fields import add_supply, at_time, body_torque, energy, no_supply, shift_invariants, supply_rate, torque
+from .lanes import FOUR, join, lane_of, load, load_rows, save, save_rows, splat
+from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
 from .vector import add, cross, dot, fuse, in_body, product, scale, subtract, times
 
@@ -69,12 +70,13 @@ class Coefficients(NamedTuple):
 
 
 @small
-def rates(J_inverse, field, q, L, slopes, at):
-    """Write (q', L', 0) to slopes[at : at + 8]."""
+def rates(J_inverse, field, q, L, slopes, at, supply_at):
+    """Write (q', L', 0) to slopes[at : at + 8], and with loads their power and torque to slopes[supply_at : supply_at + 4]."""
     w = times(J_inverse, L)
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
     n = cross(L, w)
-    T = body_torque(field, q)
+    T = torque(field, q, w)
+    save_rows(slopes, supply_at, 1, supply_rate(field, q, w))
     save(slopes, at + FOUR, join(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
     save(
         slopes,
@@ -109,11 +111,21 @@ def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slo
             (lane_of(qs, 0), lane_of(qs, 1), lane_of(qs, 2), lane_of(qs, 3)),
             (lane_of(Ls, 0), lane_of(Ls, 1), lane_of(Ls, 2)),
         )
-        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage)
+        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage, FOUR * (2 * stages + stage))
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
     dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
     q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
     return (lane_of(q1, 0), lane_of(q1, 1), lane_of(q1, 2), lane_of(q1, 3)), (lane_of(L1, 0), lane_of(L1, 1), lane_of(L1, 2))
+
+
+@small
+def sum_supply(h, weights, columns, starts, slopes, supplied):
+    """Return the sums of work and impulse with those of the last step: its quadrature of power and torque."""
+    stages = len(starts) - 2
+    for i in range(starts[stages], starts[stages + 1]):
+        rate = load_rows(slopes, FOUR * (2 * stages + columns[i]), 1, 4, 1)
+        supplied = add_supply(supplied, h * weights[i], rate)
+    return supplied
 
 
 @small
@@ -197,8 +209,10 @@ def march(model, coefficients, workspace):
     for i in range(starts[-2]):  # not one product of a slice: numba compiles the text of its error for that
         weights[i] *= h
     stages = len(starts) - 2
-    slopes = np.empty(2 * FOUR * stages)
+    slopes = np.empty(3 * FOUR * stages)
+    supplied = no_supply(field)
     record(0, q, L, q_out, L_out)
+    record_supply(0, supplied, L_out)
     kept = values(J_inverse, field, axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done = 0
@@ -206,7 +220,9 @@ def march(model, coefficients, workspace):
         last = end_of_block(done, n_steps, pause)
         for step in range(done + 1, last + 1):
             q, L = take_step(h, (step - 1) * h, J_inverse, field, weights, columns, starts, nodes, q, L, slopes)
-            q, L, more, defect = project(J_inverse, at_time(field, step * h), axis, turn, kept, scales, q, L)
+            supplied = sum_supply(h, weights, columns, starts, slopes, supplied)
+            now, aim = at_time(field, step * h), shift_invariants(kept, axis, turn, supplied)
+            q, L, more, defect = project(J_inverse, now, axis, turn, aim, scales, q, L)
             corrections += more
             if not defect < LEFT:
                 work = (step - 1) * stages
@@ -216,6 +232,7 @@ def march(model, coefficients, workspace):
                 until_sample = every
                 row += 1
                 record(row, q, L, q_out, L_out)
+                record_supply(row, supplied, L_out)
         done = last
         if done < n_steps:
             call_handlers()

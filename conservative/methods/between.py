@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -119,18 +120,24 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
     n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
     row, gaps = row[:n], gaps[:n]
-    R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
+    supplied = None if found.supplied is None else found.supplied[row]
+    R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row], supplied)
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
     R_WB, w_WB_B, frame, flight = R_WB[:done], w_WB_B[:done], found.frame, found.scene.flight
     if frame and flight:
         first = (each[row[:done]] for each in (found.R_WB, found.w_WB_B, *frame))
         frame = flight.follow(flight.fall_from(*flight.centre(*first), gaps[:done]), R_WB, w_WB_B)
-    samples = replace(found, t=t[:done].copy(), R_WB=R_WB, w_WB_B=w_WB_B, failure=failure, frame=frame)
+    changes: dict[str, Any] = {"failure": failure, "frame": frame, "supplied": None if supplied is None else supplied[:done]}
+    samples = replace(found, t=t[:done].copy(), R_WB=R_WB, w_WB_B=w_WB_B, **changes)
     return cut_at_failure(samples, method.conserves, method.bounds(found.scene, grid))
 
 
-def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
+def move(
+    scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array, supplied: Array | None = None
+) -> tuple[Array, Array, int]:
     """Move states at times t (n,), s, forward by gaps (n,), s. Return the attitudes, the rates and the number of moved states.
+
+    Work and impulse of the loads in the gaps are added to `supplied` (n, 4).
 
     States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. If a state cannot be moved, the later ones are not moved
     either. States with a gap of 0 do not change.
@@ -142,7 +149,8 @@ def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tup
     scene = scene.derive(convert_scene, units)
     body, start = scene.body, scene.derive(principal_start)
     q = np.ascontiguousarray(to_quaternion(R[far] @ body.R_BP))
-    L = np.ascontiguousarray((w[far] * units.time @ body.R_BP) * body.moments)
+    L = np.zeros((len(far), 7 if scene.loaded else 3))
+    L[:, :3] = (w[far] * units.time @ body.R_BP) * body.moments
     field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
     table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
@@ -150,4 +158,6 @@ def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tup
     moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
     kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)
     R[far[:moved]], w[far[:moved]] = moved_R, moved_w / units.time
+    if supplied is not None:
+        supplied[far] += L[:, 3:] * units.supply
     return R, w, len(t) if moved == len(far) else int(far[moved])

@@ -11,7 +11,7 @@ from ..attitude import triple
 from ..card import Card, Cost, Structure
 from ..deferred_imports import kernels
 from ..grid import Grid
-from ..invariants import JACOBI_INTEGRAL
+from ..invariants import JACOBI_INTEGRAL, with_balances
 from ..method import Method, Role, Run
 from ..potentials.turning import Turning
 from ..scene import Scene
@@ -48,6 +48,7 @@ class Projected(Method):
         kernel="projected",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
         time_dependent=True,
+        loads=True,
     )
 
     @property
@@ -56,7 +57,7 @@ class Projected(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis"})
+        return with_balances("energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis")
 
     bounds = within_round_off
 

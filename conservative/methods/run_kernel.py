@@ -26,7 +26,8 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     and L, because calls of one run do not overlap. With loads, L has four more columns, for `Trajectory.supplied`.
     """
     n, n_steps, t = grid.n_samples, grid.n_steps, grid.t
-    q, L, of_R, of_w = np.empty((n, 4)), np.empty((n, 7 if scene.loaded else 3)), (n, 3, 3), (n, 3)
+    loaded, of_R, of_w = scene.loaded, (n, 3, 3), (n, 3)
+    q, L = np.empty((n, 4)), np.empty((n, 7 if loaded else 3))
     bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
     enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
     turn = start.J_inverse, start.spin, start.R_BP
@@ -45,10 +46,9 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
             # The constructor takes three times as long.
             trajectory = object.__new__(Trajectory)
             trajectory.__dict__.update(
-                scene=scene, t=t.copy(), R_WB=R_WB, w_WB_B=w_WB_B, label=label, counters=counters, failure=None, choice=None
-            )
-            if scene.loaded:
-                trajectory.__dict__["supplied"] = L[:, 3:].copy()
+                scene=scene, t=t.copy(), R_WB=R_WB, w_WB_B=w_WB_B, label=label, counters=counters, failure=None, choice=None,
+                supplied=L[:, 3:].copy() if loaded else None,
+            )  # fmt: skip
             return trajectory
         n_good = n if done == n_steps else grid.count_samples(done)
         R_WB, w_WB_B = np.empty((n_good, 3, 3)), np.empty((n_good, 3))
@@ -57,7 +57,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
             failure: IntegrationFailed = Diverged(float(t[max(finite - 1, 0)]))
         else:
             failure = (WrongBranch if elsewhere else NotConverged)(done + 1, done * grid.dt, size, kernel.FAILURE)
-        supplied = L[:finite, 3:].copy() if scene.loaded else None
+        supplied = L[:finite, 3:].copy() if loaded else None
         return Trajectory(scene, t[:finite].copy(), R_WB[:finite], w_WB_B[:finite], label, counters, failure, None, supplied)
 
     run.__dict__["own_loop"] = partial(enter, 0, q, L)

@@ -19,6 +19,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from ..attitude import Array
 from ..check import read_only, replace_unchecked
 from ..flight import Flight
 from ..grid import Grid
@@ -43,6 +44,11 @@ class Units:
 
     moment: float
     time: float
+
+    @property
+    def supply(self) -> Array:
+        """Units (4,) of work, J, and impulse, N m s."""
+        return self.moment / self.time / np.array([self.time, 1.0, 1.0, 1.0])
 
     def convert(self, scene: Scene) -> Scene:
         """Return the scene in these units. Its numbers may be outside the range that constructors allow."""
@@ -70,8 +76,7 @@ class Units:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
         failure = found.failure and found.failure.at_times(self.time)
         w_WB_B = found.w_WB_B / self.time
-        momentum = self.moment / self.time
-        supplied = None if found.supplied is None else found.supplied * np.repeat([momentum / self.time, momentum], [1, 3])
+        supplied = None if found.supplied is None else found.supplied * self.supply
         frame = found.frame and (found.frame[0], found.frame[1] / self.time)
         changes: dict[str, Any] = {"w_WB_B": w_WB_B, "failure": failure, "supplied": supplied, "frame": frame}
         return replace(found, scene=scene, t=grid.t[: len(found)], **changes)

@@ -229,11 +229,3 @@ def load_field(field: Any, torque: Torque | None, damping: Damping | None, R_BP:
         call = kernels("function_field").Torques(address, tuple(triple(row) for row in R_BP))
     beside = UniformField(0.0, 0.0, 0.0) if field is None else field
     return Loaded(beside, call, body, world, tuple(triple(row) for row in D), 0.0)
-
-
-def load_B(torque: Torque | None, damping: Damping | None, t: float, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return the torque of the loads (3,), N m, body axes, at a time, s, an attitude (3, 3) and rates (3,), rad/s."""
-    found = np.zeros(3) if damping is None else -damping.matrix @ w_WB_B
-    if torque is None:
-        return found
-    return found + (torque.at(t) if torque.frame == "body" else torque.at(t) @ R_WB)

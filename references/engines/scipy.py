@@ -16,7 +16,7 @@ from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.units import in_own_units
-from conservative.potentials.load import load_B
+from conservative.potentials.load import load_field
 from conservative.potentials.potential import torque_W
 from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
@@ -153,11 +153,12 @@ def state_derivative(scene: Scene) -> Derivative:
         out[4:] += torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J  # type: ignore[arg-type]
         return out
 
+    loads = load_field(None, scene.torque, scene.damping, axes.R_BF)
     of_field = derivative if potential is None or type(static) in FIELDS else through_gradient
 
     def with_loads(t: float, y: Array) -> Array:
-        out, R_WB = of_field(t, y), from_quaternion(y[:4]) @ axes.R_BF.T
-        out[4:] += load_B(scene.torque, scene.damping, t, R_WB, axes.R_BF @ y[4:]) @ axes.R_BF / axes.J
+        out = of_field(t, y)
+        out[4:] += np.array(loads.at_time(t).load(y[:4], y[4:])) / axes.J
         return out
 
     return with_loads if scene.loaded else of_field

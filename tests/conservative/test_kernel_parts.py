@@ -40,10 +40,10 @@ def compiled(function: Any) -> Any:
 def gain_of_steps(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
     """Return the gain of a step of the loop for the momentum `start` less `carry`."""
     lengths, q_out, L_out = np.array([H]), np.empty((2, 4)), np.empty((2, 3))
-    state = (Q, (0.0, 0.0, 0.0, 0.0), tuple(start.tolist()), carry)
+    state = (Q, (0.0, 0.0, 0.0, 0.0), tuple(start.tolist()), carry, ())
     history = reduced.no_history()
     found = compiled(reduced.take_steps)(lengths, 1, 1, 1, J, INVERSE, None, TIGHT, (1, 0), 0, state, history, q_out, L_out)
-    _, _, after, left = found[4]
+    _, _, after, left, _ = found[4]
     return np.array(after) - left - (start - carry)
 
 

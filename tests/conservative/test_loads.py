@@ -15,6 +15,9 @@ R_WB0 = rotation_about((1.0, -2.0, 0.5), 0.9)
 DAMPING = cv.Damping([[0.5, 0.1, 0], [-0.1, 0.3, 0], [0, 0, 0.7]])
 GRAVITY = cv.UniformGravity(3.0, (0.1, 0.2, 0.3))
 
+SPRING = cv.LinearSpring(3.0, (0.1, 0.2, 0.3), (1.0, 0.0, 0.5), 0.3)
+ORBIT = cv.Orbit(0.3, (0, 1, 0)).gravity_gradient(BODY.inertia, (1, 0, 0))
+
 
 def loaded(torque=None, damping=DAMPING, potential=None, t_end=5.0, **others) -> cv.Scene:
     return cv.Scene("loaded", BODY, R_WB0, (0.1, 1.5, 2.0), t_end, potential, torque=torque, damping=damping, **others)
@@ -41,6 +44,17 @@ def test_reduced_keeps_the_balances_to_round_off(scene, order):
             scene.R_WB0[None], scene.w_WB_B0[None]
         )
         assert sizes(without).max() > 0.01 * balance.scale  # the quantity itself is not conserved
+
+
+@pytest.mark.parametrize("potential", [GRAVITY, SPRING, ORBIT], ids=["gravity", "spring", "orbit"])
+def test_projected_keeps_the_balances_also_between_its_steps(potential):
+    scene = loaded(SINE, potential=potential)
+    trajectory = cv.integrate(scene, 0.05, "projected")
+    between = cv.integrate(scene, 0.05, "projected", t_eval=[0.0, 0.333, 4.9, 5.0])
+    for balance in scene.invariants:
+        assert sizes(trajectory.drift(balance)).max() < 2e-14  # measured: at most 2e-15
+        assert sizes(between.drift(balance)).max() < 2e-14  # measured: at most 2e-15
+    assert np.abs(between.supplied[-1] - trajectory.supplied[-1]).max() < 1e-13
 
 
 def test_a_work_that_is_wrong_by_a_millionth_shows():
