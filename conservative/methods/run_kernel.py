@@ -47,7 +47,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
             trajectory = object.__new__(Trajectory)
             trajectory.__dict__.update(
                 scene=scene, t=t.copy(), R_WB=R_WB, w_WB_B=w_WB_B, label=label, counters=counters, failure=None, choice=None,
-                supplied=L[:, 3:].copy() if loaded else None,
+                supplied=L[:, 3:].copy() if loaded else None, frame=None,
             )  # fmt: skip
             return trajectory
         n_good = n if done == n_steps else grid.count_samples(done)
