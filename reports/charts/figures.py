@@ -14,8 +14,6 @@ from .style import HEIGHT, PALETTE, SHAPES, WIDTH, apply_style, colours, familie
 
 FLOOR = 1e-17
 """Replaces an error of zero on a logarithmic axis; below any round-off of a relative error in double precision."""
-SINGLE = "single"
-"""Parameter of a chart of families: whether single settings are drawn."""
 _CLASSES: Mapping[str, tuple[str, list[int]]] = {
     MethodClass.GENERAL.value: ("circle", [1, 0]),
     MethodClass.SOLUTION.value: ("diamond", [1, 0]),
@@ -70,26 +68,40 @@ def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any
 
 
 def best_of_families(picture: pd.DataFrame) -> Any:
-    """Return time against error of the best of each family, single settings thin; columns as in `rows.points`."""
+    """Return time against error of the best of each family; columns as in `rows.points`."""
     data = picture.assign(microseconds=picture["time"] * 1e6, sample=picture["sample"] * 1e6, rank=range(len(picture)))
     families = families_of(data)
     x = alt.X(**log_channel("error", "largest attitude error, rad", data["error"]))
     y = alt.Y(**log_channel("microseconds", "µs per simulated second", data["microseconds"]))
+    line = alt.Chart(data, width=WIDTH, height=HEIGHT).mark_line(
+        strokeWidth=2.2, point=alt.OverlayMarkDef(size=50, filled=True, opacity=1)
+    )
+    chart = line.encode(
+        x=x,
+        y=y,
+        color=alt.Color("name:N", scale=scale(colours(families)), sort=list(families)),
+        shape=alt.Shape("class:N", scale=scale(CLASS_SHAPES)),
+        strokeDash=alt.StrokeDash("class:N", scale=scale(CLASS_DASHES)),
+        order=alt.Order("rank:Q"),
+    )
+    return apply_style(chart)
 
-    def lines(part: pd.DataFrame, width: float, size: float) -> Any:
-        mark = alt.Chart(part).mark_line(strokeWidth=width, point=alt.OverlayMarkDef(size=size, filled=True, opacity=1))
-        return mark.encode(
-            color=alt.Color("name:N", scale=scale(colours(families)), sort=list(families)),
-            shape=alt.Shape("class:N", scale=scale(CLASS_SHAPES)),
-            strokeDash=alt.StrokeDash("class:N", scale=scale(CLASS_DASHES)),
-            detail="line:N",
-            order=alt.Order("rank:Q"),
+
+def signed_drift(drifts: pd.DataFrame) -> Any:
+    """Return the drift over time with its sign, from `lines.signed_drifts` of a scene, a panel for each invariant."""
+    channels = look(families_of(drifts), "strokeDash", title="method", symbolSize=300)
+    panels = []
+    for kind, part in drifts.groupby("quantity", sort=False):
+        ends = part["drift"].min(), part["drift"].max()
+        powers = [10.0**k for k in range(-12, 13, 3)]
+        ticks = [-p for p in powers if -p >= 10 * ends[0]] + [0.0] + [p for p in powers if p <= 10 * ends[1]]
+        axis = alt.Axis(
+            title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"
         )
-
-    single = data["single"].astype(bool)
-    thin, bold = lines(data[single], 0.8, 12).transform_filter(SINGLE), lines(data[~single], 2.2, 50)
-    layers = (thin + bold).encode(x=x, y=y).properties(width=WIDTH, height=HEIGHT)
-    return apply_style(layers.add_params(alt.param(name=SINGLE, value=False)))
+        y = alt.Y("drift:Q", axis=axis, scale=alt.Scale(type="symlog", constant=1e-14, nice=False))
+        chart = alt.Chart(part, width=WIDTH, height=HEIGHT, title=str(kind)).mark_line(strokeWidth=2)
+        panels.append(chart.encode(x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)), y=y, **channels))
+    return apply_style(alt.hconcat(*panels))
 
 
 def drift(drifts: pd.DataFrame, scene: str) -> Any:

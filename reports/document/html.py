@@ -11,15 +11,19 @@ import gzip
 import json
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from .. import animation
 from . import contrast
-from .model import Cell, Document, Section, Style, Table, walk
+from .model import Cell, Document, Motion, Section, Style, Table, walk
 
+MOST_ROWS = 600_000
+"""Largest length of the packed measurements in a page; longer ones are only in measurements.csv, next to the page."""
 WIDEST = 1.35
 """Largest ratio in the drawing of an interval, and the reciprocal of the smallest."""
 
@@ -29,7 +33,7 @@ def render(document: Document) -> str:
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"whole": _whole, "narrow": _narrow, "place": _place}
-    environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns}
+    environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns, "motion": _motion}
     blocks = list(walk(document.blocks))
     linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
@@ -42,8 +46,14 @@ def render(document: Document) -> str:
         scripts |= {"charts": packed, "vega": _vega()}
     if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
         scripts["datatables"] = _datatables()
+    rows = document.data.get("rows", ()) if isinstance(document.data, Mapping) else ()
+    if rows and any(isinstance(block, Table) and block.source for block in blocks):
+        packed = pack(json.dumps([list(rows[0]), *(list(row.values()) for row in rows)], separators=(",", ":")))
+        if len(packed) <= MOST_ROWS:
+            scripts["rows"] = packed
+    player = Markup(animation.script()) if any(isinstance(block, Motion) for block in blocks) else ""
     template = environment.get_template("page.html.j2")
-    return re.sub(r"\n{2,}", "\n", template.render(document=document, linked=linked, scripts=scripts)) + "\n"
+    return re.sub(r"\n{2,}", "\n", template.render(document=document, linked=linked, scripts=scripts, player=player)) + "\n"
 
 
 def pack(text: str) -> str:
@@ -63,6 +73,10 @@ def _datatables() -> str:
     import itables.options
 
     return pack(Path(itables.options.dt_bundle).read_text(encoding="utf-8"))
+
+
+def _motion(block: Motion) -> Markup:
+    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth, numbers=False))
 
 
 def _whole(text: str) -> Markup:

@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from conservative.trajectory import Trajectory
 
 
 class Grade(StrEnum):
@@ -79,6 +82,8 @@ class Table:
     rows: Sequence[Row]
     caption: str = ""
     style: Style = Style.SORTED
+    source: Mapping[str, str] = field(default_factory=dict)
+    """Columns and values that select its rows in `measurements.csv`, to which the page links; empty for no link."""
 
 
 class Emphasis(StrEnum):
@@ -143,7 +148,6 @@ class Layout(StrEnum):
     PANELS = "panels"
     PAIRS = "pairs"
     SPHERES = "sphere"
-    FAMILIES = "families"  # with a switch for single settings, the parameter `single` of the chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +177,15 @@ class Figure:
     layout: Layout = Layout.SINGLE
 
 
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """An animation, on the page alone: trajectories, their labels, and the index of the exact one (see `animation.element`)."""
+
+    trajectories: Sequence[Trajectory]
+    labels: Sequence[str]
+    truth: int | None = None
+
+
 @dataclass(frozen=True)
 class Section:
     """A heading with blocks. The page links sections with an anchor in its header, under the title or the shorter `menu`."""
@@ -185,7 +198,7 @@ class Section:
     """True if the page shows only the title until a reader opens it."""
 
 
-Block = Paragraph | Items | Facts | Table | Figure | Section
+Block = Paragraph | Items | Facts | Table | Figure | Motion | Section
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,11 @@
   const shade = (colour, dark) => content.colours[dark ? "dark" : "light"][colour.toUpperCase()] ?? colour;
   const dressed = (spec, dark) => JSON.parse(JSON.stringify(spec).replace(/#[0-9A-Fa-f]{6}/g, (colour) => shade(colour, dark)));
 
+  const folded = (figure) => figure.closest("details:not([open])");
+
   async function draw(figure, dark) {
+    if (folded(figure) || figure.dataset.drawn === String(dark)) return;
+    figure.dataset.drawn = dark;
     const boxes = [...figure.querySelectorAll(".chart")];
     views.get(figure).splice(0).forEach((view) => view.finalize());
     for (const [k, spec] of (content.figures[figure.dataset.figure] ?? []).entries()) {
@@ -85,7 +89,23 @@
     return drawing;
   };
   night.addEventListener("change", () => drawAll(night.matches));
-  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
+  // A chart has the width of its place, so one in a folded part is drawn when that is opened.
+  document.addEventListener("toggle", () => drawAll(night.matches), true);
+
+  // Rows of measurements.csv are in the page if they are few; otherwise the link leads to the file next to the page.
+  for (const link of document.querySelectorAll("[data-rows]")) {
+    link.addEventListener("click", async (event) => {
+      if (link.download || !document.getElementById("rows")) return;
+      event.preventDefault();
+      const [columns, ...rows] = JSON.parse(await unpack("rows")), wanted = Object.entries(JSON.parse(link.dataset.rows));
+      const text = (value) => (/[",\n]/.test(value ?? "") ? `"${value.replaceAll('"', '""')}"` : value ?? "");
+      const found = rows.filter((row) => wanted.every(([name, value]) => row[columns.indexOf(name)] === value));
+      const file = new Blob([[columns, ...found].map((row) => row.map(text).join(",")).join("\n"), "\n"], { type: "text/csv" });
+      link.href = URL.createObjectURL(file);
+      link.download = `${wanted.map(([, value]) => value).join("_")}.csv`;
+      link.click();
+    });
+  }
 
   for (const figure of figures) {
     const entries = [...figure.querySelectorAll(".entry")];
@@ -94,10 +114,6 @@
     entries.forEach((entry) => entry.addEventListener("click", () => press([entry], entry.ariaPressed === "false")));
     figure.querySelector(".all")?.addEventListener("click", () => press(entries, true));
     figure.querySelector(".none")?.addEventListener("click", () => press(entries, false));
-    for (const input of figure.querySelectorAll("[data-signal]")) {
-      const value = () => (input.type === "checkbox" ? input.checked : Number(input.value));
-      input.addEventListener("input", () => set(figure, input.dataset.signal, value()));
-    }
   }
 
   // The text of the selected cell of a grid is shown below the grid.

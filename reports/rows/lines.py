@@ -7,11 +7,14 @@ import math
 import numpy as np
 import pandas as pd
 
+from conservative.attitude import from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import long_runs, motion
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
 from conservative.outcome import OutcomeKind
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from .names import of_measure, of_study, with_outcome
 
@@ -44,10 +47,35 @@ def thin(drifts: pd.DataFrame) -> pd.DataFrame:
     return drifts[left % every == 0].reset_index(drop=True)
 
 
+def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the relative drifts of the study of motions: columns scene, method, family, name, t (s), quantity, drift."""
+    rows = _samples_of(samples, "motion").rename(columns={"value": "drift"})
+    rows = rows[rows["quantity"].str.startswith(motion.SIGNED)]
+    rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=rows["line"])
+    return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
+
+
+def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
+    """Return the motion of each method over the first duration of a scene, by the name of the method."""
+    rows = _samples_of(samples, "motion")
+    points = _points(rows[rows["scene"] == scene.name], ["method", "name", "t"], motion.STATES)
+    return {
+        str(method): Trajectory(
+            scene,
+            part["t"].to_numpy(),
+            from_quaternion(part[list(motion.STATES[:4])].to_numpy()),
+            part[list(motion.STATES[4:])].to_numpy(),
+            str(part["name"].iloc[0]),
+        )
+        for method, part in points.groupby("method", sort=False)
+    }
+
+
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
     keys = ["scene", "method", "family", "name", "t"]
-    return _points(_samples_of(samples, "motion"), keys, motion.AXES)
+    rows = _samples_of(samples, "motion")
+    return _points(rows.assign(name=rows["line"]), keys, motion.AXES)
 
 
 def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) -> pd.DataFrame:

@@ -1,8 +1,8 @@
 """Errors and times of runs over steps and tolerances, and the picture of the best of each family.
 
-A picture has the columns `name` (of the family), `class`, `single` (whether the line has a single setting), `line` (its name),
-`setting` (of a point), `error` (rad), `time` (s per simulated second), `sample` (s per sample, of a scene), `dt` (s), and
-`within` (on how many bodies the error is reached, if there are several).
+A picture has the columns `name` (of the family), `family`, `class`, `setting` (of a point), `error` (rad), `time` (s per
+simulated second), `sample` (s per sample, of a scene), `dt` (s), and `within` (on how many bodies the error is reached, if
+there are several).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from .names import OF_ENGINES, MethodClass, class_of, display_name, of_study, with_outcome
+from .names import MethodClass, class_of, display_name, of_study, with_outcome
 
 DECADES = tuple(10.0**-k for k in range(1, 14))
 _NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
@@ -86,7 +86,7 @@ def front(points: pd.DataFrame) -> pd.DataFrame:
     return ordered[ordered["error"] < best_before]
 
 
-COLUMNS = ("name", "family", "class", "single", "line", "setting", "error", "time", "sample", "dt", "within")
+COLUMNS = ("name", "family", "class", "setting", "error", "time", "sample", "dt", "within")
 AT_FIRST = 8
 """Largest number of lines that a picture shows at first."""
 SAME = 0.01
@@ -94,18 +94,16 @@ SAME = 0.01
 
 
 def picture(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the picture of the points of one scene: of each family the front, and all single settings."""
+    """Return the picture of the points of one scene: the front of each family."""
     named = points.assign(
         name=[
             display_name(family, version, "") + ", integrable motions only" * (kind == MethodClass.SOLUTION)
             for family, version, kind in zip(points["family"], points["version"], points["class"], strict=True)
         ],
-        line=points["name"],
         setting=points["method"],
         within="",
     )
-    best = [front(members).assign(single=False, line=name) for name, members in named.groupby("name", sort=False)]
-    return joined([*best, named.assign(single=True)])
+    return joined([front(members) for _, members in named.groupby("name", sort=False)])
 
 
 def joined(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -115,12 +113,16 @@ def joined(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def first_names(picture: pd.DataFrame) -> tuple[str, ...]:
-    """Return the families that a picture shows at first: the best of ours and of engines in turn."""
-    best = picture[~picture["single"].astype(bool)]
-    ranked = sorted((_rank(line), str(name)) for name, line in best.groupby("name", sort=False))
-    classes = dict(zip(best["name"], best["class"], strict=True))
-    sides = [[name for _, name in ranked if (classes[name] in OF_ENGINES) is engine] for engine in (False, True)]
-    return tuple(name for pair in zip_longest(*sides) for name in pair if name)[:AT_FIRST]
+    """Return the families that a picture shows at first: the best of our integrators, physics engines and solvers in turn.
+
+    Our closed forms come last, as they solve integrable motions only.
+    """
+    ranked = sorted((_rank(line), str(name)) for name, line in picture.groupby("name", sort=False))
+    classes = dict(zip(picture["name"], picture["class"], strict=True))
+    turns = (MethodClass.GENERAL, MethodClass.ENGINE, MethodClass.SOLVER)
+    sides = [[name for _, name in ranked if classes[name] == kind] for kind in turns]
+    rest = [name for _, name in ranked if classes[name] not in turns]
+    return tuple([name for each in zip_longest(*sides) for name in each if name] + rest)[:AT_FIRST]
 
 
 def _rank(line: pd.DataFrame) -> tuple[int, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, many_runs, price, random, selection, studies, throughput
@@ -110,6 +110,7 @@ def plan_report(
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
     made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit, processes)
+    made = [replace(each, methods=(*compared, *named)) if each.name == "motion" else each for each in made]
     if named:
         made += studies.cross_studies(studies.ENGINES, chosen, named, quick, skip_missing, time_limit)
     if full and not (names or quick):

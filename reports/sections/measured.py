@@ -11,6 +11,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.benchmarks.studies.studies import ENGINES, LONG_TIME, PRICE, RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
+from conservative.scene import Scene
 
 from ..rows import points
 from ..rows.names import of_study, with_names, with_outcome, without_outcome
@@ -28,6 +29,11 @@ class Measured:
     plan: Plan
     measurements: Measurements
     source: Provenance
+
+    @property
+    def main_scene(self) -> Scene:
+        """The brick if the report has it, otherwise its first scene."""
+        return min(self.plan.scenes, key=lambda scene: scene.name != "brick_flip")
 
     @cached_property
     def rows(self) -> pd.DataFrame:

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..document.model import Facts, Paragraph, Section, filled
-from ..run.provenance import LockedEngine, Provenance
+from ..document.model import Block, Facts, Paragraph, Section, filled
+from ..run.provenance import LockedEngine
+from .measured import Measured
 
 
-def section(source: Provenance) -> Section:
-    """Return the section."""
-    facts = {**source.facts, "command": f"`{source.command}`"}
-    resumed = [("resumed", part) for part in source.resumed]
+def section(measured: Measured, details: Sequence[Block]) -> Section:
+    """Return the section, with the other sections of a report folded."""
+    source, plan = measured.source, measured.plan
     packages = [f"{name} {version}" for name, version in source.packages.items() if name not in source.compared]
     others = Section("Every other package", [Paragraph(", ".join(packages))], folded=True)
-    locks = Section("Environments of engines", lock_sections(source.environments))
-    return Section("How this was made", filled(Facts([*facts.items(), *resumed]), others, locks), "made")
+    locks = Section("Environments of engines", lock_sections(source.environments), folded=True)
+    processes = max((study.processes for study in plan.studies), default=1)
+    kind = "A quick report: fewer steps and fewer rounds of timing." if plan.quick else "Rounds of timing are interleaved."
+    timing = f"{processes} processes in turn" if processes > 1 else "one process, so ratios are rough"
+    resumed = " It was interrupted and resumed: compare times only within one study." if source.resumed else ""
+    words = f"{kind} Times are the fastest of each method's own loop, final state only, measured by {timing}.{resumed}"
+    facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
+    facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
+    facts += [("versions", ", ".join(f"{name} {version}" for name, version in source.compared.items()))]
+    versions = Facts([*facts, *(("resumed", part) for part in source.resumed)])
+    return Section("How it was measured", filled(Paragraph(words), versions, *details, others, locks), "made", "Measured")
 
 
 def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:

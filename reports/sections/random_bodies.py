@@ -190,27 +190,28 @@ def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios], drifts: pd.Data
     measured = points(supported_rows(table), RANDOM, untimed=True)
     reached = costs(measured, DECADES, [*LINE, "version", "series"])
     families = map(display_name, reached["family"], reached["version"], [""] * len(reached))
-    reached = reached.assign(line=reached["name"], name=list(families))
-    best, bodies = cheapest_of_each(reached, "name"), measured["scene"].nunique()
-    data = joined([_means(best.assign(line=best["name"]), "name", bodies), _means(reached, "line", bodies)])
-    return Summary(sentence(ratios), data, classes_table(measured, reached, drifts, {}))
+    best = cheapest_of_each(reached.assign(name=list(families)), "name")
+    return Summary(
+        sentence(ratios), joined([_means(best, measured["scene"].nunique())]), classes_table(measured, reached, drifts, {})
+    )
 
 
-def _means(reached: pd.DataFrame, by: str, bodies: int) -> pd.DataFrame:
+def _means(reached: pd.DataFrame, bodies: int) -> pd.DataFrame:
     """Return the geometric means over bodies as points of a chart, where most bodies have a time."""
     rows = [
         {
-            **members.iloc[0][["name", "family", "class", "line"]],
-            "single": by == "line",
+            **members.iloc[0][["name", "family", "class"]],
             "setting": members["series"].mode().iloc[0],
             "error": error,
             "time": geometric_mean(members["time"]),
             "within": f"{len(members)} of {bodies}",
         }
-        for (_, error), members in reached.groupby([by, "error"], sort=False)
+        for (_, error), members in reached.groupby(["name", "error"], sort=False)
         if len(members) >= MOST * bodies
     ]
-    return pd.DataFrame(rows).sort_values(by=[by, "error"], ascending=[True, False], kind="stable") if rows else pd.DataFrame()
+    return (
+        pd.DataFrame(rows).sort_values(by=["name", "error"], ascending=[True, False], kind="stable") if rows else pd.DataFrame()
+    )
 
 
 def sentence(ratios: Iterable[RandomRatios]) -> str:

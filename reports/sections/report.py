@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
 from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
 
-from ..document.model import Block, Document, Paragraph, filled
+from ..document.model import Block, Document, Paragraph, Section, filled
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
 from . import (
+    advice,
     closing,
+    drift,
     engines,
     failures,
     hard_cases,
@@ -23,8 +26,10 @@ from . import (
     price,
     provenance,
     random_bodies,
+    ratios,
     scenes,
-    verdict,
+    speed,
+    tumbling,
 )
 from .measured import Measured, of_scene
 
@@ -37,28 +42,35 @@ SCHEMA = 2
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> Document:
     """Return the document of measurements. Every number that a report shows is computed here; nothing is measured."""
     measured = Measured(plan, measurements, source)
+    found = tumbling.results(measured)
     summaries = {scene.name: scenes.summarize(measured, scene) for scene in plan.scenes}
     rows = measured.scene_rows
-    blocks: list[Block] = [verdict.section(measured, summaries)]
+    details: list[Block] = [ratios.section(measured)]
     if RANDOM in plan.names:
-        blocks.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
-    blocks += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
+        details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
+    details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
     if plan.engines:
-        blocks.append(engines.section(measured))
-    blocks += [part.section(measured.rows, measured.samples) for name, part in SECTIONS.items() if name in plan.names]
-    blocks += hard_cases.sections(rows)
-    blocks += filled(paper.section(rows, measured.samples), failures.section(rows), provenance.section(source))
+        details.append(engines.section(measured))
+    details += [part.section(measured.rows, measured.samples) for name, part in SECTIONS.items() if name in plan.names]
+    details += hard_cases.sections(rows)
+    details += filled(paper.section(rows, measured.samples), failures.section(rows))
+    blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
+    blocks += [advice.section(measured), provenance.section(measured, [_fold(each) for each in details])]
     tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]
     sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
     sentences += [summary.sentence for summary in summaries.values()]
     return Document(
         "conservative report",
-        "Which integrator for a rotating body?",
+        "conservative: which integrator for a rotating body?",
         blocks,
         brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *engines.tables(measured), *map(Paragraph, sentences)],
         data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
         failures=failures.failures_of_ours(rows),
     )
+
+
+def _fold(block: Block) -> Block:
+    return replace(block, folded=True) if isinstance(block, Section) else block
 
 
 def records(table: pd.DataFrame) -> list[dict[str, object]]:

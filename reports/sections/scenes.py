@@ -9,20 +9,21 @@ import pandas as pd
 
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import long_runs, motion, step_ladder
+from conservative.benchmarks.studies import long_runs, step_ladder
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.scene import Scene
 
-from ..charts import figures, spheres, vega_embed
-from ..charts.style import colours, families_of
+from ..charts import figures, vega_embed
+from ..charts.style import families_of
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
-from ..document.model import Block, Cell, Emphasis, Figure, Layout, LegendEntry, Paragraph, Row, Section, Style, Table, filled
+from ..document.model import Block, Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_measure, of_study, outcomes
 from ..rows.points import front, under
 from . import scene_contests
+from .drift import spheres_figure
 from .measured import Measured, long_run_drifts, of_scene, scenes_in_trouble
-from .summary import Summary
+from .summary import SAMPLE_TERMS, TERMS, Summary
 from .summary import of_scene as summary_of_scene
 
 
@@ -55,15 +56,20 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         f"relative to `{DEFAULT_METHOD}`."
     )
     picture = figures.work_precision(points, front(points[points["class"] != MethodClass.SOLUTION]), name)
-    work: list[Block] = [families_figure(summary, f"work_precision_{name}", name, picture), classes]
+    terms = Paragraph(f"{TERMS} {SAMPLE_TERMS}", Emphasis.NOTE)
+    work: list[Block] = [
+        Figure(f"work_precision_{name}", f"{name}: time against attitude error", picture=picture),
+        classes,
+        terms,
+    ]
     if decades.rows:
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))
     errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     fits = lines.fits(errors)
     orders = filled(order(fits, lines.fits(rate_errors), name), accuracy(rows, name))
-    curves = _sphere_figure(measured, scene)
+    curves = spheres_figure(measured, scene)
     return Section(
-        name,
+        f"All tables of {name}",
         filled(
             Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
@@ -76,28 +82,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Section("The motion itself", [curves]) if curves else None,
         ),
         name,
-    )
-
-
-def families_figure(summary: Summary, name: str, motion: str, picture: object = None) -> Figure:
-    """Return time against error with the best of each family; the legend shows the others."""
-    points, legend, lines = summary.points, [], []
-    best = points[~points["single"].astype(bool)]
-    for line, members in best.groupby("name", sort=False):
-        family, kind = members[["family", "class"]].iloc[0]
-        dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
-        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash, line in summary.shown))
-        lines.append((str(line), members))
-    hidden = [entry.name for entry in legend if not entry.shown]
-    shown = ("name", "setting", "error", "microseconds", *(["within"] if best["within"].any() else ["sample", "dt"]))
-    return Figure(
-        name,
-        f"{motion}: computing time against attitude error, the best of each family",
-        " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(lines, "error", "time")]),
-        picture,
-        vega_embed.embed(figures.best_of_families(points), shown, 310, hidden) if len(points) else (),
-        legend,
-        Layout.FAMILIES,
+        folded=True,
     )
 
 
@@ -129,23 +114,6 @@ def _convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> 
         vega_embed.embed(picture, ("name", "dt", "error"), 520),
         vega_embed.legend(families_of(named), marks=True),
     )
-
-
-def _sphere_figure(measured: Measured, scene: Scene) -> Figure | None:
-    """Return the curves of a scene, a sphere each; None without that study."""
-    curves = of_scene(lines.curves(measured.samples), scene.name)
-    if curves.empty:
-        return None
-    title, words = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
-    if scene.free:
-        title = "polhode on the momentum sphere"
-        words = "The angular momentum in body axes. The exact curve is closed; drift widens it or leaves the sphere."
-    wanted = motion.select_methods(measured.plan.methods)
-    absent = ", ".join(method.name for method in wanted if method.name not in set(curves["method"]))
-    failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
-    summary = f"At the scene's own step, over {long_runs.DURATIONS:g} durations. {words}{failed}"
-    panels = [spheres.chart(curve) for _, curve in curves.groupby("name", sort=False)]
-    return Figure(f"sphere_{scene.name}", f"{scene.name}: {title}", summary, panels=panels, layout=Layout.SPHERES)
 
 
 def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:

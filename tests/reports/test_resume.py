@@ -148,7 +148,7 @@ def test_finished_studies_survive_an_error(tmp_path):
     with pytest.raises(BadInput) as caught:
         report.write(made, tmp_path / "report", fail)
     assert "2 of 6 studies are finished (motion, paper)" in caught.value.__notes__[0]
-    assert list(json.loads((tmp_path / "report.partial.json").read_text())["studies"]) == ["paper"]
+    assert list(json.loads((tmp_path / "report.partial.json").read_text())["studies"]) == ["motion", "paper"]
 
 
 @pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])

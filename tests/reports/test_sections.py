@@ -131,7 +131,7 @@ def test_orders_of_attitude_and_rates_are_fitted_to_their_own_errors(report):
         for dt in (0.1, 0.05, 0.025, 0.0125)
     ]
     document = build(plan, Measurements(measurement.frame(errors), measured.samples), source)
-    (line,) = texts_of(tables(document, "brick_flip")["brick_flip: observed order"])
+    (line,) = texts_of(tables(document, "All tables of brick_flip")["brick_flip: observed order"])
     assert line[:3] == ["reduced", "2.00 ± 0.00", "3.00 ± 0.00"]
 
 
@@ -166,19 +166,22 @@ def built(planned, table):
 
 
 def test_scenes_are_those_of_the_plan_in_its_order(built, planned, table):
-    assert [block.title for block in built.blocks if block.title in SCENES] == list(SCENES)
+    titles = [
+        block.title for block in walk(built.blocks) if isinstance(block, Section) and block.title.startswith("All tables")
+    ]
+    assert titles == [f"All tables of {name}" for name in SCENES]
     assert len(built.data["rows"]) == len(table)
     for scene in planned.scenes:
-        facts = section(built, scene.name).blocks[1].text
+        facts = section(built, f"All tables of {scene.name}").blocks[1].text
         assert facts == f"{scene.source}. {scene.t_end:g} s; the scene's own step is {scene.dt:g} s."
 
 
 def test_each_scene_has_its_rows_and_no_others(built):
     for scene, order in zip(SCENES, (2, 4), strict=True):
-        orders = texts_of(tables(built, scene)[f"{scene}: observed order"])
+        orders = texts_of(tables(built, f"All tables of {scene}")[f"{scene}: observed order"])
         (slope,) = [cells for cells in orders if cells[0].startswith("reduced")]
         assert slope[1].startswith(f"{order}.0")
-        assert [entry.name for entry in figure(built, f"work_precision_{scene}").legend] == ["reduced", "scipy"]
+        assert [panel["usermeta"]["name"] for panel in figure(built, "speed").panels] == list(SCENES)
         (panel,) = figure(built, f"drift_{scene}").panels
         assert panel["datasets"].popitem()[1].count("\n") == lines.THIN + 1
 

@@ -1,4 +1,4 @@
-"""Costs at an error from work against precision, costs with every step stored, and the ratios of the verdict."""
+"""Costs at an error from work against precision, costs with every step stored, and the ratios of the ratios."""
 
 import math
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.rows import points as work_precision
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.rows.points import points
-from conservative.reports.sections import random_bodies, scene_contests, summary, verdict
+from conservative.reports.sections import random_bodies, ratios, scene_contests, summary
 
 from .rows import frame, point, row, table, texts
 from .test_random_ratios import SLOWER, TWICE
@@ -95,9 +95,9 @@ def test_front_has_the_points_that_no_other_beats():
 
 
 def test_a_cell_has_the_ratio_or_the_side_that_is_alone():
-    cells = [str(verdict.contest_cell(each)) for each in contests(points(table(*OURS, *ENGINE)), [1e-2, 1e-6, 1e-7])]
+    cells = [str(ratios.contest_cell(each)) for each in contests(points(table(*OURS, *ENGINE)), [1e-2, 1e-6, 1e-7])]
     assert cells == ["✓ 2.0", "✗ 0.29", "✗ engine only"]  # 2 x 4^0.6 / 16
-    assert [str(verdict.contest_cell(each)) for each in contests(points(table(*OURS)), [1e-2])] == ["✓ ours only"]
+    assert [str(ratios.contest_cell(each)) for each in contests(points(table(*OURS)), [1e-2])] == ["✓ ours only"]
 
 
 POINTS = [*point("gauss", "ours", 1e-7, 4e-6), *point("heyoka", "engine", 1e-7, 2e-6)]
@@ -160,7 +160,7 @@ def test_the_verdict_has_a_row_for_each_motion_and_class_and_names_the_faster_en
     measured = SimpleNamespace(
         plan=SimpleNamespace(scenes=[scene]), ratios=random, points=points(TABLE), every_step={"made_up": FOUND}
     )
-    found = verdict.ratio_table(measured)
+    found = ratios.ratio_table(measured)
     at_1e_6 = {tuple(line[:2]): (line[found.header.index("1e-6")], line[-1]) for line in texts(found)}
     general, solution = MethodClass.GENERAL.value, MethodClass.SOLUTION.value
     assert at_1e_6 == {

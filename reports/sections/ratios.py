@@ -1,23 +1,16 @@
-"""The verdict of a report: the first figure and table, and the ratios of times at each decade of the error."""
+"""The ratios of times at each decade of the error, engines against ours."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import replace
 
 from conservative.benchmarks.contest import Contest, costs
 
 from ..document.cells import DASH, grade_ratio, tolerance
-from ..document.model import Cell, Emphasis, Grade, Paragraph, Row, Section, Style, Table, filled
+from ..document.model import Cell, Emphasis, Grade, Paragraph, Row, Section, Style, Table
 from ..rows.names import MethodClass
 from ..rows.points import DECADES
-from . import random_bodies
-from . import summary as summaries
 from .measured import Measured
 from .random_bodies import ANY, RandomRatios
 from .scene_contests import sides
-from .scenes import families_figure
-from .summary import Summary
 
 _RATIOS = (
     "The time of the fastest engine divided by that of our fastest method, at each decade of the largest attitude error. "
@@ -29,30 +22,9 @@ _RATIOS = (
 )
 
 
-def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
-    """Return the section: about random bodies if the report has some, else about a scene, if possible without a closed form."""
-    if measured.ratios:
-        about = "Random bodies"
-        summary = random_bodies.summary(measured.rows, measured.ratios, measured.long_drifts)
-    else:
-        about = min(measured.plan.scenes, key=lambda scene: scene.integrable).name
-        summary = of_scenes[about]
-    together = (
-        "within one study of this report, which was interrupted and resumed"
-        if measured.source.resumed
-        else "within this report: they were measured in interleaved rounds"
-    )
-    rough = "" if any(s.processes > 1 for s in measured.plan.studies) else f" {random_bodies.ROUGH}"
-    quick = " This is a quick run: fewer steps, fewer rounds of timing." if measured.plan.quick else ""
-    blocks = filled(
-        Paragraph(summary.sentence, Emphasis.LEAD),
-        families_figure(summary, "first", about),
-        replace(summary.classes, caption=f"{about}: µs of computing per simulated second, by class of methods"),
-        Paragraph(f"{summaries.TERMS} {summaries.SAMPLE_TERMS}", Emphasis.NOTE),
-        Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{rough}{quick}", Emphasis.NOTE),
-        Section("Where an engine is faster", [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]),
-    )
-    return Section(f"Verdict: {about}", blocks, "verdict", "Verdict")
+def section(measured: Measured) -> Section:
+    """Return the section."""
+    return Section("Where an engine is faster", [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)], "ratios")
 
 
 def ratio_table(measured: Measured) -> Table:
@@ -79,7 +51,13 @@ def ratio_table(measured: Measured) -> Table:
         [label, kind.value, *(cells.get(error, DASH) for error in errors), winners] for label, kind, cells, winners in rows
     ]
     caption = "The fastest engine's time divided by ours, by attitude error, rad"
-    return Table(["motion", "our methods", *map(tolerance, errors), "faster engine"], body, caption, Style.FILTERED)
+    return Table(
+        ["motion", "our methods", *map(tolerance, errors), "faster engine"],
+        body,
+        caption,
+        Style.FILTERED,
+        {"study": "work_precision"},
+    )
 
 
 def contest_cell(contest: Contest) -> Cell:

@@ -1,0 +1,87 @@
+"""The second screen of a report: computing time against attitude error, a line for each family, on every kind of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from conservative.benchmarks.contest import cheapest, costs
+
+from ..charts import figures, vega_embed
+from ..charts.style import colours
+from ..document.cells import factor, tolerance
+from ..document.model import Emphasis, Figure, Layout, LegendEntry, Paragraph, Section, filled
+from ..rows.names import MethodClass, of_classes
+from ..rows.points import first_names, under
+from . import random_bodies
+from .measured import Measured, of_scene
+from .summary import CAVEAT, MIDDLE, Summary
+
+
+def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
+    """Return the section, from the summary of each scene; random bodies are included if the report has them."""
+    pictures = {name: summary.points for name, summary in of_scenes.items()}
+    if measured.ratios:
+        pictures["random bodies"] = random_bodies.summary(measured.rows, measured.ratios, measured.long_drifts).points
+    name = measured.main_scene.name
+    sentence = _sentence(name, of_scene(measured.points, name))
+    rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
+    return Section(
+        "How wrong, how fast",
+        filled(
+            Paragraph(sentence, Emphasis.LEAD) if sentence else None,
+            figure(pictures),
+            Paragraph(f"{CAVEAT}{rough}", Emphasis.NOTE),
+        ),
+        "speed",
+        "Speed",
+    )
+
+
+def _sentence(scene: str, points: pd.DataFrame) -> str:
+    """Return how much faster our fastest general integrator is at `MIDDLE` than the fastest solver and physics engine."""
+    reached = costs(points, [MIDDLE])
+    ours = cheapest(of_classes(reached, MethodClass.GENERAL))
+    parts = []
+    for kind, words in ((MethodClass.SOLVER, "ODE solver"), (MethodClass.ENGINE, "physics engine")):
+        theirs = cheapest(of_classes(reached, kind))
+        if not (ours and theirs):
+            continue
+        ratio = theirs.time / ours.time
+        more = f"{factor(ratio)} times as fast as" if ratio >= 1 else f"{factor(1 / ratio)} times as slow as"
+        parts.append(f"{more} {theirs.name}, the fastest {words}")
+    if not (ours and parts):
+        return ""
+    return f"To {tolerance(MIDDLE)} rad on {scene}, {ours.name} is {', and '.join(parts)}."
+
+
+def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
+    full = {motion: points for motion, points in pictures.items() if len(points)}
+    every = pd.concat(full.values(), ignore_index=True) if full else pd.DataFrame(columns=["name", "family", "class", "error"])
+    shown = first_names(every) if len(every) else ()
+    legend = []
+    for line, members in every.groupby("name", sort=False):
+        family, kind = members[["family", "class"]].iloc[0]
+        dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
+        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash, line in shown))
+    legend.sort(key=lambda entry: shown.index(entry.name) if entry.shown else len(shown))
+    hidden, panels = [entry.name for entry in legend if not entry.shown], []
+    for motion, points in full.items():
+        fields = ("name", "setting", "error", "microseconds", *(["within"] if points["within"].any() else ["sample", "dt"]))
+        (panel,) = vega_embed.embed(figures.best_of_families(points), fields, 400, hidden)
+        panels.append(panel | {"usermeta": {"name": motion}})
+    same = dict.fromkeys(
+        sentence
+        for points in full.values()
+        for sentence in under(((str(name), line) for name, line in points.groupby("name", sort=False)), "error", "time")
+    )
+    return Figure(
+        "speed",
+        "Computing time against attitude error, each family at its best settings",
+        " ".join(["Lower left is better. Ours are solid, engines dashed.", *same]),
+        panels=panels,
+        legend=legend,
+        layout=Layout.PANELS,
+    )

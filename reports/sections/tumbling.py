@@ -1,0 +1,124 @@
+"""The first screen of a report: one motion in the exact solution, in engines and in our methods, and how wrong each is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from conservative.benchmarks.contest import cheapest, costs
+from conservative.benchmarks.measures.errors import CONSERVED
+from conservative.benchmarks.measures.measure import Measure
+from conservative.method import Role
+from conservative.outcome import Outcome
+from conservative.scene import Scene
+
+from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
+from ..document.model import Emphasis, Motion, Paragraph, Row, Section, Table, filled
+from ..rows import lines
+from ..rows.names import MethodClass, of_classes, of_measure, of_study, outcomes
+from .hard_cases import RIGHT, USABLE
+from .measured import Measured, of_scene
+from .summary import MIDDLE
+
+LOST = 1e-3
+"""Relative drift above which an invariant is lost."""
+PAPER_MAP = "reduced"
+MOST = 8
+"""Largest number of motions next to each other, with the exact one."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """The run of a method: largest drifts (relative) and attitude error (rad), order, and time per step (s); NaN if unknown.
+
+    `name` has the tolerance of an adaptive method, `line` has not.
+    """
+
+    method: str
+    name: str
+    line: str
+    ours: bool
+    dt: float
+    outcome: Outcome
+    energy: float
+    momentum: float
+    error: float
+    order: float
+    time: float
+
+
+def results(measured: Measured) -> list[Result]:
+    """Return the results on the main scene: engines, the largest error first, then the paper's map and our fastest method."""
+    scene = measured.main_scene.name
+    rows, here = of_study(measured.rows, "motion", scene), measured.rows[measured.rows["scene"] == scene]
+    points = of_scene(measured.points, scene)
+    best = cheapest(of_classes(costs(points, [MIDDLE]), MethodClass.GENERAL))
+    families = {PAPER_MAP, *points[points["name"] == (best.name if best else "")]["family"]}
+    orders, times = (
+        of_measure(here, each).groupby("method")["value"].last() for each in (Measure.ORDER, Measure.TIME_PER_STEP)
+    )
+    found = []
+    for method, run in rows[(rows["role"] == Role.ENGINE) | rows["family"].isin(families)].groupby("method", sort=False):
+        drifts = run[run["measure"] == Measure.DRIFT_MAX.text]
+        name, line, role, dt = run[["name", "line", "role", "dt"]].iloc[0]
+        values = [drifts[drifts["quantity"].str.contains(part)]["value"].max() for part in ("energy", "moment")]
+        values += [of_measure(run, Measure.ATTITUDE_MAX)["value"].max()]
+        values += [known.get(method, math.nan) for known in (orders, times)]
+        found.append(Result(str(method), name, line, role != Role.ENGINE, dt, outcomes(run)[0], *map(float, values)))
+    return sorted(found, key=lambda each: (each.ours, math.isnan(each.error), -each.error))
+
+
+def drawn(found: Sequence[Result]) -> list[str]:
+    """Return the methods that the first screens draw: those that ran, without the most accurate engines if there are many."""
+    engines, ours = ([each.method for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
+    return [*engines[: MOST - 1 - len(ours)], *ours]
+
+
+def section(measured: Measured, found: Sequence[Result]) -> Section:
+    """Return the section, from the `results`."""
+    scene = measured.main_scene
+    motions = lines.trajectories(measured.samples, scene)
+    names, truth = (
+        {each.method: each.line for each in found},
+        set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"]),
+    )
+    exact = [method for method in motions if method in truth]
+    shown = [*exact, *(method for method in drawn(found) if method in motions)]
+    motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
+    subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
+    blocks = filled(Paragraph(_sentence(found, scene), Emphasis.LEAD), motion if shown else None, table(found, scene))
+    return Section(f"What happens to {subject}", blocks, "motion", "Motion")
+
+
+def _sentence(found: Sequence[Result], scene: Scene) -> str:
+    engines, ours = ([each for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
+    parts = []
+    if engines:
+        worst = engines[0]
+        energy = f"{100 * worst.energy:.2g} %" if worst.energy > LOST else f"{number(worst.energy, 1)} of it"
+        wrong = f"{worst.line} is wrong by {number(worst.error)} rad and changes the energy by {energy}"
+        parts.append(f"After {scene.t_end:.3g} s in steps of {1e3 * worst.dt:.3g} ms, {wrong}.")
+    if ours:
+        best = min(ours, key=lambda each: each.error)
+        cost = "" if math.isnan(best.time) else f" and takes {number(1e6 * best.time)} µs per step"
+        parts.append(f"`{best.method}` of the Python package `conservative` is wrong by {number(best.error)} rad{cost}.")
+    return " ".join(parts)
+
+
+def table(found: Sequence[Result], scene: Scene) -> Table:
+    """Return the results as a table with grades."""
+    drift = f"✓ to {tolerance(CONSERVED)}, ✗ above {tolerance(LOST)}"
+    header = ["method", "step, s", f"energy drift ({drift})", f"momentum drift ({drift})"]
+    header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
+    rows: list[Row] = []
+    for each in found:
+        if not each.outcome.ok:
+            rows.append([each.name, numeric(each.dt), outcome_cell(each.outcome), *[DASH] * 4])
+            continue
+        drifts = (grade(value, limits=(CONSERVED, LOST)) for value in (each.energy, each.momentum))
+        order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
+        error = grade(each.error, limits=(RIGHT, USABLE))
+        rows.append([each.name, numeric(each.dt), *drifts, error, order, numeric(1e6 * each.time)])
+    caption = f"Largest values over {scene.t_end:.3g} s. Engines without a default step have the scene's."
+    return Table(header, rows, caption, source={"study": "motion", "scene": scene.name})
