@@ -69,7 +69,7 @@ SCALAR_LAST = "`q` is x, y, z, w: the scalar comes first"
 TRANSPOSED = "The attitudes are transposed: v_W = R v_F"
 Y_UP = "Vectors are x, z, -y, with the second axis up: answer in W and F, whose third axis is up"
 ATTITUDES = ("", SCALAR_LAST, TRANSPOSED, Y_UP)
-W_IN_W = "Rates in W are named `w`, or rates in F `w_W`: `w` is in F"
+W_IN_W = "`w` has rates in W, or `w_W` has rates in F: `w` is in F, `w_W` is in W"
 RATES = {"": 1.0, W_IN_W: 1.0, "Rates are in deg/s: answer in rad/s": math.pi / 180}
 TIMES: dict[str, tuple[float, int, int]] = {  # unit of dt, and how much later attitudes and rates are, in half steps
     "": (1, 0, 0),

@@ -290,8 +290,8 @@ def side_by_side(rows: Sequence[EngineRow], scene: str) -> Table:
             if row is None:
                 cells += [DASH] * 4
             elif math.isnan(row.error):
-                cells += [row.setting, outcome_cell(row.outcome, reason=row is best), DASH, DASH]
+                cells += [row.setting or DASH, outcome_cell(row.outcome, reason=row is best), DASH, DASH]
             else:
-                cells += [row.setting, *(row.cells[part] for part in parts)]
+                cells += [row.setting or DASH, *(row.cells[part] for part in parts)]
         body.append(cells)
     return Table(header, body, f"{scene}: each engine", Style.FILTERED)

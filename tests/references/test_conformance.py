@@ -45,7 +45,7 @@ def test_a_right_program_passes(method):
 NAMED = {
     "x, y, z, w": "free body: `q` is x, y, z, w: the scalar comes first",
     "reads x, y, z, w": "free body: It reads `q0` as x, y, z, w",
-    "w in world": "free body: Rates in W are named `w`",
+    "w in world": "free body: `w` has rates in W, or `w_W` has rates in F",
     "reads w0 in world": "free body: It reads `w0` in world axes",
     "w in deg": "free body: Rates are in deg/s: answer in rad/s",
     "R transposed": "free body: The attitudes are transposed: v_W = R v_F",
