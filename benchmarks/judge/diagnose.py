@@ -1,38 +1,66 @@
-"""Hypotheses that may explain the error of a recorded motion: each is another reading of the data, or another motion."""
+"""The judgement of a recorded motion: errors over time, and the hypothesis that explains them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain, product
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.body import RigidBody
+from conservative.flight import rotation_only
+from conservative.invariants import kinetic_energy, sizes
 from conservative.potentials.potential import depends_on_time
 from conservative.references.engine import principal_axes
 from conservative.references.engines.scipy import state_derivative
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from .motion import Case, Motion
+from .table import Recording
 
-LONGEST, NEAR, FAR = 100.0, 3.0, 0.05  # rad: angles that hypotheses are tried and first fitted over; error of turned axes
-FEWEST, MOST, STEPS = 100, 1000, 20_000  # rows on which they are tried, even over a larger angle; steps of a textbook method
-ROUND_OFF, FLOOR, CHANGE = 1e-10, 1e-12, 1e-6  # errors that need no explanation, that are equally good; change for slopes
+NUMERICAL, LONGEST, NEAR = 1000.0, 100.0, 3.0  # rad: angles that are compared without a closed form, explained, fitted first
+FEWEST, MOST, STEPS = 100, 1000, 20_000  # rows that are explained, even over a larger angle; steps of a textbook method
+ROUND_OFF, FLOOR, FAR = 1e-10, 1e-12, 0.05  # errors that need no explanation, that are equally good, of another motion
 EXPLAINED, FIRST_ROW = 0.5, 0.05  # largest shares of the error that are left, the second by a start in another first row
-NO_GYROSCOPIC_TERM = "The gyroscopic term is missing: without a torque the angular velocity is constant"
-WORDS = {
+CHANGE, LIMIT = 1e-6, 3.2  # of fitted numbers: for slopes, and their largest size
+READINGS = {
     "transposed": "The attitudes are transposed, or the quaternions conjugated: they map world to body",
     "order xyzw": "The quaternion order is xyzw, but was read as wxyz",
     "order wxyz": "The quaternion order is wxyz, but was read as xyzw",
     "world rates": "The rates are in world axes",
 }
-Build = Callable[[Array, Case], tuple[Case, Motion]]
-"""From fitted numbers (k,), of order 1, and rows, to a reading of the rows and the motion next to it."""
+NO_TERM = "The gyroscopic term is missing: without a torque the angular velocity is constant"
+DAMPED = "The rates are damped by {damping:.4g} per second"
+FITTED: dict[str, tuple[str, Sequence[str]]] = {
+    "time shift": ("Constant time shift: the file is {shift:+.4g} s ahead of the exact motion", ("shift",)),
+    "phase drift": (
+        "Phase drift of order 1: the motion is {rate:+.3g} s per second too fast, so that errors grow in proportion to time",
+        ("shift", "rate"),
+    ),
+    "damped": (DAMPED, ("damping",)),
+    "no gyroscopic term": (NO_TERM, ()),
+    "no gyroscopic term, damped": (f"{NO_TERM}. {DAMPED}", ("damping",)),
+    "body axes": (
+        "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
+        [f"turn_{i}" for i in (1, 2, 3)],
+    ),
+    "another body": (
+        "It is the motion of another body, with principal moments {moments} kg m^2 (or multiples, if it is free)",
+        [f"stretch_{ij}" for ij in (11, 12, 13, 22, 23, 33)],
+    ),
+    "first row": (
+        "The first row does not fit the others: the motion starts at another attitude or other rates",
+        [f"start_{name}_{i}" for name in ("turn", "rate") for i in (1, 2, 3)],
+    ),
+}
+"""Sentences of the hypotheses with fitted numbers, and the names of these."""
 
 
 def _rates_first(f: Callable[[Array], Array], y: Array, h: float, corrections: int) -> Array:
@@ -70,6 +98,48 @@ class Finding:
     share: float
 
 
+def judge(scene: Scene, recording: Recording, from_row: bool) -> tuple[dict[str, Any], pd.DataFrame]:
+    """Return the summary of a recording as a motion of a scene, and rows of t, quantity and value.
+
+    The exact motion starts in the first row, or as the scene does. The summary has the largest errors, of attitudes, rad, and
+    of rates, relative to the largest; the unit of each in the file and its size, 0 if the file has none; and the diagnosis.
+    """
+    scene, (R, w) = rotation_only(scene), recording.data
+    whole = Case(scene, recording.t, (None, None), from_row)
+    case, notes = whole.read(R, w), [f"{len(recording.t):,} of {recording.rows:,} rows are compared."]
+    if not recording.order_known and R is not None:
+        other = whole.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
+        case, order = min((case, "wxyz"), (other, "xyzw"), key=lambda each: float(each[0].error.max()))
+        notes.append(f"The order of the quaternions is not named; {order} fits better.")
+    if not case.closed:
+        case = case.first(NUMERICAL, 2)
+        notes.append(f"Rows to {case.t[-1]:g} s are compared with a numerical solution: no closed form is known.")
+    if recording.ignored:
+        names = ", ".join(recording.ignored)
+        notes.append(f"{names} are not judged. If these angles turn body to world, name their sequence: --euler zyx.")
+    named, tried = diagnose(case, recording.norm is not None)
+    (R, w), error = case.data, case.error.max(axis=1).tolist()
+    rates = ("deg/s", float(np.degrees(case.scale))) if recording.degrees else ("rad/s", case.scale)
+    units = [("rad", float(R is not None)), (rates[0], rates[1] * (w is not None))]
+    of = zip(("attitude", "rate"), units, case.error, strict=True)
+    series: dict[str, Array] = {f"{name} error, {unit}": errors * size for name, (unit, size), errors in of if size}
+    if w is not None and (R is not None or scene.free):  # rates alone determine the energy of a free body
+        recorded = Trajectory(case.scene, case.t, np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R, w, "file")
+        kept = [each for each in case.scene.invariants if R is not None or each.unit == "J"]
+        series |= {f"drift of {each.name}": sizes(recorded.drift(each)) for each in kept}
+    if w is not None and scene.free and max(error) > FAR:
+        J, L = np.sort(scene.body.moments), np.linalg.norm(scene.body.momentum(w), axis=1)
+        gap = np.abs(kinetic_energy(scene.body, w) * 2 * J[1] / L**2 - 1)
+        if gap[-len(gap) // 10 :].max() < 0.1 * gap[0]:
+            notes.append("The energy approaches L^2/(2 I2): intermediate axis instability is created by the integrator.")
+    if recording.norm is not None:
+        series["quaternion norm, minus 1"] = np.abs(recording.norm - 1)[: len(case.t)]
+    quantities = [{"quantity": name, "largest": float(x.max()), "final": float(x[-1])} for name, x in series.items()]
+    rows = pd.concat(pd.DataFrame({"t": case.t, "quantity": name, "value": x}) for name, x in series.items())
+    found = {"quantities": quantities, "diagnosis": named, "tried": tried, "notes": notes}
+    return {"error": error, "units": units, **found}, rows
+
+
 def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Finding]]:
     """Return the hypothesis that explains the error, if any, and all that were tried, best first.
 
@@ -79,16 +149,16 @@ def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Findin
     """
     case = whole.first(LONGEST, FEWEST)
     case = case.take(slice(None, None, -(-len(case.t) // MOST)))
-    if case.error.max() <= ROUND_OFF:
-        return None, []
     tried: list[Finding] = []
-    for each in chain(_readings(case, quaternion), _motions(case), _steps(case), _turned(case), _bodies(case)):
+    if case.error.max() <= ROUND_OFF:
+        return None, tried
+    for each in chain(_readings(case, quaternion), _steps(case), (_fitted(case, name) for name in list(FITTED)[:-1])):
         tried.append(each)
         if max(each.left) <= ROUND_OFF:  # a turned free body is also another body: the order matters
             break
     named = tried
     if case.from_row:
-        start = _first_row(case.take(slice(1, None)))
+        start = _fitted(case, "first row")
         if max(map(abs, start.values.values())) <= max(start.left):
             named = [each for each in tried if max(each.left) <= EXPLAINED * max(start.left)]
         elif start.share <= FIRST_ROW < min(each.share for each in tried):
@@ -100,156 +170,101 @@ def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Findin
     return min(good, key=lambda each: (len(each.values), each.share), default=None), sorted(tried, key=lambda each: each.share)
 
 
-def _try(
-    case: Case, name: str, text: str, build: Build, names: Iterable[str] = (), units: Any = 1.0, first: Any = 0
-) -> Finding:
-    """Return the finding of a hypothesis with fitted numbers of these names, first fitted over the near rows."""
-    p = np.zeros(len(keys := list(names))) + first
-    for of in (case.first(NEAR, 10), case) if keys else ():
-        p = _fit(of, build, p)
-    read, motion = build(p, case)
-    values = dict(zip(keys, (p * units).tolist(), strict=True))
+def _finding(case: Case, name: str, text: str, values: dict[str, float], read: Case, motion: Motion) -> Finding:
+    """Return the finding of a hypothesis: a reading of the case, and the motion next to it."""
     left, plain = read.errors(motion).max(axis=1).tolist(), case.error.max(axis=1).tolist()
-    return Finding(name, text.format(**values), values, left, plain, max(left) / max(*plain, FLOOR))
+    text = text.format(**values, moments=np.sort(read.scene.body.moments).round(9).tolist())
+    return Finding(name, text, values, left, plain, max(left) / max(*plain, FLOOR))
 
 
-def _fit(case: Case, build: Build, p: Array) -> Array:
-    """Return the numbers of least squares by Gauss and Newton's method, with shorter steps where it overshoots."""
+def _fitted(case: Case, name: str) -> Finding:
+    """Return the finding of a hypothesis of `FITTED`, whose numbers are fitted over the near rows, then over all."""
+    text, names = FITTED[name]
+    exact = {"time shift": max(1, len(case.t) // 10), "phase drift": max(1, len(case.t) // 10), "first row": 1}
+    case = case.take(slice(exact.get(name, 0), None))  # an exact first row is not shifted, and times stay above 0
+    units = np.array([{"shift": 1 / case.scale, "damping": case.scale}.get(each, 1.0) for each in names])
 
-    def residuals(p: Array) -> Array:
-        read, motion = build(p, case)
+    def build(p: Array, of: Case) -> tuple[Case, Motion]:
+        part, scene = np.split(np.clip(p, -LIMIT, LIMIT), [3]), of.scene
+        if name == "body axes":
+            turn = Rotation.from_rotvec(p).as_matrix().T
+            of = of.read(*(None if each is None else each @ turn for each in of.data))
+        elif name == "another body":
+            stretch = expm(np.concatenate(part)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+            of = replace(of, scene=scene.rename(scene.name, body=RigidBody(stretch @ scene.body.inertia @ stretch)))
+        elif name == "first row":
+            R0, w0 = scene.R_WB0 @ Rotation.from_rotvec(part[0]).as_matrix(), scene.w_WB_B0 + part[1] * of.scale
+            of = replace(of, scene=scene.rename(scene.name, R_WB0=R0, w_WB_B0=w0))
+        elif "shift" in names:
+            shift, rate = np.clip(p[0] * units[0], -case.t[0] / 2, case.t[-1]), np.clip(sum(p[1:]), -0.4, 1.0)
+            return of, of.truth(of.t * (1 + rate) + shift)
+        else:
+            return of, of.move(of.t, name == "damped", float(sum(part[0] * units)))
+        return of, of.truth(of.t)
+
+    def residuals(p: Array, of: Case) -> Array:
+        read, motion = build(p, of)
         return read.differences(motion).ravel()
 
-    now = residuals(p)
-    for _ in range(8):
-        slopes = np.stack([residuals(p + each) - now for each in CHANGE * np.eye(len(p))], axis=1) / CHANGE
-        step = np.linalg.lstsq(slopes, -now, rcond=CHANGE)[0]
-        trials = ((p + share * step, residuals(p + share * step)) for share in (1.0, 0.3, 0.1, 0.01))
-        better = next(((q, found) for q, found in trials if found @ found < 0.99 * (now @ now)), None)
-        if better is None:
-            break
-        p, now = better
-    return p
+    def fit(p: Array) -> Finding:
+        for of in (case.first(NEAR, 10), case) if names else ():
+            better: Array | None = p
+            while better is not None:  # Gauss and Newton's method, with shorter steps where it overshoots
+                p, now = better, residuals(better, of)
+                slopes = np.stack([residuals(p + each, of) - now for each in CHANGE * np.eye(len(p))], axis=1) / CHANGE
+                trials = p + np.array([[1.0], [0.3], [0.1], [0.01]]) * np.linalg.lstsq(slopes, -now, rcond=CHANGE)[0]
+                better = next((q for q in trials if np.linalg.norm(residuals(q, of)) < 0.9 * np.linalg.norm(now)), None)
+        return _finding(case, name, text, dict(zip(names, (p * units).tolist(), strict=True)), *build(p, case))
 
-
-def _of(read: Case, p: Array, of: Case) -> tuple[Case, Motion]:
-    """Return other data or another scene next to its exact motion, over the times of some rows."""
-    read = read.take(slice(len(of.t)))
-    return read, read.truth(of.t)
+    if name != "body axes" or case.error.max() <= FAR:
+        return fit(np.zeros(len(names)))
+    near = case.first(NEAR, 10)
+    turns: Any = sorted(Rotation.create_group("O").as_rotvec(), key=lambda p: float(np.linalg.norm(residuals(p, near))))
+    return min(map(fit, turns[:4]), key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
 
 
 def _readings(case: Case, quaternion: bool) -> Iterator[Finding]:
     """Yield other readings of attitudes and rates."""
-    if (R := case.data[0]) is None:
+    R, w = case.data
+    if R is None:
         return
-    attitudes, q, w = {"": R, "transposed": np.swapaxes(R, 1, 2)}, to_quaternion(R), case.data[1]
+    attitudes = {"": R, "transposed": np.swapaxes(R, 1, 2)}
     if quaternion:
-        attitudes |= {f"order {name}": from_quaternion(np.roll(q, by, axis=1)) for name, by in (("xyzw", 1), ("wxyz", -1))}
+        rolled = (from_quaternion(np.roll(to_quaternion(R), by, axis=1)) for by in (1, -1))
+        attitudes |= dict(zip(("order xyzw", "order wxyz"), rolled, strict=True))
     for name, world in list(product(attitudes, ("", "world rates")))[1:]:
         names = [each for each in (name, world) if each]
         read = case.read(attitudes[name], (w[:, None] @ attitudes[name])[:, 0] if world and w is not None else w)
-        yield _try(case, ", ".join(names), ". ".join(WORDS[each] for each in names), partial(_of, read))
-
-
-def _turned(case: Case) -> Iterator[Finding]:
-    """Yield a motion in body axes that are turned by a constant rotation."""
-    R, w = case.data
-
-    def turned(p: Array, of: Case) -> tuple[Case, Motion]:
-        turn = Rotation.from_rotvec(p).as_matrix().T
-        return _of(case.read(None if R is None else R @ turn, None if w is None else w @ turn), p, of)
-
-    def size(p: Any, of: Case) -> float:
-        read, motion = turned(p, of)
-        return float(np.sum(read.differences(motion) ** 2))
-
-    near, first = case.first(NEAR, 10), np.zeros(3)
-    if case.error.max() > FAR:
-        turns: Any = sorted(Rotation.create_group("O").as_rotvec(), key=lambda p: size(p, near))
-        first = min((_fit(near, turned, each) for each in turns[:4]), key=lambda p: size(p, case))
-    text = "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad"
-    yield _try(case, "body axes", text, turned, ("turn_1", "turn_2", "turn_3"), first=first)
-
-
-def _motions(case: Case) -> Iterator[Finding]:
-    """Yield motions that are shifted in time, without the gyroscopic term, and damped."""
-    late = case.take(slice(max(1, len(case.t) // 10), None))  # an exact first row is not shifted; and times stay above 0
-    scale = case.scale
-
-    def shifted(p: Array, of: Case) -> tuple[Case, Motion]:
-        shift, rate = np.clip(p[0] / scale, -late.t[0] / 2, late.t[-1]), np.clip(1e-3 * sum(p[1:]), -0.4, 1.0)
-        return of, of.truth(of.t * (1 + rate) + shift)
-
-    text = "Constant time shift: the file is {shift:+.4g} s ahead of the exact motion"
-    yield _try(late, "time shift", text, shifted, ["shift"], 1 / scale)
-    text = "Phase drift: the motion is {rate:+.3g} s per second too fast, so that errors grow in proportion to time"
-    yield _try(late, "phase drift", text, shifted, ["shift", "rate"], [1 / scale, 1e-3])
-
-    def damped(gyroscopic: bool, p: Array, of: Case) -> tuple[Case, Motion]:
-        return of, of.move(of.t, gyroscopic, float(np.clip(sum(p), -0.1, 10.0)) * scale)
-
-    text = "The rates are damped by {damping:.4g} per second"
-    yield _try(case, "damped", text, partial(damped, True), ["damping"], scale)
-    yield _try(case, "no gyroscopic term", NO_GYROSCOPIC_TERM, partial(damped, False))
-    text, name = f"{NO_GYROSCOPIC_TERM}. {text}", "no gyroscopic term, damped"
-    yield _try(case, name, text, partial(damped, False), ["damping"], scale)
-
-
-def _bodies(case: Case) -> Iterator[Finding]:
-    """Yield the motion of a body with another inertia."""
-    scene = case.scene
-
-    def other(p: Array, of: Case) -> tuple[Case, Motion]:
-        stretch = expm(np.clip(p, -2.0, 2.0)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
-        J = stretch @ scene.body.inertia @ stretch
-        return _of(replace(case, scene=scene.rename(scene.name, body=RigidBody((J + J.T) / 2))), p, of)
-
-    found = _try(case, "another body", "", other, ("s11", "s12", "s13", "s22", "s23", "s33"))
-    body = other(np.array(list(found.values.values())), case)[0].scene.body
-    text = f"It is the motion of another body, with principal moments {np.sort(body.moments).round(9).tolist()} kg m^2"
-    yield replace(found, sentence=text + " or multiples" * scene.free)
-
-
-def _first_row(case: Case) -> Finding:
-    """Return the motion from an initial state that is fitted to the other rows."""
-
-    def moved(p: Array, of: Case) -> tuple[Case, Motion]:
-        (turn, rates), scene = np.clip(p, -1.0, 1.0).reshape(2, 3), case.scene
-        R0, w0 = scene.R_WB0 @ Rotation.from_rotvec(turn).as_matrix(), scene.w_WB_B0 + rates * case.scale
-        return _of(replace(case, scene=scene.rename(scene.name, R_WB0=R0, w_WB_B0=w0)), p, of)
-
-    text = "The first row does not fit the others: the motion starts at another attitude or other rates"
-    return _try(case, "first row", text, moved, ("turn_1", "turn_2", "turn_3", "rate_1", "rate_2", "rate_3"))
+        text = ". ".join(READINGS[each] for each in names)
+        yield _finding(case, ", ".join(names), text, {}, read, read.truth(read.t))
 
 
 def _steps(case: Case) -> Iterator[Finding]:
     """Yield motions by textbook methods, with a step that divides the distance of the rows."""
-    gap, axes, f = float(case.t[-1]) / (len(case.t) - 1), principal_axes(case.scene), partial(state_derivative(case.scene), 0.0)
+    gap, axes, exact = float(case.t[-1]) / (len(case.t) - 1), principal_axes(case.scene), state_derivative(case.scene)
     if np.ptp(np.diff(case.t)) > 1e-3 * gap or depends_on_time(case.scene.potential):
         return
 
-    def march(step: Callable[..., Array], parts: int, p: Any, of: Case) -> tuple[Case, Motion]:
+    def march(step: Callable[..., Array], parts: int, of: Case) -> Motion:
         y = before = np.append(axes.q0, axes.w0)
         kept = [y]
         with np.errstate(all="ignore"):
             for number in range(1, (len(of.t) - 1) * parts + 1):
-                y, before = step(f, y, gap / parts, f(before)), y
+                y, before = step(lambda y: exact(0.0, y), y, gap / parts, exact(0.0, before)), y
                 y[:4] /= np.linalg.norm(y[:4])
                 kept += [y] * (number % parts == 0)
-            return of, of.motion(np.array(kept))
+            return of.motion(np.array(kept))
 
     few = case.take(slice(0, FEWEST // 2))
-    exact = few.differences(few.truth(few.t))
+    truth = few.differences(few.truth(few.t))
     for name, (order, step) in TEXTBOOK.items():
         parts, ratio = [2], 1.0  # the error grows with the step to the power of the order
         while len(parts) < 8 and parts[-1] not in parts[:-1] and ratio > 0:
-            found = march(step, parts[-1], None, few)[1]
-            made = few.differences(found) - exact
-            ratio = float(-np.sum(exact * made) / (np.sum(made * made) or 1.0))
+            found = march(step, parts[-1], few)
+            made = few.differences(found) - truth
+            ratio = float(-np.sum(truth * made) / (np.sum(made * made) or 1.0))
             parts.append(int(np.clip(np.rint(parts[-1] * max(ratio, 1e-9) ** (-1 / order)), 1, STEPS // FEWEST)))
         if few.errors(found).max() <= EXPLAINED * few.error.max():
-            some, text = (
-                case.take(slice(0, STEPS // parts[-1])),
-                f"The rows follow {name} with a step of {gap / parts[-1]:.4g} s",
-            )
-            yield replace(_try(some, name, text, partial(march, step, parts[-1])), values={"step": gap / parts[-1]})
+            some, h = case.take(slice(0, STEPS // parts[-1])), gap / parts[-1]
+            text = f"The rows follow {name} with a step of {h:.4g} s"
+            yield _finding(some, name, text, {"step": h}, some, march(step, parts[-1], some))

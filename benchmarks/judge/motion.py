@@ -32,7 +32,7 @@ class Case:
     from_row: bool
 
     def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Case:
-        """Return the case of other data. The scene keeps the part of its initial state that they do not have."""
+        """Return the case of other attitudes and rates. The scene keeps the part of its initial state that they do not have."""
         data = {"R_WB0": R_WB, "w_WB_B0": w_WB_B}
         start = {name: values[0] for name, values in data.items() if self.from_row and values is not None}
         return replace(self, scene=self.scene.rename(self.scene.name, **start), data=(R_WB, w_WB_B))
@@ -64,12 +64,10 @@ class Case:
 
     def truth(self, t: Array) -> Motion:
         """Return the exact motion at ascending times (n,), s, from 0 or later."""
-        scene, field = self.scene, self.scene.potential
+        body, field, R0, w0 = self.scene.body, self.scene.potential, self.scene.R_WB0, self.scene.w_WB_B0
         if field is None:
-            return free_body(scene.body, scene.R_WB0, scene.w_WB_B0, t)
-        if self.closed:
-            return lagrange_top(scene.body, field, scene.R_WB0, scene.w_WB_B0, t)  # type: ignore[arg-type]
-        return self.move(t)
+            return free_body(body, R0, w0, t)
+        return lagrange_top(body, field, R0, w0, t) if self.closed else self.move(t)  # type: ignore[arg-type]
 
     def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> Motion:
         """Return the motion by SciPy's DOP853, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
@@ -93,11 +91,11 @@ class Case:
 
     def differences(self, motion: Motion) -> Array:
         """Return a motion minus the data (n, 12), in rad and relative to `scale`; 0 for what the file does not have."""
-        out = np.zeros((len(self.t), 12))
-        for part, unit, made, data in zip((slice(9), slice(9, 12)), (np.sqrt(2), self.scale), motion, self.data, strict=True):
-            if made is not None and data is not None:
-                out[:, part] = (made - data).reshape(len(out), -1) / unit
-        return np.clip(np.nan_to_num(out, nan=1e3), -1e3, 1e3)
+        out = [np.zeros((len(self.t), n)) for n in (9, 3)]
+        for i, unit in enumerate((np.sqrt(2), self.scale)):
+            if (made := motion[i]) is not None and (data := self.data[i]) is not None:
+                out[i] = (made - data).reshape(out[i].shape) / unit
+        return np.clip(np.nan_to_num(np.concatenate(out, axis=1), nan=1e3), -1e3, 1e3)
 
     def errors(self, motion: Motion) -> Array:
         """Return the sizes (2, n) of `differences`: angles between attitudes, rad, and differences of rates."""

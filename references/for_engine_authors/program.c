@@ -1,6 +1,6 @@
-/* rigid_step.h as a program for references/PROTOCOL.md, in the framing "lines".
+/* rigid_step.h as a program for references/PROTOCOL.md, in the framing "lines"; in float with -DSINGLE.
 
-       cc -O2 -o rigid_step references/for_engine_authors/program.c -lm
+       cc -O3 -o rigid_step references/for_engine_authors/program.c -lm
        conservative engines add ./rigid_step
        conservative run brick_flip --method rigid_step */
 
@@ -11,103 +11,66 @@
 #include <time.h>
 
 #include "rigid_step.h"
+#ifdef SINGLE
+typedef float real;
+#define RS(name) rsf_##name
+#else
+typedef double real;
+#define RS(name) rs_##name
+#endif
 
-typedef struct { rs_body body; rs_state start; double dt; int single, n_steps, n_samples; long *steps; double *samples; } run;
-
-/* Read the numbers of a field, at most `count`, and return how many there are. */
-static int numbers(const char *line, const char *name, double *out, int count) {
-  char key[32], *end;
+/* The i-th number of a field of a request, 0 without the field. */
+static double number(const char *line, const char *name, int i) {
+  char key[32];
   const char *at;
-  int n = 0;
-  snprintf(key, sizeof key, "\"%s\":", name);
+  snprintf(key, sizeof key, "\"%s\": ", name);
   if (!(at = strstr(line, key))) return 0;
-  for (at += strlen(key); n < count && *at && *at != ']' && *at != '}'; at = end) {
-    at += strspn(at, " [,");
-    out[n] = strtod(at, &end);
-    if (end == at) break;
-    n++;
+  for (at += strlen(key); i > 0; i--) at += strcspn(at, ",") + 1;
+  return strtod(at + strspn(at, "["), NULL);
+}
+
+/* Integrate a request so many times. Print `count` numbers of each sample, q and w, after the first `skip`. */
+static void integrate(const char *line, double calls, int skip, int count) {
+  const double weight = strstr(line, "\"free\": true") ? 0 : number(line, "mass", 0) * number(line, "gravity", 0);
+  const long n_steps = (long)number(line, "n_steps", 0), every = (long)number(line, "every", 0);
+  const real dt = (real)number(line, "dt", 0);
+  RS(body) body;
+  RS(state) start, s;
+  long i, n;
+  for (i = 0; i < 3; i++) {
+    body.J[i] = (real)number(line, "moments", (int)i), body.moment[i] = (real)(weight * number(line, "com", (int)i));
+    start.L[i] = body.J[i] * (real)number(line, "w0", (int)i);
   }
-  return n;
-}
-
-/* Integrate; samples are q and w, seven numbers each. In float if asked for: only the results are converted. */
-#define INTEGRATE(prefix, real)                                                                                                   \
-  {                                                                                                                                \
-    prefix##_body body;                                                                                                            \
-    prefix##_state s;                                                                                                              \
-    for (i = 0; i < 3; i++) body.J[i] = (real)r->body.J[i], body.moment[i] = (real)r->body.moment[i];                              \
-    for (i = 0; i < 4; i++) s.q[i] = (real)r->start.q[i];                                                                          \
-    for (i = 0; i < 3; i++) s.L[i] = (real)r->start.L[i];                                                                          \
-    for (n = 0; n <= r->n_steps; n++) {                                                                                            \
-      if (sample < r->n_samples && n == r->steps[sample]) {                                                                        \
-        for (i = 0; i < 7; i++) r->samples[7 * sample + i] = i < 4 ? s.q[i] : s.L[i - 4] / body.J[i - 4];                          \
-        sample++;                                                                                                                  \
-      }                                                                                                                            \
-      if (n < r->n_steps) prefix##_step(&body, (real)r->dt, &s);                                                                   \
-    }                                                                                                                              \
-  }
-
-static void integrate(run *r) {
-  int i, n, sample = 0;
-  if (r->single) INTEGRATE(rsf, float) else INTEGRATE(rs, double)
-}
-
-static void print(const char *name, const run *r, int first, int count) {
-  int i, k;
-  printf("\"%s\": [", name);
-  for (k = 0; k < r->n_samples; k++)
-    for (i = 0; i < count; i++)
-      printf("%s%.17g%s", i ? ", " : k ? ", [" : "[", r->samples[7 * k + first + i], i == count - 1 ? "]" : "");
-  printf("]");
-}
-
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+  for (i = 0; i < 4; i++) start.q[i] = (real)number(line, "q0", (int)i);
+  for (; calls > 0; calls--)
+    for (s = start, n = 0; n <= n_steps; n++) {
+      if (count && (n % every == 0 || n == n_steps))
+        for (i = 0; i < count; i++)
+          printf("%s%.17g%s", i ? ", " : n ? ", [" : "[", (double)(skip ? s.L[i] / body.J[i] : s.q[i]), i == count - 1 ? "]" : "");
+      if (n < n_steps) RS(step)(&body, dt, &s);
+    }
 }
 
 int main(void) {
-  char *line = NULL;
-  size_t size = 0;
-  run *runs = NULL;
-  int count = 0, i;
-  while (getline(&line, &size, stdin) > 0) {
-    double x[9] = {0}, start;
-    run *r = numbers(line, "run", x, 1) && x[0] >= 1 && x[0] <= count ? &runs[(int)x[0] - 1] : NULL;
+  char *line = NULL, **runs = NULL;
+  size_t size = 0, count = 0;
+  for (; getline(&line, &size, stdin) > 0; fflush(stdout)) {
+    const char *run = strstr(line, "\"run\":") && count ? runs[(size_t)number(line, "run", 0)] : NULL;
     if (strstr(line, "\"do\": \"hello\"")) {
       printf("{\"protocol\": 1, \"program\": \"rigid_step\", \"version\": \"1\", \"framing\": \"lines\", \"engine\": {\"order\": 2,"
-             " \"settings\": {\"precision\": \"f64\"}, \"choices\": {\"precision\": [\"f64\", \"f32\"]}, \"fields\":"
-             " [\"UniformGravity\"]}}");
+             " \"precision\": \"f%d\", \"fields\": [\"UniformGravity\"]}}\n", (int)(8 * sizeof(real)));
     } else if (strstr(line, "\"do\": \"prepare\"")) {
-      double mass = 0, gravity = 0, com[3] = {0}, *steps = malloc(line ? (strlen(line) + 1) * sizeof *steps : 0);
-      runs = realloc(runs, (size_t)(count + 1) * sizeof *runs);
-      r = &runs[count++];
-      numbers(line, "moments", r->body.J, 3), numbers(line, "q0", r->start.q, 4), numbers(line, "w0", x, 3);
-      for (i = 0; i < 3; i++) r->start.L[i] = r->body.J[i] * x[i];
-      numbers(line, "mass", &mass, 1), numbers(line, "gravity", &gravity, 1), numbers(line, "com", com, 3);
-      for (i = 0; i < 3; i++) r->body.moment[i] = strstr(line, "\"free\": true") ? 0 : mass * gravity * com[i];
-      numbers(line, "dt", &r->dt, 1), numbers(line, "n_steps", x, 1);
-      r->n_steps = (int)x[0], r->single = strstr(line, "\"f32\"") != NULL;
-      r->n_samples = numbers(line, "steps", steps, (int)strlen(line));
-      r->steps = malloc((size_t)r->n_samples * sizeof *r->steps);
-      r->samples = malloc(7 * (size_t)r->n_samples * sizeof *r->samples);
-      for (i = 0; i < r->n_samples; i++) r->steps[i] = (long)steps[i];
-      free(steps);
-      printf("{\"run\": %d}", count);
-    } else if (strstr(line, "\"do\": \"run\"") && r) {
-      integrate(r);
-      printf("{"), print("q", r, 0, 4), printf(", "), print("w", r, 4, 3), printf("}");
-    } else if (strstr(line, "\"do\": \"time\"") && r && numbers(line, "calls", x, 1)) {
-      for (start = seconds(); seconds() - start < 0.02;) integrate(r);
-      for (start = seconds(), i = 0; i < (int)x[0]; i++) integrate(r);
-      printf("{\"seconds\": %.9g}", seconds() - start);
-    } else if (strstr(line, "\"do\": \"check\"")) {
-      printf("{}");
+      runs = realloc(runs, (count + 1) * sizeof *runs), runs[count] = strdup(line);
+      printf("{\"run\": %zu}\n", count++);
+    } else if (strstr(line, "\"do\": \"run\"") && run) {
+      printf("{\"q\": ["), integrate(run, 1, 0, 4), printf("], \"w\": ["), integrate(run, 1, 4, 3), printf("]}\n");
+    } else if (strstr(line, "\"do\": \"time\"") && run) {
+      struct timespec a, b;
+      clock_gettime(CLOCK_MONOTONIC, &a), integrate(run, number(line, "calls", 0), 0, 0), clock_gettime(CLOCK_MONOTONIC, &b);
+      printf("{\"seconds\": %g}\n", (double)(b.tv_sec - a.tv_sec) + (double)(b.tv_nsec - a.tv_nsec) * 1e-9);
     } else {
-      printf("{\"error\": \"unsupported\", \"message\": \"one body at a time, in the framing lines\"}");
+      printf("{\"error\": \"unsupported\", \"message\": \"one body at a time, in the framing lines\"}\n");
     }
-    printf("\n"), fflush(stdout);
   }
   return 0;
 }

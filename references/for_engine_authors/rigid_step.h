@@ -47,14 +47,6 @@ static inline void RS(up)(const RS_REAL *q, RS_REAL *g) {
   g[2] = q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3];
 }
 
-/* Kinetic plus potential energy. */
-static inline RS_REAL RS(energy)(const RS(body) *body, const RS(state) *s) {
-  const RS_REAL *J = body->J, *L = s->L;
-  RS_REAL g[3];
-  RS(up)(s->q, g);
-  return (L[0] * L[0] / J[0] + L[1] * L[1] / J[1] + L[2] * L[2] / J[2]) / 2 + RS(dot)(body->moment, g);
-}
-
 /* The equation of the step for a, half of its Cayley vector: r = J a + a x (J a) - h/2 (L + h/2 (T - a x T)), without its terms in
    L and J a if `rest` is 0; T, the mean torque in the axes of the start; and the columns K of the derivative of r. */
 static inline void RS(equation)(const RS(body) *body, RS_REAL h, const RS_REAL *g, const RS_REAL *L, const RS_REAL *a, int rest,
@@ -135,7 +127,7 @@ static inline int RS(step)(const RS(body) *body, RS_REAL h, RS(state) *state) {
   int parts, done, i;
   for (parts = 1; parts <= 64; parts *= 2) {
     RS(state) s = *state;
-    for (done = 0; done < parts && RS(try)(body, h / parts, &s); done++) {}
+    for (done = 0; done < parts && RS(try)(body, h / (RS_REAL)parts, &s); done++) {}
     if (done == parts) { *state = s; return parts; }
   }
   RS(up)(state->q, g);

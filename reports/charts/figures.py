@@ -122,7 +122,7 @@ def drift(drifts: pd.DataFrame, scene: str) -> Any:
 
 
 def judged(rows: pd.DataFrame, name: str) -> Any:
-    """Return errors and drifts of a recorded motion after its first row, from `judgement.judge`, a panel for each quantity."""
+    """Return errors and drifts of a recorded motion after its first row, from `diagnose.judge`, a panel for each quantity."""
     panels = []
     for kind, part in rows.assign(shown=rows["value"].clip(lower=FLOOR)).query("t > 0").groupby("quantity", sort=False):
         base = alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 130, title=f"{name}: {kind}").mark_line(strokeWidth=1.4)

@@ -48,14 +48,14 @@ def judge(run: Path, body: str, rates: str, start: str, error: float, as_json: b
     """
     require_extra("conservative judge", "report")
     from conservative import registry
-    from conservative.benchmarks.judge import judgement, table
+    from conservative.benchmarks.judge import diagnose, table
 
     from ..charts import figures, style
     from ..sections.judge import build
 
     with output_files(out, FILES) as write:
         recording = table.read(run, world=rates == "world", **reading)
-        summary, rows = judgement.judge(registry.scene(body), recording, start == "row")
+        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row")
         document = build(summary, run.name, error)
         drawn = {"csv": lambda: rows.to_csv(index=False), "svg": lambda: style.svg_text(figures.judged(rows, run.name))}
         write(document, **drawn)

@@ -10,7 +10,7 @@ from ..document.model import Document, Emphasis, Items, Paragraph, Table, filled
 
 
 def build(summary: Mapping[str, Any], name: str, allowed: float) -> Document:
-    """Return the document of `judgement.judge` on the file `name`, whose error may be up to `allowed` (rad, or relative)."""
+    """Return the document of `diagnose.judge` on the file `name`, whose error may be up to `allowed` (rad, or relative)."""
 
     def amount(errors: Sequence[float]) -> str:
         units = zip(errors, summary["units"], strict=True)

@@ -67,7 +67,7 @@ def test_another_body_and_another_first_row_are_named():
     w[0] = FREE.w_WB_B0
     found = diagnosed(FREE, R, w)
     assert found.name == "first row"
-    assert found.values["rate_1"] == pytest.approx(1e-3 / np.linalg.norm(w, axis=1).max(), rel=1e-6)
+    assert found.values["start_rate_1"] == pytest.approx(1e-3 / np.linalg.norm(w, axis=1).max(), rel=1e-6)
 
 
 @pytest.mark.parametrize("scene", [FREE, HEAVY], ids=["free", "heavy"])
