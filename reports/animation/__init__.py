@@ -1,4 +1,4 @@
-"""Animations of motions: several trajectories side by side on one clock, as a page, as part of a page, or as a video.
+"""Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a video.
 
 Each panel draws the body as its inertia box, the box of constant density with the same moments, centred at the fixed point. An
 arrow is the angular momentum, relative to its initial size. A rod along one axis of the body leaves a trace.
@@ -16,31 +16,25 @@ from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 
-from conservative.errors import BadInput
+from conservative.errors import BadInput, require_extra
 from conservative.files import write_bytes
 from conservative.trajectory import Trajectory
 
-from .frames import Panel, make_panels
+from .frames import COLOURS, make_panels, speeds
 
 KINDS = (".html", ".gif", ".mp4")
 """Endings of files that contain an animation."""
 MARK = "Written by conservative watch"
 """Text near the beginning of each such file."""
-_LIMITS = {"attitude error": "1e-3 0.1"}
-"""Values up to which a number is green and amber; see `_DRIFTS` for the others."""
-_DRIFTS = "1e-10 1e-3"
+_HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True, eq=False)
 class Animation:
     """An animation of trajectories. A notebook shows it; `save` writes it into a file.
 
-    Attributes
-    ----------
-    trajectories, labels
-        The motions and the title of each panel.
-    truth
-        Index of the trajectory that is the reference solution, which the other panels show as an outline; None without one.
+    Attributes: `trajectories`, `labels` (the titles of the panels), and `truth`, the index of the reference solution, which the
+    other panels show as an outline, or None.
     """
 
     trajectories: Sequence[Trajectory]
@@ -53,46 +47,36 @@ class Animation:
         Raises
         ------
         BadInput
-            The name has another ending, or the file cannot be written.
+            The name has another ending, or the file cannot be written; or as in `element`.
         MissingExtra
-            matplotlib or imageio-ffmpeg, of the extra `video`, is not installed.
+            A package is not installed: for pages of the extra `report`, for videos of `video`.
         """
         write_bytes(Path(path), self.render(Path(path).suffix), "path")
 
     def render(self, kind: str, progress: Callable[[float], None] = lambda share: None) -> bytes:
-        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the share of a video."""
+        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the finished share of a video."""
         if kind not in KINDS:
             raise BadInput("path", f"a file that ends in {kind!r}", f"one that ends in {', '.join(KINDS)}")
         if kind == ".html":
-            return self._page().encode()
+            motion = element(self.trajectories, self.labels, truth=self.truth)
+            name = self.trajectories[0].scene.name
+            return _fill("page.html.j2", name=name, mark=MARK, motion=motion, script=script()).encode()
         from .video import draw
 
-        clock, panels = make_panels(self.trajectories, self.labels, self.truth)
-        return draw(clock, panels, self.truth, kind, MARK, progress)
-
-    def _page(self) -> str:
-        title = escape(self.trajectories[0].scene.name)
-        return (
-            f'<!DOCTYPE html>\n<!-- {MARK} -->\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
-            '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">\n'
-            "<style>:root { color-scheme: light; } body { font: 16px/1.4 system-ui, sans-serif; margin: 1rem auto; "
-            f"max-width: 78rem; padding: 0 1rem; }} h1 {{ font-size: 1.35rem; }}</style></head>\n<body><main><h1>{title}</h1>\n"
-            f"{element(self.trajectories, self.labels, truth=self.truth)}</main>\n{script()}</body></html>\n"
-        )
+        return draw(*make_panels(self.trajectories, self.labels, self.truth), self.truth, kind, MARK, progress)
 
     def _repr_html_(self) -> str:
         height = 160 + 330 * math.ceil(len(self.trajectories) / 4)
-        return f'<iframe srcdoc="{escape(self._page())}" style="width: 100%; height: {height}px; border: 0"></iframe>'
+        page = escape(self.render(".html").decode())
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: {height}px; border: 0"></iframe>'
 
 
 def script() -> str:
     """Return the style, the packed library and the player of all animations of a page, for the end of the page."""
-    style, library, player = ((Path(__file__).parent / name).read_bytes() for name in ("player.css", "three.js", "player.js"))
+    style, library, player = ((_HERE / name).read_bytes() for name in ("player.css", "three.js", "player.js"))
     packed = base64.b64encode(gzip.compress(library, mtime=0)).decode()
-    return (
-        f'<style>\n{style.decode()}</style>\n<script type="application/gzip" id="three">{packed}</script>\n'
-        f"<script>\n{player.decode()}</script>\n"
-    )
+    three = f'<script type="application/gzip" id="three">{packed}</script>'
+    return f"<style>\n{style.decode()}</style>\n{three}\n<script>\n{player.decode()}</script>\n"
 
 
 def element(
@@ -113,45 +97,27 @@ def element(
     truth
         Index of the reference solution, or None. The other panels show its attitude as an outline, and their attitude error.
     numbers
-        True to show the largest drifts and attitude error so far below each panel. The error is correct to the interpolation
-        between the samples of the truth, if the times of the samples differ.
+        True to show the largest drifts and attitude error so far below each panel. If the samples of the truth have other
+        times, the error includes that of the interpolation between them.
 
     Raises
     ------
     BadInput
         A trajectory has no samples, there is not one label for each, or the body turns too often to be watched.
     """
-    clock, panels = make_panels(trajectories, labels, truth)
-    if not numbers:
-        panels = [replace(panel, sizes={}) for panel in panels]
-    data = {
-        "duration": clock.duration,
-        "frames": len(clock.times),
-        "truth": truth,
-        "panels": [panel.data() for panel in panels],
-    }
-    content = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    speeds = "".join(f'<option value="{s:g}"{" selected" if s == clock.speed else ""}>{s:g}</option>' for s in clock.speeds)
-    return (
-        f'<div class="motion" id="{escape(id)}" role="group" aria-label="Animation of {escape(trajectories[0].scene.name)}">\n'
-        '<p class="missing" hidden>This browser has no WebGL, so the bodies are not drawn. The numbers below still follow the '
-        "slider. Open the page in another browser, or switch on hardware acceleration.</p>\n"
-        f'<div class="panels">{"".join(map(_panel, panels))}</div>\n<div class="controls">'
-        '<button type="button" class="play">Play</button><input class="time" type="range" min="0" '
-        f'max="{clock.duration!r}" step="{clock.duration / 1000!r}" value="0" aria-label="time, s">'
-        '<output class="clock"></output>'
-        f'<label>simulated s per s <select class="speed">{speeds}</select></label></div>\n'
-        f'<script type="application/json" class="data">{content}</script>\n</div>\n'
-    )
+    times, panels = make_panels(trajectories, labels, truth)
+    panels = panels if numbers else [replace(panel, sizes={}) for panel in panels]
+    duration, name = float(times[-1]), trajectories[0].scene.name
+    content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
+    data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)
+    safe = data.replace("<", "\\u003c")  # no end of the script
+    return _fill("motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=safe)
 
 
-def _panel(panel: Panel) -> str:
-    values = "".join(
-        f'<dt>{escape(name)}{", rad" * (name in _LIMITS)}</dt><dd data-limits="{_LIMITS.get(name, _DRIFTS)}"></dd>'
-        for name in panel.sizes
-    )
-    failed = f'<div class="ended" hidden>{escape(panel.outcome)}</div>' if panel.outcome else ""
-    return (
-        f'<figure><canvas role="img" aria-label="{escape(panel.label)}: the moving body"></canvas>'
-        f'<figcaption><strong>{escape(panel.label)}</strong><dl class="values">{values}{failed}</dl></figcaption></figure>'
-    )
+def _fill(template: str, **values: object) -> str:
+    require_extra("An animation", "report", "jinja2")
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(_HERE)
+    environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.get_template(template).render(values)

@@ -14,23 +14,22 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import require_extra
 
-from .frames import Clock, Panel
+from .frames import COLOURS, FACES, Panel, speeds
 
-FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")
-"""Colours of the faces +x, -x, +y, -y, +z and -z, as in the page."""
-ARROW, TRACE, OUTLINE, INK = "#009e73", "#cc3399", "#808890", "#202428"
+ARROW, TRACE, OUTLINE, INK = (str(COLOURS[name]) for name in ("arrow", "trace", "outline", "ink"))
 RATES = {".gif": 12.5, ".mp4": 30.0}
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, DPI = 1.92, 100
-"""Side of a panel, inches, and pixels per inch: multiples of 16 pixels, which encoders ask for."""
-EYE = np.array([math.cos(0.35) * math.cos(0.6), math.cos(0.35) * math.sin(0.6), math.sin(0.35)])
-"""Direction from the body to the eye, world axes, as in the page."""
+SIDE, BELOW, DPI = 1.92, 0.64, 100
+"""Sides of the picture of a panel and of the text below it, inches; multiples of 16 pixels, which encoders ask for."""
+TILT, TURN = 20.0, 34.4
+"""Direction to the eye, degrees, as in the page."""
+EYE = np.array([math.cos(math.radians(TURN)), math.sin(math.radians(TURN)), math.tan(math.radians(TILT))])
 _CORNERS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)]) / 2
 _SIDES = [np.flatnonzero(_CORNERS[:, axis] == sign / 2)[[0, 1, 3, 2]] for axis in range(3) for sign in (1, -1)]
 
 
 def draw(
-    clock: Clock, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
+    times: Array, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
 ) -> bytes:
     """Return a video with an ending of `RATES`, at the default speed, with `mark` as its comment.
 
@@ -40,115 +39,83 @@ def draw(
         matplotlib, or for .mp4 imageio-ffmpeg, is not installed.
     """
     require_extra(f"Writing {kind}", "video", "matplotlib", *["imageio_ffmpeg"] * (kind == ".mp4"))
-    images = _images(clock, panels, truth, RATES[kind], progress)
+    images = _images(times, panels, truth, RATES[kind], progress)
     if kind == ".gif":
-        from PIL import Image
+        from PIL import Image, ImageColor
 
-        inks = np.array([_rgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
-        shades = np.concatenate([[np.full(3, 255)], inks, (inks + 255) / 2, (inks + _rgb(INK)) / 2])  # blended at their edges
+        inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
+        shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2, (inks + inks[-1]) // 2])  # they blend at their edges
         palette = Image.new("P", (1, 1))
-        palette.putpalette(shades.astype(np.uint8).ravel().tolist())
+        palette.putpalette(shades.ravel().tolist())
         first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
-        out = io.BytesIO()
-        first.save(
-            out,
-            "GIF",
-            save_all=True,
-            append_images=rest,
-            duration=round(1000 / RATES[kind]),
-            loop=0,
-            comment=mark,
-            optimize=True,
-        )
+        out, options = io.BytesIO(), {"save_all": True, "append_images": rest, "loop": 0, "comment": mark, "optimize": True}
+        first.save(out, "GIF", duration=round(1000 / RATES[kind]), **options)
         return out.getvalue()
     import imageio_ffmpeg
 
     with tempfile.TemporaryDirectory() as folder:
-        file, first_image = Path(folder, "video.mp4"), next(images)
-        height, width = first_image.shape[:2]
-        options = ["-movflags", "+faststart", "-metadata", f"comment={mark}"]  # faststart: the comment comes first
-        writer = imageio_ffmpeg.write_frames(str(file), (width, height), fps=RATES[kind], quality=8, output_params=options)
+        file, image = Path(folder, "video.mp4"), next(images)
+        output = ["-movflags", "+faststart", "-metadata", f"comment={mark}"]  # faststart: the comment comes first
+        writer = imageio_ffmpeg.write_frames(str(file), image.shape[1::-1], fps=RATES[kind], quality=8, output_params=output)
         writer.send(None)
-        for image in (first_image, *images):
-            writer.send(np.ascontiguousarray(image))
+        for each in (image, *images):
+            writer.send(each)
         writer.close()
         return file.read_bytes()
 
 
 def _images(
-    clock: Clock, panels: Sequence[Panel], truth: int | None, rate: float, progress: Callable[[float], None]
+    times: Array, panels: Sequence[Panel], truth: int | None, rate: float, progress: Callable[[float], None]
 ) -> Iterator[Any]:
     """Yield the images (height, width, 3) of a video, bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    columns = min(len(panels), 4)
-    rows = math.ceil(len(panels) / columns)
-    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + 0.64)), dpi=DPI)
+    columns, rows = min(len(panels), 4), math.ceil(len(panels) / 4)
+    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + BELOW)), dpi=DPI)
     canvas: Any = FigureCanvasAgg(figure)
     axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
-    figure.subplots_adjust(0, 0.64 / (SIDE + 0.64) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=0.2)
-    count = max(2, round(clock.duration / clock.speed * rate))
-    for number, frame in enumerate(np.linspace(0, len(clock.times) - 1, count).round().astype(int)):
+    figure.subplots_adjust(0, BELOW / (SIDE + BELOW) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=BELOW / SIDE)
+    clock = figure.text(0.01, 0.99, "", va="top", size=8, color=INK)
+    count = max(2, round(times[-1] / speeds(times[-1])[2] * rate))
+    for number, frame in enumerate(np.linspace(0, len(times) - 1, count).round().astype(int)):
         progress(number / count)
+        exact = None if truth is None else panels[truth]
         for axis, panel in zip(axes, panels, strict=True):
-            outline = (
-                None if truth is None or panel is panels[truth] else panels[truth].R_WP[min(frame, len(panels[truth].R_WP) - 1)]
-            )
-            _draw_panel(axis, panel, min(frame, len(panel.R_WP) - 1), outline)
-        figure.texts.clear()
-        figure.text(0.01, 0.99, f"{clock.times[frame]:.2f} s", va="top", size=8, color=INK)
+            _draw_panel(axis, panel, frame, None if panel is exact else exact)
+        clock.set_text(f"{times[frame]:.2f} s")
         canvas.draw()
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _draw_panel(axes: Any, panel: Panel, frame: int, outline: Array | None) -> None:
+def _draw_panel(axes: Any, panel: Panel, frame: int, exact: Panel | None) -> None:
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     axes.clear()
     axes.set_axis_off()
-    axes.view_init(elev=math.degrees(math.asin(EYE[2])), azim=math.degrees(math.atan2(EYE[1], EYE[0])))
+    axes.view_init(elev=TILT, azim=TURN)
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_box_aspect((1, 1, 1), zoom=1.05)
-    R = panel.R_WP[frame]
-    corners = (_CORNERS * panel.size) @ R.T
-    normals = np.repeat(R.T, 2, axis=0) * np.tile([1.0, -1.0], 3)[:, None]
-    faces = [corners[side] for side in _SIDES]
-    seen = [k for k in range(6) if normals[k] @ EYE > 0]  # of a convex body, no face that is seen hides another one
-    axes.add_collection3d(
-        Poly3DCollection(
-            [faces[k] for k in seen], facecolors=[FACES[k] for k in seen], edgecolors=INK, linewidths=0.6, zorder=2
-        )
-    )
-    # What lies nearer to the eye than the fixed point is drawn after the box, the rest before it.
+    if exact is not None:
+        corners = (_CORNERS * panel.size) @ exact.R_WP[min(frame, len(exact.R_WP) - 1)].T
+        edges = [corners[side] for side in _SIDES]
+        axes.add_collection3d(Poly3DCollection(edges, facecolors="none", edgecolors=OUTLINE, linewidths=0.7, zorder=4))
+    frame = min(frame, len(panel.R_WP) - 1)
+    R, arrow = panel.R_WP[frame], 1.45 * panel.L_W[frame]
+    towards = np.repeat(EYE @ R, 2) * np.tile([1.0, -1.0], 3)
+    corners, seen = (_CORNERS * panel.size) @ R.T, np.flatnonzero(towards > 0)  # a seen face of a convex body hides no other
+    faces, colours = [corners[_SIDES[k]] for k in seen], [FACES[k] for k in seen]
+    axes.add_collection3d(Poly3DCollection(faces, facecolors=colours, edgecolors=INK, linewidths=0.6, zorder=2))
     trace = panel.R_WP[: frame + 1] @ panel.tip
+    with np.errstate(divide="ignore"):  # rod and arrow are drawn from where they leave the box
+        rods = [np.stack([min(np.min(panel.size / 2 / np.abs(end @ R)), 1.0) * end, end]) for end in (trace[-1], arrow)]
     segments = np.stack([trace[:-1], trace[1:]], axis=1)
-    rod, arrow = (_outside(end, R, panel.size) for end in (trace[-1], 1.45 * panel.L_W[frame]))
-    for lines, colour, width in ((segments, TRACE, 1.0), (rod, TRACE, 2.0), (arrow, ARROW, 2.6)):
-        near = lines.mean(axis=1) @ EYE > 0
+    for lines, colour, width in ((segments, TRACE, 1.0), (rods[0][None], TRACE, 2.0), (rods[1][None], ARROW, 2.6)):
+        near = lines.mean(axis=1) @ EYE > 0  # nearer to the eye than the fixed point: drawn after the box, the rest before
         for part, order in ((lines[~near], 1), (lines[near], 3)):
             if len(part):
                 axes.add_collection3d(Line3DCollection(part, colors=colour, linewidths=width, zorder=order))
-    axes.scatter(*1.45 * panel.L_W[frame], color=ARROW, marker="^", s=34, depthshade=False, zorder=3)
-    if outline is not None:
-        corners = (_CORNERS * panel.size) @ outline.T
-        edges = [corners[side] for side in _SIDES]
-        axes.add_collection3d(Poly3DCollection(edges, facecolors="none", edgecolors=OUTLINE, linewidths=0.7, zorder=4))
-    values = [f"{name}{', rad:' * (name == 'attitude error')} {_text(series[frame])}" for name, series in panel.sizes.items()]
+    axes.scatter(*arrow, color=ARROW, marker="^", s=34, depthshade=False, zorder=3)
+    values = "\n".join(f"{name}: {panel.text(name, frame)[0]}" for name in panel.sizes)
     axes.text2D(0.5, 0.0, panel.label, transform=axes.transAxes, ha="center", va="top", size=8, weight="bold", color=INK)
-    axes.text2D(0.5, -0.08, "\n".join(values), transform=axes.transAxes, ha="center", va="top", size=7, color=INK)
-
-
-def _outside(end: Array, R_WP: Array, size: Array) -> Array:
-    """Return the part outside the box of the segment from the fixed point to `end` (3,), (1, 2, 3)."""
-    with np.errstate(divide="ignore"):
-        leaves = float(np.min(size / 2 / np.abs(end @ R_WP)))
-    return np.stack([min(leaves, 1.0) * end, end])[None]
-
-
-def _rgb(colour: str) -> Array:
-    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], dtype=float)
-
-
-def _text(value: float) -> str:
-    return "< 1e-15" if value < 1e-15 else f"{value:.1g}" if 0.1 <= value < 10 else f"{value:.0e}".replace("e-0", "e-")
+    axes.text2D(0.5, -0.08, values, transform=axes.transAxes, ha="center", va="top", size=7, color=INK)
