@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import combinations, product
+from itertools import combinations, permutations, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from ..environments.environment import find_environment, list_environments
 from ..worker.calls import python_worker
 from ..worker.client import EngineCrashed, EngineTimeout, time_limit
 from . import loaders
-from .description import Link, Part, join_links, kind_of, make_pose, read_links
+from .description import Link, Part, join_links, kind_of, make_pose, read_links, steiner
 from .loaders import LOADERS
 
 LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
@@ -32,6 +34,7 @@ LIMIT, MEMORY = 300.0, 2**33
 CASES = 24
 RATE = 3.0
 """Number of cases, half of them without force and torque, and their typical rate, rad/s."""
+Mistake = Callable[[list[Link]], list[Link]]
 CATALOGUE = Path(__file__).parent / "models"
 
 
@@ -61,81 +64,85 @@ class Finding:
     error: float = 0.0
 
 
-def _each(change: Callable[[Link], Link]) -> Callable[[list[Link]], list[Link]]:
-    return lambda links: [change(link) for link in links]
+def _all(change: Callable[[Link], dict[str, Any]]) -> Mistake:
+    return lambda links: [replace(link, **change(link)) for link in links]
 
 
-def _children(change: Callable[[Link], Link]) -> Callable[[list[Link]], list[Link]]:
-    return lambda links: [links[0], *(change(link) for link in links[1:])]
+def _children(change: Callable[[Link], dict[str, Any]]) -> Mistake:
+    return lambda links: [links[0], *(replace(link, **change(link)) for link in links[1:])]
 
 
-def _turned(link: Link, R: Array, inertia: Array) -> Link:
-    return replace(link, frame=make_pose(link.frame[:3, 3], R), inertia=inertia)
-
-
-def _axes(link: Link, order: tuple[int, ...], transposed: bool = False) -> Link:
-    """Return the link with its ascending principal moments in another order about the same axes, or about transposed ones."""
+def _ordered(link: Link, order: Sequence[int]) -> dict[str, Any]:
     moments, axes = np.linalg.eigh(link.inertia)
-    axes = axes.T if transposed else axes
-    return replace(link, inertia=(axes * moments[list(order)]) @ axes.T)
+    return {"inertia": (axes * moments[list(order)]) @ axes.T}
 
 
-def _shift(link: Link, sign: float) -> Link:
-    c = link.frame[:3, :3].T @ link.frame[:3, 3]
-    return replace(link, inertia=link.inertia + sign * link.mass * (c @ c * np.eye(3) - np.outer(c, c)))
+def _transposed(link: Link) -> dict[str, Any]:
+    moments, axes = np.linalg.eigh(link.inertia)
+    return {"inertia": (axes.T * moments) @ axes}
 
 
-def _from_geometry(link: Link, density: float | None, com: bool) -> Link:
+def _from_geometry(link: Link, mass: float, com: bool) -> dict[str, Any]:
     if not link.geometry.mass:
-        return link
-    part = link.geometry.scale(link.mass / link.geometry.mass if density is None else density / 1000)
-    filled = link.filled(part)
-    return filled if com else replace(filled, frame=make_pose(link.frame[:3, 3]))
+        return {}
+    part = link.geometry.scale(mass / link.geometry.mass)
+    return {"mass": mass, "frame": make_pose(part.com if com else link.frame[:3, 3]), "inertia": part.inertia}
 
 
-MISTAKES: dict[str, Callable[[list[Link]], list[Link]]] = {
-    "the rotation of the inertial frame is ignored": _each(lambda k: _turned(k, np.eye(3), k.inertia)),
-    "R I instead of R I R'": _each(lambda k: _turned(k, np.eye(3), k.frame[:3, :3] @ k.inertia)),
-    "the rotation of the inertial frame is inverted": _each(lambda k: _turned(k, k.frame[:3, :3].T, k.inertia)),
-    "the products of inertia are dropped": _each(lambda k: replace(k, inertia=np.diag(np.diag(k.inertia)))),
-    "the products of inertia have the other sign": _each(
-        lambda k: replace(k, inertia=2 * np.diag(np.diag(k.inertia)) - k.inertia)
-    ),
-    "the principal axes are transposed": _each(lambda k: _axes(k, (0, 1, 2), True)),
+def _moved(link: Link, sign: float) -> dict[str, Any]:
+    return {"inertia": link.inertia + sign * steiner(link.mass, link.frame[:3, :3].T @ link.frame[:3, 3])}
+
+
+def _collapsed(links: list[Link]) -> list[Link]:
+    whole, root = join_links(links), join_links(links[:1])
+    others = [replace(link, frame=make_pose(R=link.frame[:3, :3])) for link in links[1:]]
+    moved = sum((join_links([link]).inertia + steiner(link.mass, link.pose[:3, 3]) for link in others), root.inertia)
+    return [Link(np.eye(4)).filled(replace(whole, inertia=moved))]
+
+
+MISTAKES: dict[str, Mistake] = {
+    "the rotation of the inertial frame is ignored": _all(lambda k: {"frame": make_pose(k.frame[:3, 3])}),
+    "R I instead of R I R'": _all(lambda k: {"frame": make_pose(k.frame[:3, 3]), "inertia": k.frame[:3, :3] @ k.inertia}),
+    "the rotation of the inertial frame is inverted": _all(lambda k: {"frame": make_pose(k.frame[:3, 3], k.frame[:3, :3].T)}),
+    "the products of inertia are dropped": _all(lambda k: {"inertia": np.diag(np.diag(k.inertia))}),
+    "the products of inertia have the other sign": _all(lambda k: {"inertia": 2 * np.diag(np.diag(k.inertia)) - k.inertia}),
+    "the principal axes are transposed": _all(_transposed),
     **{
-        f"the principal moments are about the wrong axes ({order})": _each(lambda k, order=order: _axes(k, order))  # type: ignore[misc]
-        for order in ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
+        f"the principal moments are in another order, {order}": _all(partial(_ordered, order=order))
+        for order in list(permutations(range(3)))[1:]
     },
-    "the inertia is that of the geometry": _each(lambda k: _from_geometry(k, None, False)),
-    "inertia and centre of mass are those of the geometry": _each(lambda k: _from_geometry(k, None, True)),
-    "mass, centre of mass and inertia are those of the geometry at 1000 kg/m^3": _each(lambda k: _from_geometry(k, 1000, True)),
-    "the inertia is taken about the origin of the link": _each(lambda k: _shift(k, -1)),
-    "the inertia is moved away from the centre of mass": _each(lambda k: _shift(k, 1)),
-    "the centre of mass is at the origin of the link": _each(lambda k: replace(k, frame=make_pose(R=k.frame[:3, :3]))),
-    "the mass of fixed children is lost": _children(lambda k: replace(k, mass=0.0, inertia=np.zeros((3, 3)))),
-    "the inertia of fixed children is lost": _children(lambda k: replace(k, inertia=np.zeros((3, 3)))),
-    "the rotation of fixed children is ignored": _children(lambda k: replace(k, pose=make_pose(k.pose[:3, 3]))),
-    "the place of fixed children is ignored": _children(lambda k: replace(k, pose=make_pose(R=k.pose[:3, :3]))),
-    "the inertia is the unit matrix": _each(lambda k: replace(k, inertia=np.eye(3))),
-    "mass and inertia are 1": _each(lambda k: replace(k, mass=1.0, inertia=np.eye(3))),
-    "the three moments are made equal": _each(lambda k: replace(k, inertia=np.trace(k.inertia) / 3 * np.eye(3))),
+    "the inertia is that of the geometry": _all(lambda k: _from_geometry(k, k.mass, False)),
+    "inertia and centre of mass are those of the geometry": _all(lambda k: _from_geometry(k, k.mass, True)),
+    "mass and inertia are those of the geometry at 1000 kg/m^3": _all(lambda k: _from_geometry(k, k.geometry.mass, True)),
+    "the inertia is taken about the origin of the link": _all(lambda k: _moved(k, -1)),
+    "the inertia is moved away from the centre of mass": _all(lambda k: _moved(k, 1)),
+    "the centre of mass is at the origin of the link": _all(lambda k: {"frame": make_pose(R=k.frame[:3, :3])}),
+    "the mass of fixed children is lost": _children(lambda k: {"mass": 0.0, "inertia": np.zeros((3, 3))}),
+    "the inertia of fixed children is lost": _children(lambda k: {"inertia": np.zeros((3, 3))}),
+    "the rotation of fixed children is ignored": _children(lambda k: {"pose": make_pose(k.pose[:3, 3])}),
+    "the place of fixed children is ignored": _children(lambda k: {"pose": make_pose(R=k.pose[:3, :3])}),
+    "fixed children are moved to the origin of the root link, not to the common centre of mass": _collapsed,
+    "the inertia is lost": _all(lambda k: {"inertia": np.zeros((3, 3))}),
+    "the inertia is the unit matrix": _all(lambda k: {"inertia": np.eye(3)}),
+    "mass and inertia are 1": _all(lambda k: {"mass": 1.0, "inertia": np.eye(3)}),
+    "the three moments are made equal": _all(lambda k: {"inertia": np.trace(k.inertia) / 3 * np.eye(3)}),
 }
 """Known mistakes of loaders, as functions from the links of a file to the links that a loader makes of them."""
 
 
 def accelerations(part: Part, cases: Array) -> Array:
-    """Return angular accelerations and accelerations of the origin (n, 6) of a body, for cases (n, 12) as in `loaders`.
+    """Return the accelerations (n, 6) of a body for velocities and forces (n, 2, 6), as in `loaders`.
 
     Newton and Euler about the centre of mass c: m a_c = F, J w' = T - c x F - w x J w, a = a_c - w' x c - w x (w x c).
     """
-    w, _, force, torque = np.moveaxis(np.reshape(cases, (-1, 4, 3)), 1, 0)
+    _, w, force, torque = np.moveaxis(np.reshape(cases, (-1, 4, 3)), 1, 0)
     moment = torque - np.cross(part.com, force) - np.cross(w, w @ part.inertia.T)
     turn = np.linalg.solve(part.inertia, moment.T).T
-    return np.hstack([turn, force / part.mass - np.cross(turn, part.com) - np.cross(w, np.cross(w, part.com))])
+    return np.hstack([force / part.mass - np.cross(turn, part.com) - np.cross(w, np.cross(w, part.com)), turn])
 
 
 def make_cases(part: Part) -> Array:
-    """Return generic rates, velocities, forces and torques (n, 12) for a body, so that all terms are of one order."""
+    """Return generic rates, velocities, forces and torques (n, 2, 6) for a body, so that all terms are of one order."""
     rng, size = np.random.default_rng(2026), np.sqrt(np.trace(part.inertia) / part.mass)
     w, force, torque = (
         rng.normal(size=(3, CASES, 3))
@@ -143,7 +150,7 @@ def make_cases(part: Part) -> Array:
         * np.array((1, part.mass * size * RATE, part.mass * size**2 * RATE))[:, None, None]
     )
     force[::2] = torque[::2] = 0
-    return np.hstack([w, -np.cross(w, part.com), force, torque + np.cross(part.com, force)])
+    return np.hstack([-np.cross(w, part.com), w, force, torque + np.cross(part.com, force)]).reshape(-1, 2, 6)
 
 
 def identify(cases: Array, measured: Array, near: Part) -> Part:
@@ -155,9 +162,9 @@ def identify(cases: Array, measured: Array, near: Part) -> Part:
     rows, right = [], []
     size = np.sqrt(abs(np.trace(near.inertia) / near.mass))
     units = near.mass, near.mass * size, near.mass * size**2
-    for (w, _, force, torque), given in zip(np.reshape(cases, (-1, 4, 3)), measured, strict=True):
-        turn, P = given[:3], near.com
-        a = given[3:] + np.cross(turn, P) + np.cross(w, np.cross(w, P))
+    for (_, w, force, torque), given in zip(np.reshape(cases, (-1, 4, 3)), measured, strict=True):
+        turn, P = given[3:], near.com
+        a = given[:3] + np.cross(turn, P) + np.cross(w, np.cross(w, P))
         W = hat(w)
         A = np.zeros((6, 13))
         A[:3, 0], A[:3, 1:4] = a * units[0] / units[1], hat(turn) + W @ W
@@ -167,23 +174,17 @@ def identify(cases: Array, measured: Array, near: Part) -> Part:
         right.append(np.concatenate([force / units[1], (torque - np.cross(P, force)) / units[2]]))
     x = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0]
     mass, d = x[0] * units[0], x[1:4] / x[0] * size
-    inertia = x[4:].reshape(3, 3) * units[2] - mass * (d @ d * np.eye(3) - np.outer(d, d))
+    inertia = x[4:].reshape(3, 3) * units[2] - steiner(mass, d)
     return Part(float(mass), near.com + d, inertia)
 
 
-def distance(part: Part, other: Part) -> float:
-    """Return the largest relative difference of mass, centre of mass and inertia from those of `part`."""
-    size = np.sqrt(abs(np.trace(part.inertia) / part.mass))
-    return float(
-        np.nan_to_num(
-            max(
-                abs(other.mass / part.mass - 1),
-                np.linalg.norm(other.com - part.com) / size,
-                np.linalg.norm(other.inertia - part.inertia) / np.linalg.norm(part.inertia),
-            ),
-            nan=np.inf,
-        )
-    )
+def distance(part: Part, other: Part, scale: Part | None = None) -> float:
+    """Return the largest difference of mass, centre of mass and inertia, relative to those of `scale`, by default `part`."""
+    unit = scale or part
+    size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass))
+    parts = (other.mass - part.mass) / unit.mass, (other.com - part.com) / size, other.inertia - part.inertia
+    errors = [np.linalg.norm(parts[0]), np.linalg.norm(parts[1]), np.linalg.norm(parts[2]) / np.linalg.norm(unit.inertia)]
+    return float(np.nan_to_num(max(errors), nan=np.inf))
 
 
 def _list(values: Array) -> str:
@@ -198,7 +199,7 @@ def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
         for name in names:
             changed = MISTAKES[name](changed)
         part = join_links(changed)
-        if part.mass and np.linalg.det(part.inertia) and distance(part, seen) < tolerance:
+        if part.mass and distance(wanted, part) > tolerance > distance(part, seen, wanted):
             return ", and ".join(names)
     for factor, name in ((np.pi / 180, "degrees are read as radians"), (180 / np.pi, "radians are read as degrees")):
         if kind_of(path) != "usd" and distance(join_links(read_links(path, 1 / factor)), seen) < tolerance:
@@ -264,8 +265,8 @@ class Program:
             with time_limit(LIMIT):
                 given = {"engine": self.engine, "path": str(path.resolve()), "kind": kind_of(path), "cases": cases}
                 result = self.worker.ask("call", adapter=self._adapter, function="probe", **given)
-        except NotImplementedError:
-            return answer("")
+        except NotImplementedError as error:
+            return answer("", str(error))
         except (EngineCrashed, EngineTimeout) as failure:
             return answer("crashed", str(failure.outcome))
         if words := result.get("refused", ""):
@@ -275,12 +276,13 @@ class Program:
             return answer("wrong", "accelerations that are not finite")
         seen = identify(cases, measured, wanted)
         expected = accelerations(wanted, cases)
-        error = float(np.abs(measured - expected).max() / np.abs(expected).max())
+        worst = float(np.abs(measured - expected).max() / np.abs(expected).max())
         tolerance = 1e-2 if self.engine in SINGLE else 1e-4
         if distance(wanted, seen) < tolerance and not flaw:
-            return answer("right", "", seen, error)
-        said = f"; it prints: {result['output'][:200]}" if result["output"] else ""
+            return answer("right", "", seen, worst)
+        said = re.search(r"[^.:]*(inertia|mass|moment)[^.]*", result["output"], re.IGNORECASE)
+        prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
         if flaw and said and seen.flaw == "":
-            return answer("right", f"it repairs the inertia{said}", seen, error)
+            return answer("right", f"it repairs the inertia{prints}", seen, worst)
         what = f"{flaw}, and it does not say so" if flaw else explain(path, links, seen, tolerance)
-        return answer("wrong", what + said, seen, error)
+        return answer("wrong", what + prints, seen, worst)

@@ -98,8 +98,13 @@ def join(parts: Iterable[Part]) -> Part:
     inertia = np.zeros((3, 3))
     for part in parts:
         d = part.com - com
-        inertia = inertia + part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        inertia = inertia + part.inertia + steiner(part.mass, d)
     return Part(mass, com, inertia)
+
+
+def steiner(mass: float, d: Array) -> Array:
+    """Return the inertia (3, 3) of a point mass at d (3,) about the origin."""
+    return mass * (d @ d * np.eye(3) - np.outer(d, d))
 
 
 def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Array:

@@ -1,37 +1,33 @@
 """Each engine's own loader, and the accelerations of the body that it makes. Runs in the environments of engines.
 
-A loader is a function `name(path, kind)` that loads a file and returns `accelerate(w, v, force, torque)`, whose arguments (3,)
-are rates, the velocity of the origin of the root link, and a force and torque there, in its axes. It returns the angular
-acceleration and the acceleration of the origin. Engines without such a function make one short step from the identity.
+A loader `_name(path, kind)` returns a function from a velocity (6,) and a force (6,) at the origin of the root link to the
+acceleration (6,) of that origin, all linear before angular and in its axes. Some engines make one short step for it.
 """
-
-from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 
 import numpy as np
 
 STEP64, STEP32 = 2.0**-17, 2.0**-10
-"""Steps, s, of engines whose accelerations are differences: their errors are near 1e-5 and 1e-3 of the acceleration."""
+"""Such steps, s, in double and single precision. Their errors are up to 1e-5 and 5e-3 of the acceleration."""
+PLACE = np.array([0.0, 0, 0, 1, 0, 0, 0])
 
 
 def probe(engine, path, kind, cases):
-    """Return accelerations (n, 6), angular and of the origin, for cases (n, 12) of `accelerate`, or the reason of a refusal.
-
-    `output` is what the engine printed while it loaded the file.
-    """
-    with tempfile.TemporaryFile() as stream:
-        kept = os.dup(2)
+    """Return accelerations (n, 6) for velocities and forces (n, 2, 6), or the reason of a refusal; and the engine's output."""
+    answer, kept = {}, os.dup(2)
+    with tempfile.TemporaryFile() as stream, warnings.catch_warnings():
+        warnings.simplefilter("always")
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
-        answer = {}
         try:
             accelerate = LOADERS[engine](path, kind)
-        except NotImplementedError:
-            raise
+        except (NotImplementedError, ImportError) as error:
+            raise NotImplementedError(str(error)) from None
         except (Exception, SystemExit) as error:
-            answer = {"refused": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+            answer["refused"] = f"{type(error).__name__}: {' '.join(str(error).split())}"
         finally:
             os.dup2(kept, 1)
             os.dup2(kept, 2)
@@ -39,293 +35,228 @@ def probe(engine, path, kind, cases):
         stream.seek(0)
         answer["output"] = " ".join(stream.read(65536).decode(errors="replace").split())
     if "refused" not in answer:
-        answer["accelerations"] = np.array([np.concatenate(accelerate(*np.reshape(case, (4, 3)))) for case in cases])
+        answer["accelerations"] = np.array([accelerate(*case) for case in cases], float)
     return answer
 
 
-def mujoco(path, kind):
-    """Return `accelerate` of MuJoCo: `mj_forward` with the free joint's own coordinates."""
+def _choose(kind, **readers):
+    if readers.get(kind) is None:
+        raise NotImplementedError
+    return readers[kind]
+
+
+def _linear(vector):
+    return np.concatenate([vector, np.zeros(3)])
+
+
+def _compile_mujoco(path, kind):
+    """Return MuJoCo's model of a file, on a free joint, without gravity and contacts."""
     import mujoco
 
-    model = _mujoco_model(path, kind)
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0, 0, 0, 1, 0, 0, 0
+    spec = _choose(kind, urdf=mujoco.MjSpec, mjcf=mujoco.MjSpec).from_file(path)
+    if not spec.joints:
+        spec.worldbody.first_body().add_freejoint()
+    spec.option.gravity, spec.option.disableflags = [0, 0, 0], int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    return mujoco, spec.compile()
 
-    def accelerate(w, v, force, torque):
-        data.qvel[:], data.qfrc_applied[:] = [*v, *w], [*force, *torque]
+
+def _mujoco(path, kind):
+    mujoco, model = _compile_mujoco(path, kind)
+    data = mujoco.MjData(model)
+    data.qpos[:] = PLACE
+
+    def accelerate(v, force):
+        data.qvel[:], data.qfrc_applied[:] = v, force
         mujoco.mj_forward(model, data)
-        return data.qacc[3:], data.qacc[:3]
+        return data.qacc.copy()
 
     return accelerate
 
 
-def _mujoco_model(path, kind):
-    """Return the model of a file, on a free joint, without gravity, contacts and passive forces."""
-    import mujoco
-
-    if kind not in ("urdf", "mjcf"):
-        raise NotImplementedError
-    spec = mujoco.MjSpec.from_file(path)
-    if not spec.joints:
-        spec.worldbody.first_body().add_freejoint()
-    spec.option.gravity = [0, 0, 0]
-    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    return spec.compile()
-
-
-def mjx(path, kind):
-    """Return `accelerate` of MJX: `mjx.forward` in double precision."""
+def _mjx(path, kind):
     import jax
     from mujoco import mjx
 
-    model = mjx.put_model(_mujoco_model(path, kind))
-    data = mjx.make_data(model).replace(qpos=jax.numpy.array([0.0, 0, 0, 1, 0, 0, 0]))
-    forward = jax.jit(lambda qvel, force: mjx.forward(model, data.replace(qvel=qvel, qfrc_applied=force)).qacc)
-
-    def accelerate(w, v, force, torque):
-        qacc = np.asarray(forward(np.concatenate([v, w]), np.concatenate([force, torque])))
-        return qacc[3:], qacc[:3]
-
-    return accelerate
+    model = mjx.put_model(_compile_mujoco(path, kind)[1])
+    data = mjx.make_data(model).replace(qpos=jax.numpy.array(PLACE))
+    return jax.jit(lambda v, force: mjx.forward(model, data.replace(qvel=v, qfrc_applied=force)).qacc)
 
 
-def mjwarp(path, kind):
-    """Return `accelerate` of MuJoCo Warp: `forward`, in single precision."""
-    import mujoco
+def _mjwarp(path, kind):
     import mujoco_warp
-    import warp
 
-    warp.config.quiet = True
-    warp.set_device("cpu")
-    host = _mujoco_model(path, kind)
+    mujoco, host = _compile_mujoco(path, kind)
     model, data = mujoco_warp.put_model(host), mujoco_warp.put_data(host, mujoco.MjData(host))
-    data.qpos.assign(np.array([[0, 0, 0, 1, 0, 0, 0]], np.float32))
+    data.qpos.assign(PLACE[None].astype(np.float32))
 
-    def accelerate(w, v, force, torque):
-        data.qvel.assign(np.array([[*v, *w]], np.float32))
-        data.qfrc_applied.assign(np.array([[*force, *torque]], np.float32))
+    def accelerate(v, force):
+        data.qvel.assign(v[None].astype(np.float32))
+        data.qfrc_applied.assign(force[None].astype(np.float32))
         mujoco_warp.forward(model, data)
-        qacc = data.qacc.numpy()[0]
-        return qacc[3:], qacc[:3]
+        return data.qacc.numpy()[0]
 
     return accelerate
 
 
-def pinocchio(path, kind):
-    """Return `accelerate` of Pinocchio: `aba` on a free flyer."""
+def _brax(path, kind):
+    import jax
+    from brax.generalized import dynamics, pipeline
+    from brax.io import mjcf
+
+    system = _choose(kind, mjcf=mjcf.load)(path).replace(mj_model=None)
+    system = system.replace(gravity=0 * system.gravity)
+
+    @jax.jit
+    def accelerate(v, force):
+        state = pipeline.init(system, PLACE, v)
+        return jax.numpy.linalg.solve(state.mass_mx, dynamics.forward(system, state, force))
+
+    return accelerate
+
+
+def _pinocchio(path, kind):
     import pinocchio as pin
 
-    build = {
-        "urdf": pin.buildModelFromUrdf,
-        "mjcf": pin.buildModelFromMJCF,
-        "sdf": getattr(pin, "buildModelFromSdf", None),
-    }.get(kind)
-    if build is None:
-        raise NotImplementedError
+    build = _choose(kind, urdf=pin.buildModelFromUrdf, mjcf=pin.buildModelFromMJCF, sdf=getattr(pin, "buildModelFromSdf", None))
     model = build(path) if kind == "mjcf" else build(path, pin.JointModelFreeFlyer())
-    if model.nv == 0:
-        model = build(path, pin.JointModelFreeFlyer())
-    data = model.createData()
+    data, place = model.createData(), np.roll(PLACE, 3)  # zeros and a quaternion, scalar last
     model.gravity.linear = np.zeros(3)
-
-    def accelerate(w, v, force, torque):
-        a = pin.aba(model, data, np.array([0.0, 0, 0, 0, 0, 0, 1]), np.concatenate([v, w]), np.concatenate([force, torque]))
-        return a[3:], a[:3] + np.cross(w, v)
-
-    return accelerate
+    return lambda v, force: pin.aba(model, data, place, v, force) + _linear(np.cross(v[3:], v[:3]))  # it is spatial
 
 
-def drake(path, kind):
-    """Return `accelerate` of Drake: time derivatives of a continuous plant, whose velocities are in world axes."""
+def _drake(path, kind):
     import pydrake.all as drake
 
     plant = drake.MultibodyPlant(0.0)
-    if kind == "usd":
-        raise NotImplementedError
-    drake.Parser(plant).AddModels(path)
+    _choose(kind, **dict.fromkeys(("urdf", "sdf", "mjcf"), drake.Parser(plant).AddModels))(path)
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     plant.Finalize()
     context = plant.CreateDefaultContext()
     (body,) = plant.GetFloatingBaseBodies()
     plant.SetFreeBodyPose(context, plant.get_body(body), drake.RigidTransform())
 
-    def accelerate(w, v, force, torque):
-        plant.SetVelocities(context, np.concatenate([w, v]))
-        plant.get_applied_generalized_force_input_port().FixValue(context, np.concatenate([torque, force]))
-        a = plant.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
-        return a[:3], a[3:]
+    def accelerate(v, force):
+        plant.SetVelocities(context, np.roll(v, 3))
+        plant.get_applied_generalized_force_input_port().FixValue(context, np.roll(force, 3))
+        return np.roll(plant.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector(), 3)
 
     return accelerate
 
 
-def dart(path, kind):
-    """Return `accelerate` of DART: `computeForwardDynamics` with spatial velocities in body axes."""
-    import dartpy
+def _dart(path, kind):
+    from dartpy import utils
 
-    if kind == "urdf":
-        skeleton = dartpy.utils.DartLoader().parseSkeleton(path)
-    elif kind == "sdf":
-        skeleton = dartpy.utils.SdfParser.readSkeleton(path)
-    elif kind == "mjcf":
-        world = dartpy.utils.MjcfParser.readWorld(path)
-        skeleton = world and world.getSkeleton(0)
-    else:
-        raise NotImplementedError
-    if skeleton is None:
-        raise ValueError("the loader returned no skeleton")
+    world = _choose(
+        kind, urdf=utils.DartLoader().parseSkeleton, sdf=utils.SdfParser.readSkeleton, mjcf=utils.MjcfParser.readWorld
+    )(path)
+    skeleton = world.getSkeleton(0) if kind == "mjcf" else world
     skeleton.setGravity([0, 0, 0])
     skeleton.setPositions(np.zeros(skeleton.getNumDofs()))
-
     body = skeleton.getBodyNode(0)
 
-    def accelerate(w, v, force, torque):
-        skeleton.setVelocities(np.concatenate([w, v]))
-        skeleton.setForces(np.concatenate([torque, force]))
+    def accelerate(v, force):
+        skeleton.setVelocities(np.roll(v, 3))
+        skeleton.setForces(np.roll(force, 3))
         skeleton.computeForwardDynamics()
-        return body.getAngularAcceleration(), body.getLinearAcceleration()
+        return np.concatenate([body.getLinearAcceleration(), body.getAngularAcceleration()])
 
     return accelerate
 
 
-def _by_steps(advance, point, step):
-    """Return `accelerate` from a step, which maps rates, velocity, force and torque at a point to rates and velocity."""
+def _by_steps(step, seconds, point):
+    """Return accelerations from a step, which maps velocity and force (6,) at a point (3,) to the velocity after it."""
 
-    def accelerate(w, v, force, torque):
-        start = v + np.cross(w, point)
-        w_end, v_end = advance(w, start, force, torque - np.cross(point, force))
-        turn = (w_end - w) / step
-        return turn, (v_end - start) / step - np.cross(turn, point) - np.cross(w, np.cross(w, point))
+    def accelerate(v, force):
+        w, start = v[3:], v + _linear(np.cross(v[3:], point))
+        a = (step(start, force - np.roll(_linear(np.cross(point, force[:3])), 3)) - start) / seconds
+        return a - _linear(np.cross(a[3:], point) + np.cross(w, np.cross(w, point)))
 
     return accelerate
 
 
-def pybullet(path, kind, flags="URDF_USE_INERTIA_FROM_FILE"):
-    """Return `accelerate` of PyBullet; without the flag it ignores the inertia of a file, as documented."""
-    import pybullet
+def _pybullet(path, kind):
+    import pybullet as bullet
 
-    if not pybullet.isConnected():
-        pybullet.connect(pybullet.DIRECT)
-    pybullet.resetSimulation()
-    if kind == "urdf":
-        body = pybullet.loadURDF(path, flags=getattr(pybullet, flags) if flags else 0)
-    elif kind in ("sdf", "mjcf"):
-        body = {"sdf": pybullet.loadSDF, "mjcf": pybullet.loadMJCF}[kind](path)[-1]
+    if not bullet.isConnected():
+        bullet.connect(bullet.DIRECT)
+    bullet.resetSimulation()
+    if kind == "urdf":  # without this flag it ignores the inertia of the file, as documented; the other loaders have no flag
+        body = bullet.loadURDF(path, flags=bullet.URDF_USE_INERTIA_FROM_FILE)
     else:
-        raise NotImplementedError
-    pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP64, numSubSteps=0)
-    for part in range(-1, pybullet.getNumJoints(body)):
-        pybullet.changeDynamics(body, part, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=1e6)
-    point, turn = pybullet.getDynamicsInfo(body, -1)[3:5]
+        body = _choose(kind, sdf=bullet.loadSDF, mjcf=bullet.loadMJCF)(path)[-1]
+    bullet.setPhysicsEngineParameter(fixedTimeStep=STEP64, numSubSteps=0)
+    for part in range(-1, bullet.getNumJoints(body)):
+        bullet.changeDynamics(body, part, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=1e6)
+    point, turn = bullet.getDynamicsInfo(body, -1)[3:5]
 
-    def advance(w, v, force, torque):
-        pybullet.resetBasePositionAndOrientation(body, point, turn)
-        pybullet.resetBaseVelocity(body, v.tolist(), w.tolist())
-        pybullet.applyExternalForce(body, -1, force.tolist(), point, pybullet.WORLD_FRAME)
-        pybullet.applyExternalTorque(body, -1, torque.tolist(), pybullet.WORLD_FRAME)
-        pybullet.stepSimulation()
-        v, w = pybullet.getBaseVelocity(body)
-        return np.array(w), np.array(v)
+    def step(v, force):
+        v, force = v.tolist(), force.tolist()
+        bullet.resetBasePositionAndOrientation(body, point, turn)
+        bullet.resetBaseVelocity(body, v[:3], v[3:])
+        bullet.applyExternalForce(body, -1, force[:3], point, bullet.WORLD_FRAME)
+        bullet.applyExternalTorque(body, -1, force[3:], bullet.WORLD_FRAME)
+        bullet.stepSimulation()
+        return np.concatenate(bullet.getBaseVelocity(body))
 
-    return _by_steps(advance, np.array(point), STEP64)
+    return _by_steps(step, STEP64, point)
 
 
-def sapien(path, kind):
-    """Return `accelerate` of SAPIEN (PhysX): its URDF loader, without damping."""
+def _sapien(path, kind):
     import sapien
 
-    if kind != "urdf":
-        raise NotImplementedError
     system = sapien.physx.PhysxCpuSystem()
     scene = sapien.Scene([system])
     system.timestep = STEP32
     loader = scene.create_urdf_loader()
     loader.fix_root_link = False
-    body = loader.load_multiple(path)[0][0]
-    links = body.get_links()
+    articulations, actors = _choose(kind, urdf=loader.load_multiple)(path)[:2]  # a link without children is an actor
+    dynamic = sapien.physx.PhysxRigidDynamicComponent
+    links = articulations[0].get_links() if articulations else [actors[0].find_component_by_type(dynamic)]
     for link in links:
         link.set_linear_damping(0)
         link.set_angular_damping(0)
         link.set_max_angular_velocity(1e6)
         link.set_disable_gravity(True)
 
-    def advance(w, v, force, torque):
-        body.set_root_pose(sapien.Pose())
-        body.set_root_linear_velocity(v.astype(np.float32))
-        body.set_root_angular_velocity(w.astype(np.float32))
-        links[0].add_force_torque(force.astype(np.float32), torque.astype(np.float32))
+    def step(v, force):
+        v, force = v.astype(np.float32), force.astype(np.float32)
+        if articulations:
+            articulations[0].set_root_pose(sapien.Pose())
+            articulations[0].set_root_linear_velocity(v[:3])
+            articulations[0].set_root_angular_velocity(v[3:])
+        else:
+            actors[0].set_pose(sapien.Pose())
+            links[0].set_linear_velocity(v[:3])
+            links[0].set_angular_velocity(v[3:])
+        links[0].add_force_torque(force[:3], force[3:])
         system.step()
-        return links[0].get_angular_velocity().astype(float), links[0].get_linear_velocity().astype(float)
+        return np.concatenate([links[0].get_linear_velocity(), links[0].get_angular_velocity()]).astype(float)
 
-    return _by_steps(advance, links[0].get_cmass_local_pose().p.astype(float), STEP32)
+    step.owner = scene
+    return _by_steps(step, STEP32, links[0].get_cmass_local_pose().p)
 
 
-def newton(path, kind):
-    """Return `accelerate` of Newton: `SolverSemiImplicit`, on the body that its importer makes with fixed joints collapsed."""
+def _newton(path, kind):
     import newton
-    import warp
 
-    warp.config.quiet = True
-    warp.set_device("cpu")
     builder = newton.ModelBuilder()
-    options = {"collapse_fixed_joints": True}
-    if kind == "urdf":
-        builder.add_urdf(path, floating=True, **options)
-    elif kind == "mjcf":
-        builder.add_mjcf(path, **options)
-    elif kind == "usd":
-        builder.add_usd(path, **options)
-    else:
-        raise NotImplementedError
+    read = _choose(kind, urdf=builder.add_urdf, mjcf=builder.add_mjcf, usd=builder.add_usd)
+    read(path, collapse_fixed_joints=True, **({"floating": True} if kind == "urdf" else {}))
     model = builder.finalize(device="cpu")
     model.gravity.zero_()
     solver = newton.solvers.SolverSemiImplicit(model, angular_damping=0.0)
-    before, after, com = model.state(), model.state(), model.body_com.numpy()[0].astype(float)
+    before, after = model.state(), model.state()
 
-    def advance(w, v, force, torque):
+    def step(v, force):
         before.body_q.assign(np.array([[0, 0, 0, 0, 0, 0, 1]], np.float32))
-        before.body_qd.assign(np.array([[*v, *w]], np.float32))
-        before.body_f.assign(np.array([[*force, *torque]], np.float32))
+        before.body_qd.assign(v[None].astype(np.float32))
+        before.body_f.assign(force[None].astype(np.float32))
         solver.step(before, after, None, None, STEP32)
-        end = after.body_qd.numpy()[0].astype(float)
-        return end[3:], end[:3]
+        return after.body_qd.numpy()[0].astype(float)
 
-    return _by_steps(advance, com, STEP32)
-
-
-def brax(path, kind):
-    """Return `accelerate` of Brax: its generalized pipeline, whose free joint has the coordinates of MuJoCo's."""
-    import jax
-    from brax.generalized import dynamics, pipeline
-    from brax.io import mjcf
-
-    if kind != "mjcf":
-        raise NotImplementedError
-    system = mjcf.load(path)
-    system = system.replace(gravity=0 * system.gravity, mj_model=None)
-    start = pipeline.init(system, np.array([0.0, 0, 0, 1, 0, 0, 0]), np.zeros(6))
-
-    @jax.jit
-    def forward(qd, force):
-        state = pipeline.init(system, start.q, qd)
-        return jax.numpy.linalg.solve(state.mass_mx, dynamics.forward(system, state, force))
-
-    def accelerate(w, v, force, torque):
-        a = np.asarray(forward(np.concatenate([v, w]), np.concatenate([force, torque])))
-        return a[3:], a[:3]
-
-    return accelerate
+    return _by_steps(step, STEP32, model.body_com.numpy()[0])
 
 
-LOADERS = {
-    "mujoco": mujoco,
-    "mjx": mjx,
-    "mjwarp": mjwarp,
-    "pinocchio": pinocchio,
-    "drake": drake,
-    "dart": dart,
-    "pybullet": pybullet,
-    "sapien": sapien,
-    "newton": newton,
-    "brax": brax,
-}
+_ALL = _mujoco, _pinocchio, _drake, _dart, _pybullet, _newton, _sapien, _brax, _mjx, _mjwarp
+LOADERS = {each.__name__[1:]: each for each in _ALL}
 """Loaders by the names of engines."""

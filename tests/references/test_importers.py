@@ -112,9 +112,9 @@ def test_accelerations_obey_momentum_and_give_the_body_back():
         part = Part(rng.uniform(0.5, 2) * scale**0.6, rng.normal(size=3) * scale**0.2, scale * (R * (1.1, 2.0, 2.7)) @ R.T)
         cases = make_cases(part)
         found = accelerations(part, cases)
-        w, _, _, torque = np.reshape(cases, (-1, 4, 3)).transpose(1, 0, 2)
+        _, w, _, torque = np.reshape(cases, (-1, 4, 3)).transpose(1, 0, 2)
         J = part.inertia + part.mass * (part.com @ part.com * np.eye(3) - np.outer(part.com, part.com))
-        about_origin = found[:, :3] @ J + np.cross(w, w @ J) + part.mass * np.cross(part.com, found[:, 3:])
+        about_origin = found[:, 3:] @ J + np.cross(w, w @ J) + part.mass * np.cross(part.com, found[:, :3])
         assert np.abs(about_origin - torque).max() < 1e-11 * np.abs(torque).max()  # measured: 5e-14
         near = replace(part, mass=1.3 * part.mass, com=1.1 * part.com, inertia=part.inertia + 0.3 * scale * np.eye(3))
         assert distance(part, identify(cases, found, near)) < 1e-9  # measured: 2e-12
