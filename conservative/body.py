@@ -1,4 +1,4 @@
-"""The rigid body: its inertia about the fixed point."""
+"""The rigid body: its inertia about the fixed point, and the momentum of a rotor in it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .attitude import Array
+from .attitude import Array, triple
 from .check import LARGEST, finite_array, read_only, set_fields
 from .errors import BadInput
 
@@ -32,18 +32,24 @@ class RigidBody:
     inertia
         Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component has
         to be 1e-30 to 1e30 kg m^2.
+    rotor_momentum
+        Constant momentum h (3,) of a rotor, kg m^2/s, body axes; None or zeros without one. The angular momentum is J w + h.
+        The kinetic energy is w'J w / 2, without the constant energy of the rotor itself. For a rotor with moment I about its
+        axis n that is driven at a constant speed s relative to the body, J includes the rotor and h = I s n. For one
+        without a motor torque, J includes it without I n n', and h = I (s + n.w) n.
 
     Raises
     ------
     BadInput
         The inertia is not finite, not symmetric, not positive definite, or of another shape; or a tensor that is not diagonal
         has moments with a ratio above `TENSOR_CONDITION`. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
-        the equations hold for them, but some engines reject them.
+        the equations hold for them, but some engines reject them. Or the rotor momentum is not three finite numbers.
     """
 
     inertia: Array
+    rotor_momentum: Array | None = None
 
-    def __init__(self, inertia: ArrayLike) -> None:
+    def __init__(self, inertia: ArrayLike, rotor_momentum: ArrayLike | None = None) -> None:
         value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
         tensor = np.diag(value) if value.ndim == 1 else value
         asymmetry = np.abs(tensor - tensor.T).max()
@@ -56,7 +62,10 @@ class RigidBody:
         condition = LARGEST if is_diagonal else TENSOR_CONDITION
         if moments[-1] > condition * moments[0]:
             raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")
-        set_fields(self, inertia=read_only((tensor + tensor.T) / 2))
+        if rotor_momentum is not None:
+            rotor = finite_array("rotor_momentum", rotor_momentum, ((3,),), "three finite numbers (3,), kg m^2/s, or None")
+            rotor_momentum = rotor if rotor.any() else None
+        set_fields(self, inertia=read_only((tensor + tensor.T) / 2), rotor_momentum=rotor_momentum)
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
@@ -88,8 +97,13 @@ class RigidBody:
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
     def momentum(self, w_WB_B: ArrayLike) -> Array:
-        """Return the angular momentum (..., 3), kg m^2/s, for rates (..., 3), rad/s, both in body axes."""
-        return np.asarray(w_WB_B, dtype=float) @ self.inertia
+        """Return the angular momentum (..., 3), kg m^2/s, with that of the rotor, for rates (..., 3), rad/s; body axes."""
+        of_body = np.asarray(w_WB_B, dtype=float) @ self.inertia
+        return of_body if self.rotor_momentum is None else of_body + self.rotor_momentum
+
+    def rotor_along(self, R_BF: Array) -> tuple[float, float, float] | None:
+        """Return the momentum of the rotor in axes F, given the rotation R_BF (3, 3) from F to body axes; None without one."""
+        return None if self.rotor_momentum is None else triple(self.rotor_momentum @ R_BF)
 
     def symmetry_axis(self, tolerance: float = 1e-14) -> int | None:
         """Return the index (0, 1, 2) of the principal axis of symmetry; None for an asymmetric body, 2 for a spherical one.
@@ -107,4 +121,5 @@ class RigidBody:
 
     def __repr__(self) -> str:
         diagonal = np.array_equal(self.inertia, np.diag(np.diag(self.inertia)))
-        return f"RigidBody(inertia={(np.diag(self.inertia) if diagonal else self.inertia).tolist()})"
+        rotor = "" if self.rotor_momentum is None else f", rotor_momentum={self.rotor_momentum.tolist()}"
+        return f"RigidBody(inertia={(np.diag(self.inertia) if diagonal else self.inertia).tolist()}{rotor})"

@@ -116,6 +116,8 @@ class Card:
         True if a torque and damping are supported. If not, `Method.unsupported` reports them.
     flight
         True if an engine integrates the translation in free flight as well. If not, `Method.unsupported` reports it.
+    rotors
+        True if bodies with a rotor are supported. If not, `Method.unsupported` reports them.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -137,6 +139,7 @@ class Card:
     time_dependent: bool = False
     loads: bool = False
     flight: bool = False
+    rotors: bool = False
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

@@ -46,9 +46,9 @@ class ReferenceValues:
         method conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not
         the grid's. Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
         """
-        drifts = np.empty((len(self.rows), 5))
+        drifts, rotor = np.empty((len(self.rows), 5)), self.bodies.scene.body.rotor_momentum
         V = _NO_ENERGIES if self.bodies.scene.potential is None else field_energies(self.bodies, t, R_WB, w_WB_B)
-        kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, self.rows, drifts)
+        kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, rotor, self.rows, drifts)
         return drifts
 
 
@@ -65,12 +65,15 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
     L_B = momenta_of(bodies)
-    kinetic = np.einsum("ni,ni->n", L_B, w) / 2
+    rotor = scene.body.rotor_momentum
+    kinetic = np.einsum("ni,ni->n", L_B if rotor is None else L_B - rotor, w) / 2
     scale = kinetic + field_scales(bodies)
     scale[scale == 0] = 1.0
     largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
     momentum = lengths(L_B)
     momentum = np.where(momentum > 0, momentum, largest_momentum / np.sqrt(2))
+    if rotor is not None:
+        largest_momentum += np.linalg.norm(rotor)
     if isinstance(potential, Turning):
         scale += potential.orbit.rate * largest_momentum
 
@@ -131,8 +134,9 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
 def momenta_of(bodies: Batch) -> Array:
     """Return the initial momenta (n, 3), kg m^2/s, body axes."""
     if bodies.inertia is None:
-        return np.asarray(bodies.w_WB_B0 @ bodies.scene.body.inertia)
-    return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
+        return bodies.scene.body.momentum(bodies.w_WB_B0)
+    rotor = 0.0 if bodies.scene.body.rotor_momentum is None else bodies.scene.body.rotor_momentum
+    return rotor + np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
 
 
 def field_scales(bodies: Batch) -> Array | float:
@@ -156,6 +160,8 @@ def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array
     if isinstance(potential, Turning):
         inertia = bodies.scene.body.inertia if bodies.inertia is None else bodies.inertia[:, None]
         L_B = (inertia @ w_WB_B[..., None])[..., 0]
+        if bodies.scene.body.rotor_momentum is not None:
+            L_B += bodies.scene.body.rotor_momentum
         normal_B = potential.orbit.normal_W @ R_OB  # the normal has the same components in W and O
         V = V - potential.orbit.rate * np.sum(normal_B * L_B, axis=-1)
     return np.ascontiguousarray(V)

@@ -64,8 +64,8 @@ def sizes(drift: Array) -> Array:
 
 
 def kinetic_energy(body: RigidBody, w_WB_B: Array) -> Array:
-    """Return the kinetic energy (...), J, at rates (..., 3), rad/s, body axes."""
-    return np.asarray(np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2)
+    """Return the kinetic energy (...), J, at rates (..., 3), rad/s, body axes, without the constant energy of a rotor."""
+    return np.asarray(np.sum((w_WB_B @ body.inertia) * w_WB_B, axis=-1) / 2)
 
 
 def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B: Array, t: Array) -> Array:
@@ -76,7 +76,13 @@ def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B:
 
 def jacobi_scale(body: RigidBody, field: Turning, energy_scale: float) -> float:
     """Return the reference scale of the Jacobi integral, J: the scale of the energy plus the contribution of the turning."""
-    return energy_scale + field.orbit.rate * math.sqrt(2 * energy_scale * float(body.moments.max()))
+    return energy_scale + field.orbit.rate * largest_momentum(body, energy_scale)
+
+
+def largest_momentum(body: RigidBody, energy: float) -> float:
+    """Return the largest angular momentum, kg m^2/s, that a kinetic energy, J, allows."""
+    rotor = 0.0 if body.rotor_momentum is None else float(np.linalg.norm(body.rotor_momentum))
+    return math.sqrt(2 * energy * float(body.moments.max())) + rotor
 
 
 def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
@@ -94,7 +100,7 @@ def invariants_of(
 
     These are the energy, unless the field depends on time; the Jacobi integral in a turning field; the world momentum (a
     vector) of a free body, or its component along the axis of the field (the vertical in uniform gravity); and the axial
-    momentum if body and field are symmetric about one axis.
+    momentum if body and field are symmetric about one axis. Momenta include that of a rotor.
 
     Parameters
     ----------
@@ -158,7 +164,7 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     The scale of a momentum is the largest momentum that the energy allows, which exceeds its reference scale if a body starts
     near rest.
     """
-    most = math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
+    most = largest_momentum(scene.body, scene.energy_scale)
     of_motion = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
     return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in of_motion}
 
@@ -170,9 +176,10 @@ NEARLY_SPHERICAL = 0.005
 def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-14) -> Array | None:
     """Return the unit vector (3,), body axes, about which body and field are symmetric, or None.
 
-    In uniform gravity it points towards the centre of mass. The result is None for other kinds of field.
+    In uniform gravity it points towards the centre of mass. The result is None for other kinds of field, and for a body with a
+    rotor, which no method treats as symmetric.
     """
-    if potential is not None and not isinstance(potential, UniformGravity):
+    if body.rotor_momentum is not None or not isinstance(potential, UniformGravity | None):
         return None
     moment_P = np.zeros(3) if potential is None else potential.moment_B @ body.R_BP
     size = float(np.linalg.norm(moment_P))

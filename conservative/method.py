@@ -21,8 +21,8 @@ from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find
 Run = Callable[[], Trajectory]
 
 
-def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
-    """Extend `Method.unsupported` by the reasons for potentials that depend on time, for loads, and for engines in flight."""
+def _refuse_extras(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
+    """Extend `Method.unsupported` by the reasons for potentials that depend on time, loads, rotors, and engines in flight."""
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
@@ -32,6 +32,8 @@ def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[A
             return "it does not take a torque or damping; reduced, projected and scipy do"
         if scene.flight and method.role == Role.ENGINE and not method.card.flight:
             return "its adapter has no free flight; those of mujoco, pinocchio, drake and pybullet have"
+        if scene.body.rotor_momentum is not None and not method.card.rotors:
+            return "it is for bodies without a rotor; Reduced(), Gauss(), Taylor() and Splitting() take one"
         return unsupported(method, scene)
 
     return reason
@@ -61,7 +63,7 @@ class Method(ABC):
             if name in vars(cls):  # these were class attributes in earlier versions
                 raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
         if "unsupported" in vars(cls):
-            cls.unsupported = _refuse_time(cls.unsupported)  # type: ignore[method-assign]
+            cls.unsupported = _refuse_extras(cls.unsupported)  # type: ignore[method-assign]
 
     @property
     def name(self) -> str:
@@ -108,7 +110,7 @@ class Method(ABC):
         """
         return Bounds(drift=1e-3, orthonormality=0.1, energy=math.inf if self.role == Role.ENGINE else 1.0)
 
-    @_refuse_time
+    @_refuse_extras
     def unsupported(self, scene: Scene) -> str | None:
         """Return the reason why the scene is not supported, or None."""
         return None

@@ -63,6 +63,7 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
 def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
     """Return the derivative of quaternion and body momentum (7, n) at times (n,)."""
     J_inverse, potential = _inverse(scene), scene.potential
+    h1, h2, h3 = scene.body.rotor_along(np.eye(3)) or (0.0, 0.0, 0.0)
     # In double precision a field's products would be rounded, which some bodies amplify by 1,000.
     fixed: Any = None if potential is None else potential.kernel_field(np.eye(3, dtype=np.longdouble))
 
@@ -78,6 +79,7 @@ def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
         if scene.torque is not None:
             given = np.array([scene.torque.at(float(each)) for each in t], dtype=np.longdouble).T
             T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
+        L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
         spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
         return np.array([*(rate / 2 for rate in turn), *spin])
 

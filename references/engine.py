@@ -111,6 +111,11 @@ class EngineAxes:
         return self.scene.w_WB_B0 @ self.R_BF
 
     @property
+    def rotor(self) -> Array:
+        """Momentum of the rotor (3,), kg m^2/s, axes F; zero without one."""
+        return np.array(self.scene.body.rotor_along(self.R_BF) or (0.0, 0.0, 0.0))
+
+    @property
     def moment(self) -> Array:
         """Weight times centre of mass (3,), N m, axes F; zero for a free body."""
         potential = self.scene.potential

@@ -149,7 +149,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
-    card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True)
+    card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True, rotors=True)
 
     def __post_init__(self) -> None:
         allowed = "an integer from 53 (double precision) to 4096"
@@ -178,8 +178,9 @@ class Precise(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         field = find_field(scene.potential)
         values = () if field is None else field.values(scene.potential)
-        solve = _solver(scene.body.inertia.tolist(), to_quaternion(scene.R_WB0), scene.w_WB_B0, field, values, self.bits)
         axes = EngineAxes(scene, np.eye(3), np.diag(scene.body.inertia))
+        values = *axes.rotor.tolist(), *values
+        solve = _solver(scene.body.inertia.tolist(), to_quaternion(scene.R_WB0), scene.w_WB_B0, field, values, self.bits)
         t = _reals(grid.steps.tolist(), self.bits) * _real(grid.dt, self.bits)
 
         def run() -> Trajectory:
@@ -192,15 +193,19 @@ class Precise(Method):
 
 @dataclass(frozen=True)
 class QuaternionEquations:
-    """The equations q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w); parameters J (9), J^-1 (9) and the field's."""
+    """The equations q' = q w / 2 and w' = J^-1 ((J w + h) x w + torque), state (q, w).
+
+    Parameters: J (9), J^-1 (9), momentum h of the rotor (3), and the field's.
+    """
 
     field: TorqueExpression | None
 
     def __call__(self, parameters: Sequence[forms.Expression]) -> forms.Equations:
         hy = forms.heyoka()
         q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
-        J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
-        torque = forms.cross(forms.product(J, w), w)
+        J, K, rotor, rest = parameters[:9], parameters[9:18], parameters[18:21], parameters[21:]
+        momentum = [a if forms.is_zero(b) else a + b for a, b in zip(forms.product(J, w), rotor, strict=True)]
+        torque = forms.cross(momentum, w)
         if self.field is not None:
             torque = [a + b for a, b in zip(torque, self.field.torque(q, rest), strict=True)]
         return [*zip(q, forms.kinematics_in_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]

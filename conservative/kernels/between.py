@@ -26,14 +26,14 @@ BLOCK = 2**8
 
 
 @kernel
-def cross_gap(n, gap, t, J_inverse, field, table, q, L, room):
+def cross_gap(n, gap, t, J_inverse, rotor, field, table, q, L, room):
     """Return the state (q, L) that follows on one at t, s, after a gap, s, in n steps, and what the loads supplied in it."""
     (weights, columns, starts, nodes), (scaled, slopes) = table, room
     h, supplied = gap / n, no_supply(field)
     for i in range(len(weights)):
         scaled[i] = h * weights[i] if i < starts[-2] else weights[i]
     for step in range(n):
-        q, L = take_step(h, t + step * h, J_inverse, field, scaled, columns, starts, nodes, q, L, slopes)
+        q, L = take_step(h, t + step * h, J_inverse, rotor, field, scaled, columns, starts, nodes, q, L, slopes)
         q, supplied = near_unit(q), sum_supply(h, weights, columns, starts, slopes, supplied)
     return q, L, supplied
 
@@ -50,7 +50,7 @@ def difference(q0, L0, q1, L1, size):
 
 
 @entry
-def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, gaps, q, L):
+def move(J_inverse, rotor, field, weights, columns, starts, nodes, size, longest, t, gaps, q, L):
     """Move the states q (n, 4), of length one, and L (n, 3), kg m^2/s, principal axes, at t (n,), s, on by gaps (n,), s.
 
     With loads, L has four more columns, filled with the work, J, and the impulse, N m s, world axes, of the gap.
@@ -66,12 +66,12 @@ def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, ga
             continue
         n = max(1, int(min(math.ceil(gaps[i] / longest), 1.0 * MOST)))
         q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
-        coarse, off = cross_gap(n, gaps[i], t[i], J_inverse, field, table, q0, L0, room), math.inf
+        coarse, off = cross_gap(n, gaps[i], t[i], J_inverse, rotor, field, table, q0, L0, room), math.inf
         while not off <= AGREED:
             n *= 2
             if n > MOST:
                 return i
-            fine = cross_gap(n, gaps[i], t[i], J_inverse, field, table, q0, L0, room)
+            fine = cross_gap(n, gaps[i], t[i], J_inverse, rotor, field, table, q0, L0, room)
             off = difference(coarse[0], coarse[1], fine[0], fine[1], size)
             coarse = fine
         q[i, 0], q[i, 1], q[i, 2], q[i, 3] = coarse[0]

@@ -32,7 +32,7 @@ def largest_skewness(R):
 
 
 @entry
-def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, reference, drifts):
+def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts):
     """Measure the largest drifts of n bodies over m samples.
 
     Parameters
@@ -43,6 +43,8 @@ def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, reference, drifts):
         Attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     V
         Energies (n, m), J, to add to the kinetic ones; (0, 0) if there are none.
+    rotor
+        Momentum (3,) of the rotor of all bodies, kg m^2/s, body axes; None without one.
     reference
         Rows (n, 10, 3). With J the inertia, kg m^2, and S the reference scale of momentum, kg m^2/s:
 
@@ -70,6 +72,8 @@ def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, reference, drifts):
             E = 0.5 * (L_B[0] * w[0] + L_B[1] * w[1] + L_B[2] * w[2])
             if len(V):
                 E += V[i, k]
+            if rotor is not None:
+                L_B = (L_B[0] + rotor[0], L_B[1] + rotor[1], L_B[2] + rotor[2])
             L = transform(axes, transform(R, L_B))
             a, b, c = L[0] - at[6, 0], L[1] - at[6, 1], L[2] - at[6, 2]
             of_R = largest_skewness(R)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arithmetic import accumulate, add, dot
 from . import small
 from .lanes import load_rows, save_rows
 from .traced import trace
+from .vector import accumulate, add, dot
 
 
 @trace
@@ -22,6 +22,12 @@ def finite_torque(field, q, a):
     to Q0 Cay(2 a) (method of the paper, 23 and 27b, in three unknowns).
     """
     return field.finite_torque(q, a)
+
+
+@small
+def whole(rotor, L):
+    """Return the momentum L of a body with that of its rotor, which is None without one."""
+    return L if rotor is None else add(L, rotor)
 
 
 @trace

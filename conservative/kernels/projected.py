@@ -2,7 +2,9 @@
 
 The state is the attitude as a quaternion q and the momentum L, principal axes: with w = J^-1 L and the body's torque T(q),
 
-    q' = q (0, w) / 2        L' = L x w + T
+    q' = q (0, w) / 2        L' = (L + r) x w + T
+
+with the momentum r of a rotor, which L does not contain.
 
 Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is
 restored, and then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
@@ -19,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .fields import add_supply, at_time, body_torque, energy, no_supply, shift_invariants, supply_rate, torque
+from .fields import add_supply, at_time, body_torque, energy, no_supply, shift_invariants, supply_rate, torque, whole
 from .lanes import FOUR, join, lane_of, load, load_rows, save, save_rows, splat
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
@@ -54,6 +56,7 @@ class Model(NamedTuple):
     scales: Any
     q: Any
     L: Any
+    rotor: Any
 
 
 class Coefficients(NamedTuple):
@@ -70,11 +73,11 @@ class Coefficients(NamedTuple):
 
 
 @small
-def rates(J_inverse, field, q, L, slopes, at, supply_at):
+def rates(J_inverse, rotor, field, q, L, slopes, at, supply_at):
     """Write (q', L', 0) to slopes[at : at + 8], and with loads their power and torque to slopes[supply_at : supply_at + 4]."""
     w = times(J_inverse, L)
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
-    n = cross(L, w)
+    n = cross(whole(rotor, L), w)
     T = torque(field, q, w)
     save_rows(slopes, supply_at, 1, supply_rate(field, q, w))
     save(slopes, at + FOUR, join(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
@@ -101,7 +104,7 @@ def combine(q, L, weights, columns, first, last, slopes):
 
 
 @small
-def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slopes):
+def take_step(h, t, J_inverse, rotor, field, weights, columns, starts, nodes, q, L, slopes):
     """Return the state after a step from t, s. Stage i begins at starts[i] in weights and columns; the step is last."""
     q0, L0 = join(q[0], q[1], q[2], q[3]), join(L[0], L[1], L[2], 0.0)
     stages = len(starts) - 2
@@ -111,7 +114,9 @@ def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slo
             (lane_of(qs, 0), lane_of(qs, 1), lane_of(qs, 2), lane_of(qs, 3)),
             (lane_of(Ls, 0), lane_of(Ls, 1), lane_of(Ls, 2)),
         )
-        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage, FOUR * (2 * stages + stage))
+        rates(
+            J_inverse, rotor, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage, FOUR * (2 * stages + stage)
+        )
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
     dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
     q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
@@ -136,18 +141,18 @@ def near_unit(q):
 
 
 @small
-def values(J_inverse, field, axis, turn, q, L):
+def values(J_inverse, rotor, field, axis, turn, q, L):
     """Energy, J, and momentum about the world vector `axis`, kg m^2/s; without an axis, `None`, the latter is 0.
 
     Of a field that turns, the Jacobi integral E - turn.l in place of the energy.
     """
-    momentum = 0.0 if axis is None else dot(L, in_body(q, axis))
-    lacking = 0.0 if turn is None else dot(L, in_body(q, turn))
+    momentum = 0.0 if axis is None else dot(whole(rotor, L), in_body(q, axis))
+    lacking = 0.0 if turn is None else dot(whole(rotor, L), in_body(q, turn))
     return (0.5 * dot(L, times(J_inverse, L)) + energy(field, q)) - lacking, momentum
 
 
 @small
-def gradient(J_inverse, field, turn, q, L):
+def gradient(J_inverse, rotor, field, turn, q, L):
     """(w, T): the gradients of what `values` has in the energy's place are w by L, and -T by a turn of the body.
 
     Of the Jacobi integral these are the rates relative to the axes that turn, and the torque plus L x turn.
@@ -156,23 +161,23 @@ def gradient(J_inverse, field, turn, q, L):
     if turn is None:
         return w, T
     o = in_body(q, turn)
-    return subtract(w, o), add(T, cross(L, o))
+    return subtract(w, o), add(T, cross(whole(rotor, L), o))
 
 
 @small
-def shortest_move(J_inverse, field, axis, turn, size, e, m, q, L):
+def shortest_move(J_inverse, rotor, field, axis, turn, size, e, m, q, L):
     """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order.
 
     Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are scaled to length one here,
     and regularised by DEPENDENT, so that parallel gradients share the correction.
     """
-    w, T = gradient(J_inverse, field, turn, q, L)
+    w, T = gradient(J_inverse, rotor, field, turn, q, L)
     by_energy = 1.0 / math.sqrt(size * size * dot(w, w) + dot(T, T) + TINY)
     if axis is None:
         a = e * by_energy * by_energy
         return scale(a * size * size, w), scale(-a, T)
     v = in_body(q, axis)
-    across = cross(L, v)
+    across = cross(whole(rotor, L), v)
     by_momentum = 1.0 / math.sqrt(size * size + dot(across, across))
     cosine = (size * size * dot(w, v) - dot(T, across)) * by_energy * by_momentum
     one = 1.0 + DEPENDENT
@@ -183,18 +188,18 @@ def shortest_move(J_inverse, field, axis, turn, size, e, m, q, L):
 
 
 @small
-def project(J_inverse, field, axis, turn, kept, scales, q, L):
+def project(J_inverse, rotor, field, axis, turn, kept, scales, q, L):
     """Return (q, L, corrections, relative defect left) of a state brought back to the energy and momentum `kept`."""
     q = near_unit(q)
     corrections = 0
     while True:
-        now = values(J_inverse, field, axis, turn, q, L)
+        now = values(J_inverse, rotor, field, axis, turn, q, L)
         e, m = kept[0] - now[0] if scales[0] < math.inf else 0.0, kept[1] - now[1]
         defect = max(abs(e) / scales[0], abs(m) / scales[1])
         if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
             return q, L, corrections, defect
         corrections += 1
-        dL, way = shortest_move(J_inverse, field, axis, turn, scales[1], e, m, q, L)
+        dL, way = shortest_move(J_inverse, rotor, field, axis, turn, scales[1], e, m, q, L)
         L = add(L, dL)
         q = near_unit(product(q, (1.0, 0.5 * way[0], 0.5 * way[1], 0.5 * way[2])))
 
@@ -202,7 +207,7 @@ def project(J_inverse, field, axis, turn, kept, scales, q, L):
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
-    J_inverse, field, axis, turn, scales, q, L = model
+    J_inverse, field, axis, turn, scales, q, L, rotor = model
     weights, columns, starts, nodes, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     weights = weights.copy()
@@ -213,16 +218,16 @@ def march(model, coefficients, workspace):
     supplied = no_supply(field)
     record(0, q, L, q_out, L_out)
     record_supply(0, supplied, L_out)
-    kept = values(J_inverse, field, axis, turn, q, L)
+    kept = values(J_inverse, rotor, field, axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done = 0
     while done < n_steps:
         last = end_of_block(done, n_steps, pause)
         for step in range(done + 1, last + 1):
-            q, L = take_step(h, (step - 1) * h, J_inverse, field, weights, columns, starts, nodes, q, L, slopes)
+            q, L = take_step(h, (step - 1) * h, J_inverse, rotor, field, weights, columns, starts, nodes, q, L, slopes)
             supplied = sum_supply(h, weights, columns, starts, slopes, supplied)
             now, aim = at_time(field, step * h), shift_invariants(kept, axis, turn, supplied)
-            q, L, more, defect = project(J_inverse, now, axis, turn, aim, scales, q, L)
+            q, L, more, defect = project(J_inverse, rotor, now, axis, turn, aim, scales, q, L)
             corrections += more
             if not defect < LEFT:
                 work = (step - 1) * stages

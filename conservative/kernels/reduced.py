@@ -6,6 +6,8 @@ The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principa
     q1 = q0 (1, a) / sqrt(1 + a.a)
     L1 = Cay(2a)' (L0 + h T) = 2 J w* - L0
 
+L is J w, without the momentum r of a rotor, which adds a x (h/2) r on the left of the first equation. L1 = 2 J w* - L0 remains.
+
 Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
 constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
 residual has the size of L1 - L0 instead of L. L1 follows from its other side. The round-off left to an asymmetric body has no
@@ -29,7 +31,7 @@ from typing import Any, NamedTuple
 
 from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .fields import at_step, finite_torque, no_supply, supply, torque
+from .fields import at_step, finite_torque, no_supply, supply, torque, whole
 from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
@@ -76,13 +78,17 @@ PAST, ROOM = 5, 30
 
 
 class Model(NamedTuple):
-    """Moments, kg m^2, and their inverses, field or None, attitude and momentum, kg m^2/s, at the start: principal axes."""
+    """Moments, kg m^2, and their inverses, field or None, attitude and momentum, kg m^2/s, at the start: principal axes.
+
+    `rotor` is the momentum of the rotor, kg m^2/s, or None. `L` does not contain it.
+    """
 
     J: Any
     J_inverse: Any
     field: Any
     q: Any
     L: Any
+    rotor: Any = None
 
 
 class Coefficients(NamedTuple):
@@ -93,10 +99,10 @@ class Coefficients(NamedTuple):
 
 
 @small
-def explicit_guess(h, J_inverse, field, q, L):
+def explicit_guess(h, J_inverse, field, rotor, q, L):
     """Return a of an explicit half step of Euler's equations: third order in h."""
     w = times(J_inverse, L)
-    rate = cross(L, w)
+    rate = cross(whole(rotor, L), w)
     if field is not None:
         rate = add(rate, torque(field, q, w))
     return scale(0.5 * h, times(J_inverse, add(L, scale(0.5 * h, rate))))
@@ -123,10 +129,12 @@ def gaps(J):
 
 
 @small
-def residual(h, J, field, q, L, a):
+def residual(h, J, field, rotor, q, L, a):
     """Left minus right side of the equation for a."""
     half = 0.5 * h
     lhs = add(times(J, a), times(gaps(J), (a[1] * a[2], a[2] * a[0], a[0] * a[1])))
+    if rotor is not None:
+        lhs = add(lhs, cross(a, scale(half, rotor)))
     if field is None:
         return subtract(lhs, scale(half, L))
     T = finite_torque(field, q, a)[0]
@@ -134,12 +142,15 @@ def residual(h, J, field, q, L, a):
 
 
 @small
-def tangent(h, J, field, q, a):
+def tangent(h, J, field, rotor, q, a):
     """Return the residual's derivative by a (three columns)."""
     Ja = times(J, a)
     k0 = (J[0], a[2] * J[0] - Ja[2], Ja[1] - a[1] * J[0])
     k1 = (Ja[2] - a[2] * J[1], J[1], a[0] * J[1] - Ja[0])
     k2 = (a[1] * J[2] - Ja[1], Ja[0] - a[0] * J[2], J[2])
+    if rotor is not None:
+        x, y, z = scale(0.5 * h, rotor)
+        k0, k1, k2 = add(k0, (0.0, -z, y)), add(k1, (z, 0.0, -x)), add(k2, (-y, x, 0.0))
     if field is None:
         return k0, k1, k2
     T, dT = finite_torque(field, q, a)
@@ -151,24 +162,27 @@ def tangent(h, J, field, q, a):
 
 
 @small
-def inverse_tangent(h, J, field, q, a):
+def inverse_tangent(h, J, field, rotor, q, a):
     """Rows of the inverse of the residual's derivative by a."""
-    return inverse(tangent(h, J, field, q, a))
+    return inverse(tangent(h, J, field, rotor, q, a))
 
 
 @small
-def final_correction(h, J, field, q, L, carry, rows, a):
+def final_correction(h, J, field, rotor, q, L, carry, rows, a):
     """Return a after one more correction with the tangent of the last, and L1 - L0; `rows` are that tangent's inverse.
 
     Of J w + a x (J w) = L0 + (h/2) (T - a x T), a = (h/2) w, the difference u = J w - L0 is rounded once and includes what L0
     lost to rounding. L1 - L0 = 2 u, and the correction is added to u, where it is not rounded away as it is in a. Each
     component of a x (J w) is one constant times two rates: rounding that constant changes the conserved energy and momentum in
-    the last place, but they are conserved all the same.
+    the last place, but they are conserved all the same. With a rotor they would not be, because the mean of w1 w2 w3 is not 0.
     """
     half = 0.5 * h
     w = scale(2.0 / h, a)
     u = add(subtract(times(J, w), L), carry)
-    turning = times(scale(half, gaps(J)), (w[1] * w[2], w[2] * w[0], w[0] * w[1]))
+    if rotor is None:
+        turning = times(scale(half, gaps(J)), (w[1] * w[2], w[2] * w[0], w[0] * w[1]))
+    else:
+        turning = scale(half, cross(w, add(times(J, w), rotor)))
     if field is not None:
         half_T = scale(half, finite_torque(field, q, a)[0])
         turning = subtract(add(turning, cross(a, half_T)), half_T)
@@ -177,7 +191,7 @@ def final_correction(h, J, field, q, L, carry, rows, a):
 
 
 @small
-def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
+def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
     """Return (a, L1 - L0, corrections made, size of the last, whether to trust it), from a first guess of a.
 
     Newton's answer is trusted where it takes at most `FEW` corrections, stays near the guess (`near`), and the determinant of
@@ -189,15 +203,15 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
     With lanes, the loop runs until the last body is done; a lane that is done does not change, so that its result
     does not depend on its neighbours. After one correction the answer is as near to the guess as that correction is small.
     """
-    rows, over = invert(tangent(h, J, field, q, guess))
-    correction = apply(rows, residual(h, J, field, q, L, guess))
+    rows, over = invert(tangent(h, J, field, rotor, q, guess))
+    correction = apply(rows, residual(h, J, field, rotor, q, L, guess))
     a = subtract(guess, correction)
     square = dot(correction, correction)
     enough = square <= tolerance * (dot(a, a) + REST)
     iterations, close = 1, enough
     while iterations < FEW and not every(enough):
-        new_rows, new_over = invert(tangent(h, J, field, q, a))
-        correction = apply(new_rows, residual(h, J, field, q, L, a))
+        new_rows, new_over = invert(tangent(h, J, field, rotor, q, a))
+        correction = apply(new_rows, residual(h, J, field, rotor, q, L, a))
         a = choose(enough, a, subtract(a, correction))
         rows = choose(enough, rows, new_rows)
         over = choose(enough, over, new_over)
@@ -206,12 +220,12 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
         enough = enough | (square <= tolerance * aa)
         close = dot(away, away) <= near * aa + NEAR_ZERO
         iterations += 1
-    a, gain = final_correction(h, J, field, q, L, carry, rows, a)
+    a, gain = final_correction(h, J, field, rotor, q, L, carry, rows, a)
     return a, gain, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
 
 
 @kernel
-def continue_branch(h, J, J_inverse, field, q, L, carry, tolerance):
+def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
     """Return what `newton_solve` does, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
 
     Each guess is on the tangent of the branch. Where the branch ends before h, the size is that of the residual at that end,
@@ -222,8 +236,10 @@ def continue_branch(h, J, J_inverse, field, q, L, carry, tolerance):
     while part >= SHORTEST_PART:
         aim = min(reached + part, 1.0)
         hs = aim * h
-        guess = add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, q, L)
-        found, gain, iterations, size, trusted = newton_solve(hs, J, field, q, L, carry, guess, NEAR_TANGENT, tolerance)
+        guess = (
+            add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, rotor, q, L)
+        )
+        found, gain, iterations, size, trusted = newton_solve(hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, tolerance)
         corrections += iterations
         if not trusted:
             part *= 0.5
@@ -231,16 +247,18 @@ def continue_branch(h, J, J_inverse, field, q, L, carry, tolerance):
         if aim == 1.0:
             return found, gain, corrections, size, True
         a, reached, part = found, aim, 2.0 * part
-        rows = inverse_tangent(hs, J, field, q, a)
-        slope = scale(0.5, apply(rows, forcing(hs, field, q, L, a)))
-    r = residual(h, J, field, q, L, a)
-    f = forcing(0.5 * h, field, q, L, a)
+        rows = inverse_tangent(hs, J, field, rotor, q, a)
+        slope = scale(0.5, apply(rows, forcing(hs, field, rotor, q, L, a)))
+    r = residual(h, J, field, rotor, q, L, a)
+    f = forcing(0.5 * h, field, rotor, q, L, a)
     return a, a, corrections, math.sqrt(dot(r, r) / dot(f, f)) / abs(0.5 * h), False
 
 
 @small
-def forcing(h, field, q, L, a):
+def forcing(h, field, rotor, q, L, a):
     """Twice the derivative by h of the right side of the equation for a, L0 + h (T - a x T)."""
+    if rotor is not None:
+        L = subtract(L, cross(a, rotor))
     if field is None:
         return L
     T = finite_torque(field, q, a)[0]
@@ -248,11 +266,11 @@ def forcing(h, field, q, L, a):
 
 
 @kernel
-def find_solution(h, J, J_inverse, field, q, L):
+def find_solution(h, J, J_inverse, field, rotor, q, L):
     """Return whether Newton's method from the explicit guess, trusted or not, ends at a solution of the equation."""
-    a = explicit_guess(h, J_inverse, field, q, L)
+    a = explicit_guess(h, J_inverse, field, rotor, q, L)
     for _ in range(MAX_ITERATIONS):
-        correction = apply(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
+        correction = apply(inverse_tangent(h, J, field, rotor, q, a), residual(h, J, field, rotor, q, L, a))
         a = subtract(a, correction)
         if dot(correction, correction) <= 1e-24 * (dot(a, a) + REST):
             return True
@@ -267,7 +285,7 @@ def march(model, coefficients, workspace):
     5 % in a field; without it round-off errors grow thirty times as large. A step fails where it has no solution on the
     continuous branch; the size then is the residual where the branch ends.
     """
-    J, J_inverse, field = model.J, model.J_inverse, model.field
+    J, J_inverse, field, rotor = model.J, model.J_inverse, model.field, model.rotor
     n_steps, every, pause, q_out, L_out = workspace
     lengths = coefficients.lengths
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
@@ -281,7 +299,7 @@ def march(model, coefficients, workspace):
         first = at[0]
         last = end_of_block(first - 1, n_steps, left)
         at, row, more, size, state, history = take_steps(
-            lengths, n_steps, last, every, J, J_inverse, field, tolerance, at, row, state, history, q_out, L_out
+            lengths, n_steps, last, every, J, J_inverse, field, rotor, tolerance, at, row, state, history, q_out, L_out
         )
         corrections += more
         step, stage = at
@@ -291,10 +309,10 @@ def march(model, coefficients, workspace):
             q, q_carry, L, L_carry, supplied = state
             h = lengths[stage]
             now = at_step(field, find_start(lengths, step, stage), h)
-            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, q, L, L_carry, tolerance)
+            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, rotor, q, L, L_carry, tolerance)
             corrections += more
             if not found:
-                elsewhere = find_solution(h, J, J_inverse, now, q, L)
+                elsewhere = find_solution(h, J, J_inverse, now, rotor, q, L)
                 return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
             L, L_carry = add_momentum(L, L_carry, gain)
             supplied = supply(now, h, q, a, supplied)
@@ -318,7 +336,7 @@ def enter(*loose):
 
 
 @kernel
-def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at, row, state, history, q_out, L_out):
+def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolerance, at, row, state, history, q_out, L_out):
     """Take steps from a step and stage on, up to step `last` or a stage whose solution is not trusted; return where that is.
 
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
@@ -332,8 +350,8 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
         for stage in range(first, len(lengths)):
             h = lengths[stage]
             now = at_step(field, find_start(lengths, step, stage), h)
-            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, q, L)
-            a, gain, iterations, size, trusted = newton_solve(h, J, now, q, L, L_carry, a, NEAR, tolerance)
+            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, rotor, q, L)
+            a, gain, iterations, size, trusted = newton_solve(h, J, now, rotor, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
@@ -434,7 +452,7 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted
             own_field = None if field is None else UniformField(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
             own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
             own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
-            found, own_gain, _, _, exists = continue_branch(h, own[0], own[1], own[2], own[3], own[4], own[5], tolerance)
+            found, own_gain, _, _, exists = continue_branch(h, own[0], own[1], own[2], None, own[3], own[4], own[5], tolerance)
             if not exists:
                 finished[first + i] = False
                 found, own_gain, L, carry = rest, rest, put(L, i, rest), put(carry, i, rest)
@@ -476,8 +494,8 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                 past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
                 a = guess_ahead((newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]))
                 if not every(enough):
-                    a = choose(enough, a, explicit_guess(h, J_inverse, field, q, L))
-                a, gain, _, _, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
+                    a = choose(enough, a, explicit_guess(h, J_inverse, field, None, q, L))
+                a, gain, _, _, trusted = newton_solve(h, J, field, None, q, L, L_carry, a, NEAR, tolerance)
                 if not every(trusted):
                     a, gain, L, L_carry = solve_alone(
                         h, J, J_inverse, field, q, L, L_carry, tolerance, a, gain, trusted, finished, i

@@ -127,7 +127,7 @@ def buss_step(h, t, J_inverse, field, q, L):
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`)."""
-    J, J_inverse, field, q, L = model
+    J, J_inverse, field, q, L, _ = model
     scheme, weights, nodes, alpha, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     slopes, w = np.empty((len(nodes), 6)), times(J_inverse, L)

@@ -154,7 +154,7 @@ def move(
     field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
     table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
-    moved = kernels("between").move(start.J_inverse, field, *table, *limits, times, gaps[far] / units.time, q, L)
+    moved = kernels("between").move(start.J_inverse, start.rotor, field, *table, *limits, times, gaps[far] / units.time, q, L)
     moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
     kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)
     R[far[:moved]], w[far[:moved]] = moved_R, moved_w / units.time

@@ -15,7 +15,7 @@ import numpy as np
 from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
 from ..errors import BadInput
-from ..invariants import jacobi_scale
+from ..invariants import jacobi_scale, largest_momentum
 from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning
@@ -39,6 +39,8 @@ class PrincipalStart:
         Rotation (3, 3) from the kernel's axes to body axes; None if they are the same.
     field
         Parameters of the potential in the kernel's axes; None for a free body.
+    rotor
+        Momentum of the rotor, kg m^2/s; None without one. `L` does not contain it.
     spin
         In the non-spinning frame, the omitted rate about the third axis, rad/s, and 1/J3; otherwise None.
     """
@@ -49,6 +51,7 @@ class PrincipalStart:
     L: Triple
     R_BP: Array | None
     field: Any
+    rotor: Triple | None = None
     spin: tuple[float, float] | None = None
 
 
@@ -87,7 +90,8 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     if scene.loaded:
         field = load_field(field, scene.torque, scene.damping, R_BP)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
-    return PrincipalStart(triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
+    rotor, q = scene.body.rotor_along(R_BP), quadruple(scene.R_WB0 @ R_BP)
+    return PrincipalStart(triple(moments), triple(1 / moments), q, triple(L), turned, field, rotor)
 
 
 def quadruple(R: Array) -> Quadruple:
@@ -108,7 +112,7 @@ def invariant_scales(scene: Scene) -> tuple[float, float]:
     The first is inf if neither energy nor Jacobi integral is conserved.
     """
     energy, potential = scene.energy_scale, scene.potential
-    momentum = math.sqrt(2 * energy * float(scene.body.moments.max()))
+    momentum = largest_momentum(scene.body, energy)
     if isinstance(potential, Turning):
         return jacobi_scale(scene.body, potential, energy), momentum
     return math.inf if depends_on_time(potential) else energy, momentum

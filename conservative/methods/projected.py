@@ -49,6 +49,7 @@ class Projected(Method):
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
         time_dependent=True,
         loads=True,
+        rotors=True,
     )
 
     @property
@@ -76,4 +77,5 @@ def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
     start, field = principal_start(scene), scene.potential
     axis, scales = field_axis(scene), invariant_scales(scene)
     turn = triple(field.orbit.rate * field.orbit.normal_W) if isinstance(field, Turning) else None
-    return method.label, start, kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L)
+    model = kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L, start.rotor)
+    return method.label, start, model

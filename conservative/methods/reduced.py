@@ -95,6 +95,7 @@ class Reduced(Method):
         kernel="reduced",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
         loads=True,
+        rotors=True,
     )
 
     def __post_init__(self) -> None:
@@ -132,7 +133,7 @@ def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
-    model = kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L)
+    model = kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L, start.rotor)
     return replace(method, frame=frame).label, start, model
 
 

@@ -46,6 +46,7 @@ class Substepped(Method):
         structure=lambda method: method.inner.card.structure(method.inner),
         time_dependent=True,  # `unsupported` asks the other method
         loads=True,
+        rotors=True,
     )
 
     def __post_init__(self) -> None:

@@ -195,7 +195,7 @@ def nearby_scene(scene: Scene) -> Scene:
     moved = body.R_BP @ np.diag(ROUNDED * sizes * _SIGNS[0]) @ body.R_BP.T
     return scene.rename(
         scene.name,
-        body=RigidBody(body.inertia + moved),
+        body=RigidBody(body.inertia + moved, body.rotor_momentum),
         R_WB0=scene.R_WB0 * (1 + ROUNDED * _SIGNS),
         w_WB_B0=w + ROUNDED * rates * _SIGNS[0],
     )

@@ -55,9 +55,12 @@ class Units:
         energy, potential = self.moment / self.time / self.time, cast(Any, scene.potential)
         if potential is not None:
             potential = potential.in_units(energy, self.time) if depends_on_time(potential) else potential.in_units(energy)
+        rotor = scene.body.rotor_momentum
+        if rotor is not None:
+            rotor = read_only(rotor / self.moment * self.time)
         return replace_unchecked(
             scene,
-            body=replace_unchecked(scene.body, inertia=read_only(scene.body.inertia / self.moment)),
+            body=replace_unchecked(scene.body, inertia=read_only(scene.body.inertia / self.moment), rotor_momentum=rotor),
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
             t_end=scene.t_end / self.time,
             potential=potential,

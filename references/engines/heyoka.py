@@ -97,6 +97,7 @@ class Heyoka(Method):
         ),
         colour="green",
         time_dependent=True,
+        rotors=True,
     )
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion
+from conservative.attitude import Array, from_quaternion, hat
 from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
@@ -69,6 +69,7 @@ class SciPy(Method):
         colour="orange",
         time_dependent=True,
         loads=True,
+        rotors=True,
     )
 
     def __post_init__(self) -> None:
@@ -136,7 +137,7 @@ def _count_steps(solver: Any) -> Any:
 def state_derivative(scene: Scene) -> Derivative:
     """Return the derivative of the state, a quaternion, scalar first, and rates in principal axes.
 
-    numba compiles it unless the potential is one of Python functions, or the scene has a torque or damping.
+    numba compiles it, apart from the torques of a rotor, of loads and of potentials of Python functions.
     """
     axes, potential, compiled = principal_axes(scene), scene.potential, compile_derivative()
     field, static = SimpleNamespace(**describe_field(axes)), static_part(potential)
@@ -155,10 +156,13 @@ def state_derivative(scene: Scene) -> Derivative:
 
     loads = load_field(None, scene.torque, scene.damping, axes.R_BF)
     of_field = derivative if potential is None or type(static) in FIELDS else through_gradient
+    gyroscopic = hat(axes.rotor) / axes.J[:, None]
 
-    def with_loads(t: float, y: Array) -> Array:
+    def with_more(t: float, y: Array) -> Array:
         out = of_field(t, y)
-        out[4:] += np.array(loads.at_time(t).load(y[:4], y[4:])) / axes.J
+        out[4:] += gyroscopic @ y[4:]
+        if scene.loaded:
+            out[4:] += np.array(loads.at_time(t).load(y[:4], y[4:])) / axes.J
         return out
 
-    return with_loads if scene.loaded else of_field
+    return with_more if scene.loaded or gyroscopic.any() else of_field

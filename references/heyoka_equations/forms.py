@@ -94,7 +94,7 @@ class EulerEquations:
     """Euler's equations in principal axes and the equations of the attitude, state (attitude, w).
 
     Parameters: (J2 - J3)/J1 and its cyclic permutations (3), the rates of the axes to which the attitude refers (3), in those
-    axes, and the parameters of the field.
+    axes, the matrix J^-1 hat(h) of a rotor with momentum h (9, row by row), and the parameters of the field.
 
     Attributes
     ----------
@@ -111,7 +111,8 @@ class EulerEquations:
         w = heyoka().make_vars("w1", "w2", "w3")
         equations, axis = self.attitude(w, parameters[3:6])
         gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
-        return [*equations, *zip(w, _sums(gyroscopic, self.acceleration(parameters[6:], axis)), strict=True)]
+        others = _sums(self.acceleration(parameters[15:], axis), product(parameters[6:15], w))
+        return [*equations, *zip(w, _sums(gyroscopic, others), strict=True)]
 
 
 def quaternion(w: Sequence[Expression], turn: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, hat, to_quaternion
 from conservative.scene import Scene
 
 from ..engine import EngineAxes, orbit_turn, principal_axes, symmetric_axes
@@ -79,8 +79,8 @@ def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[
     """Return Euler's equations with those of an attitude that `write` makes of a matrix."""
     field = express_field(scene)
     axes, R_WD = field.axes, field.R_WD
-    equations = forms.EulerEquations(attitude, field.acceleration)
-    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *field.parameters])
+    equations, rotor = forms.EulerEquations(attitude, field.acceleration), (hat(axes.rotor) / axes.J[:, None]).ravel().tolist()
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *rotor, *field.parameters])
     start = np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0])
     turn = orbit_turn(scene)
     return Formulation(axes, form, parameters, start, kind, [0.0] * 4 if turn is None else turn[0], R_WD)
@@ -100,7 +100,7 @@ def lean(scene: Scene) -> Formulation:
     """Return the formulation with the fewest products."""
     axes = symmetric_axes(scene)
     if axes is None:
-        if not scene.free:
+        if not scene.free or scene.body.rotor_momentum is not None:
             return base_vectors(scene)
         # A body at rest has no momentum to turn about.
         return _free_rates_and_angle(scene) if scene.kinetic_energy0 > 0 else body(scene)

@@ -42,14 +42,16 @@ def gain_of_steps(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
     lengths, q_out, L_out = np.array([H]), np.empty((2, 4)), np.empty((2, 3))
     state = (Q, (0.0, 0.0, 0.0, 0.0), tuple(start.tolist()), carry, ())
     history = reduced.no_history()
-    found = compiled(reduced.take_steps)(lengths, 1, 1, 1, J, INVERSE, None, TIGHT, (1, 0), 0, state, history, q_out, L_out)
+    found = compiled(reduced.take_steps)(
+        lengths, 1, 1, 1, J, INVERSE, None, None, TIGHT, (1, 0), 0, state, history, q_out, L_out
+    )
     _, _, after, left, _ = found[4]
     return np.array(after) - left - (start - carry)
 
 
 def gain_of_branch(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
     """Return the same gain by continuation, without the sum."""
-    return np.array(reduced.continue_branch(H, J, INVERSE, None, Q, tuple(start.tolist()), carry, TIGHT)[1])
+    return np.array(reduced.continue_branch(H, J, INVERSE, None, None, Q, tuple(start.tolist()), carry, TIGHT)[1])
 
 
 @pytest.mark.parametrize("gain", [gain_of_steps, gain_of_branch])
@@ -61,10 +63,10 @@ def test_the_last_correction_includes_the_carry_of_the_momentum(gain) -> None:
 
 def trust(size: float, near: float, momentum: tuple[float, ...] = L) -> bool:
     """Return whether Newton's method is trusted from a guess at the squared distance `size` |a|^2 from the solution a."""
-    a = np.array(reduced.continue_branch(H, J, INVERSE, None, Q, momentum, (0.0, 0.0, 0.0), 1e-20)[0])
+    a = np.array(reduced.continue_branch(H, J, INVERSE, None, None, Q, momentum, (0.0, 0.0, 0.0), 1e-20)[0])
     aside = np.array([0.0, 0.6, -0.8]) * np.sqrt(size) * np.linalg.norm(a)
     guess = tuple((a + aside).tolist())
-    _, _, _, _, trusted = reduced.newton_solve(H, J, None, Q, momentum, (0.0, 0.0, 0.0), guess, near, 1e-8)
+    _, _, _, _, trusted = reduced.newton_solve(H, J, None, None, Q, momentum, (0.0, 0.0, 0.0), guess, near, 1e-8)
     return bool(trusted)
 
 
@@ -77,7 +79,7 @@ def test_newton_is_trusted_only_near_its_guess() -> None:
 
 def test_newton_is_trusted_no_farther_from_a_small_solution() -> None:
     small = tuple(1e-3 * x for x in L)  # |a| = 1.5e-4
-    a = np.linalg.norm(reduced.continue_branch(H, J, INVERSE, None, Q, small, (0.0, 0.0, 0.0), 1e-20)[0])
+    a = np.linalg.norm(reduced.continue_branch(H, J, INVERSE, None, None, Q, small, (0.0, 0.0, 0.0), 1e-20)[0])
     assert trust(7e-5 / a**2, 0.0, small)
     assert not trust(3e-4 / a**2, 0.0, small)
 

@@ -29,7 +29,9 @@ def states_in_digits(inertia, q0, w0, t, moment_B=None, bits=256):
     """
     diagonal = [[x if i == j else 0 for j in range(3)] for i, x in enumerate(inertia)]
     field = None if moment_B is None else precise.FIELDS[cv.UniformGravity]
-    solve = precise._solver(inertia if np.ndim(inertia) == 2 else diagonal, q0, w0, field, moment_B or (), bits)
+    solve = precise._solver(
+        inertia if np.ndim(inertia) == 2 else diagonal, q0, w0, field, (0.0, 0.0, 0.0, *(moment_B or ())), bits
+    )
     _, _, reals = solve(precise._reals([0, *t], bits), None)
     with precise._digits(bits) as mp:
         rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in reals[1:]]
