@@ -52,6 +52,7 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
     from conservative import registry
     from conservative.files import text_file
     from conservative.method import Role
+    from conservative.trajectory import Trajectory
 
     from ..animation import KINDS, Animation
     from ..document.model import Document, Paragraph
@@ -60,23 +61,22 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
 
     if out.suffix not in KINDS:
         raise BadInput("out", repr(str(out)), f"a file that ends in {', '.join(KINDS)}")
-    body, names = registry.scene(scene), split_names("method", methods) or [DEFAULT_METHOD]
+    body = registry.scene(scene)
+    names = split_names("method", methods) or [DEFAULT_METHOD]
     chosen = [registry.method(name) for name in names]
-    end = body.t_end if t_end is None else t_end
-    steps = [min(method.card.usual_dt or body.dt, end) if dt is None else dt for method in chosen]
+    longest = body.t_end if t_end is None else t_end
+    steps = [min(method.card.usual_dt or body.dt, longest) if dt is None else dt for method in chosen]
     grids = [bounded_grid(body, method, step, t_end) for method, step in zip(chosen, steps, strict=True)]
     truth = next((number for number, method in enumerate(chosen) if method.role == Role.TRUTH), None)
-    with text_file(out, "out") as stream, progress() as step:
-        runs = []
-        for number, (method, grid) in enumerate(zip(chosen, grids, strict=True)):
-            step(0.5 * number / len(chosen), method.name)
+    runs: list[Trajectory] = []
+    with text_file(out, "out") as stream, progress() as tell:
+        for method, grid in zip(chosen, grids, strict=True):
+            tell(0.5 * len(runs) / len(chosen), method.name)
             runs.append(run_on(body, method, grid))
-        drawn = Animation(runs, [f"{name}, dt = {grid.dt:.3g} s" for name, grid in zip(names, grids, strict=True)], truth)
-        stream.buffer.write(drawn.render(out.suffix, lambda share: step(0.5 + share / 2, "drawing")))
-    data = [summarize(*each) for each in zip(runs, chosen, (grid.dt for grid in grids), strict=True)]
-    failures = [f"{name} on {body.name}: {run.outcome}" for name, run in zip(names, runs, strict=True) if not run.ok]
-    text = f"Wrote {out}. Open it in a browser." if out.suffix == ".html" else f"Wrote {out}."
-    show(
-        Document("conservative watch", body.name, [Paragraph(text)], data={"out": str(out), "runs": data}, failures=failures),
-        as_json,
-    )
+        labels = [f"{name}, dt = {grid.dt:.3g} s" for name, grid in zip(names, grids, strict=True)]
+        drawn = Animation(runs, labels, truth).render(out.suffix, lambda share: tell(0.5 + share / 2, "drawing"))
+        stream.buffer.write(drawn)
+    data = [summarize(run, method, grid.dt) for run, method, grid in zip(runs, chosen, grids, strict=True)]
+    failures = [f"{run.label} on {body.name}: {run.outcome}" for run in runs if not run.ok]
+    text = Paragraph(f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html"))
+    show(Document("conservative watch", body.name, [text], data={"out": str(out), "runs": data}, failures=failures), as_json)
