@@ -104,23 +104,6 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
     return apply_style(alt.hconcat(*panels))
 
 
-def drift(drifts: pd.DataFrame, scene: str) -> Any:
-    """Return the largest drift so far over time, from `lines.drifts` of a scene, a panel for each invariant."""
-    data = drifts.assign(shown=drifts["drift"].clip(lower=FLOOR))
-    channels = look(families_of(data), "strokeDash", title="method", symbolSize=300)
-    panels = [
-        alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 40, title=f"{scene}: drift of {kind}")
-        .mark_line(strokeWidth=1.8, clip=True)
-        .encode(
-            x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)),
-            y=alt.Y(**log_channel("shown", "largest so far, relative", part["shown"])),
-            **channels,
-        )
-        for kind, part in data.groupby("quantity", sort=False)
-    ]
-    return apply_style(alt.vconcat(*panels))
-
-
 def judged(rows: pd.DataFrame, name: str) -> Any:
     """Return errors and drifts of a recorded motion after its first row, from `diagnose.judge`, a panel for each quantity."""
     panels = []

@@ -70,7 +70,6 @@ class Style(StrEnum):
 
     SORTED = "sorted"
     FILTERED = "filtered"  # sorted, with a search field
-    CARDS = "cards"  # a phone shows each row as a card
     GRID = "grid"  # a matrix of small cells in two halves, whose text appears below the table
 
 

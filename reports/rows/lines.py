@@ -10,7 +10,7 @@ import pandas as pd
 from conservative.attitude import from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import long_runs, motion
+from conservative.benchmarks.studies import motion
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
@@ -21,30 +21,10 @@ from .names import of_measure, of_study, with_outcome
 ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
 ANALYTICAL = "analytical"
 """Name of the exact motion in the paper's figure 2."""
-THIN = 40
-"""Samples of a line of drift on the page; a few are enough, as it only grows."""
 
 
 def _samples_of(samples: pd.DataFrame, study: str) -> pd.DataFrame:
     return samples[samples["study"] == study]
-
-
-def drifts(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the drifts over time: columns scene, family, name, t (s), quantity, drift (relative, the largest so far).
-
-    If methods differ only in tolerance, the loosest and the tightest are included.
-    """
-    rows = _samples_of(samples, "long_runs").rename(columns={"value": "drift"})
-    names = rows.groupby(["scene", "line"])["name"]
-    rows = rows[(rows["name"] == names.transform("first")) | (rows["name"] == names.transform("last"))]
-    return rows[["scene", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
-
-
-def thin(drifts: pd.DataFrame) -> pd.DataFrame:
-    """Return drifts with about `THIN` samples of each line, including its last."""
-    every = max(1, long_runs.SAMPLES // THIN)
-    left = drifts.groupby(["scene", "name", "quantity"], sort=False).cumcount(ascending=False)
-    return drifts[left % every == 0].reset_index(drop=True)
 
 
 def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:

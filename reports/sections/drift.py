@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import pandas as pd
+
 from conservative.benchmarks.studies import long_runs, motion
-from conservative.method import Method
 from conservative.scene import Scene
 
 from ..charts import figures, spheres, vega_embed
@@ -24,38 +25,47 @@ _WHY = (
 def section(measured: Measured, found: Sequence[Result]) -> Section:
     """Return the section, about the methods of `tumbling.results`."""
     scene, methods = measured.main_scene, drawn(found)
-    drifts = of_scene(lines.signed_drifts(measured.samples), scene.name)
-    drifts = drifts[drifts["method"].isin(methods) | ~drifts["method"].isin(m.name for m in _competitors(measured))]
-    figure = Figure(
-        "drift",
+    drawings = (draw(measured, scene, methods) for draw in (drift_figure, spheres_figure))
+    return Section("Where drift comes from", filled(Paragraph(_WHY, Emphasis.LEAD), *drawings), "drift", "Drift")
+
+
+def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None = None) -> Figure | None:
+    """Return the drift over time on a scene, of all methods or of some next to the exact motion; None without samples."""
+    drifts = _select(measured, of_scene(lines.signed_drifts(measured.samples), scene.name), methods)
+    if drifts.empty:
+        return None
+    picture = figures.signed_drift(drifts)
+    return Figure(
+        f"drift_{scene.name}" if methods is None else "drift_over_time",
         f"{scene.name}: change of energy and momentum in {long_runs.DURATIONS * scene.t_end:.3g} s",
         "Middle line: exact. Above it a method gains, below it loses. The axis is logarithmic on both sides of it.",
-        panels=vega_embed.embed(figures.signed_drift(drifts), ("name", "t", "drift"), 260),
-        legend=vega_embed.legend(families_of(drifts), marks=False),
-        layout=Layout.PAIRS,
+        picture if methods is None else None,
+        vega_embed.embed(picture, ("name", "t", "drift"), 260),
+        vega_embed.legend(families_of(drifts), marks=False),
+        Layout.PAIRS,
     )
-    blocks = filled(Paragraph(_WHY, Emphasis.LEAD), figure if len(drifts) else None, spheres_figure(measured, scene, methods))
-    return Section("Where drift comes from", blocks, "drift", "Drift")
 
 
 def spheres_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None = None) -> Figure | None:
     """Return the curves of a scene, a sphere each, of all methods or of some next to the exact one; None without curves."""
-    curves = of_scene(lines.curves(measured.samples), scene.name)
-    competitors = {method.name for method in _competitors(measured)}
-    if methods is not None:
-        curves = curves[curves["method"].isin(methods) | ~curves["method"].isin(competitors)]
+    curves = _select(measured, of_scene(lines.curves(measured.samples), scene.name), methods)
     if curves.empty:
         return None
     title, words = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
     if scene.free:
         title = "polhode on the momentum sphere"
         words = "The angular momentum in body axes. The exact curve is closed; drift widens it or leaves the sphere."
-    absent = ", ".join(sorted(competitors - set(curves["method"]))) if methods is None else ""
+    absent = "" if methods else ", ".join(sorted(_competitors(measured) - set(curves["method"])))
     failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
     name = f"sphere_{scene.name}" if methods is None else "polhodes"
     panels = [spheres.chart(curve) for _, curve in curves.groupby("name", sort=False)]
     return Figure(name, f"{scene.name}: {title}", words + failed, panels=panels, layout=Layout.SPHERES)
 
 
-def _competitors(measured: Measured) -> list[Method]:
-    return motion.select_methods((*measured.plan.methods, *measured.plan.engines))
+def _competitors(measured: Measured) -> set[str]:
+    return {method.name for method in motion.select_methods((*measured.plan.methods, *measured.plan.engines))}
+
+
+def _select(measured: Measured, rows: pd.DataFrame, methods: Sequence[str] | None) -> pd.DataFrame:
+    """Return the rows of some methods and of the exact motion, or of all methods."""
+    return rows if methods is None else rows[rows["method"].isin(methods) | ~rows["method"].isin(_competitors(measured))]

@@ -10,11 +10,10 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.benchmarks.studies.studies import ENGINES, LONG_TIME, PRICE, RANDOM, THROUGHPUT
-from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from ..rows import points
-from ..rows.names import of_study, with_names, with_outcome, without_outcome
+from ..rows.names import of_study, with_names
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -63,11 +62,6 @@ class Measured:
         return {scene.name: each_step(self.scene_rows, scene.name) for scene in self.plan.scenes}
 
     @cached_property
-    def long_drifts(self) -> pd.DataFrame:
-        """The largest drifts of long runs (see `long_run_drifts`)."""
-        return long_run_drifts(self.scene_rows)
-
-    @cached_property
     def ratios(self) -> tuple[random_bodies.RandomRatios, ...]:
         """The ratios on random bodies; empty without that study."""
         return random_bodies.ratios(self.rows) if RANDOM in self.plan.names else ()
@@ -83,15 +77,3 @@ def long_run_drifts(table: pd.DataFrame) -> pd.DataFrame:
     rows = of_study(table, "long_runs")
     rows = rows[rows["measure"].isin([Measure.DRIFT_MAX.text, Measure.ORTHONORMALITY.text])]
     return rows.assign(quantity=rows["quantity"].mask(rows["quantity"] == "", "orthonormality"))
-
-
-_NO_TROUBLE = (OutcomeKind.OK, OutcomeKind.NO_ORDER, OutcomeKind.SKIPPED, OutcomeKind.MISSING)
-
-
-def scenes_in_trouble(table: pd.DataFrame) -> pd.DataFrame:
-    """Return failed runs, and scenes that a method does not support: columns scene, method, family, outcome."""
-    rows = table[table["study"] != "stability"]
-    runs = set(with_outcome(rows, OutcomeKind.OK)[["scene", "method"]].itertuples(index=False, name=None))
-    bad = without_outcome(rows, *_NO_TROUBLE)[["scene", "method", "family", "outcome"]].drop_duplicates()
-    real = [row.outcome != OutcomeKind.UNSUPPORTED or (row.scene, row.method) not in runs for row in bad.itertuples()]
-    return bad[pd.Series(real, index=bad.index, dtype=bool)]

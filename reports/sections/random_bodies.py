@@ -22,7 +22,7 @@ from ..document.cells import DASH, factor, grade_ratio, number, numeric, ratio_t
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, with_outcome, without_outcome
 from ..rows.points import joined, points
-from .summary import MIDDLE, MOST, Summary, cheapest_of_each, classes_table, geometric_mean
+from .summary import MIDDLE, MOST, Summary, cheapest_of_each, geometric_mean
 
 ANY = "fastest engine"
 """Stands for all engines: on each body, the fastest of them."""
@@ -185,15 +185,13 @@ def count_text(ratios: Ratios) -> str:
     return f"{len(ratios.both)} of {len(ratios.contests)}" + (f" ({reasons})" if reasons else "")
 
 
-def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios], drifts: pd.DataFrame) -> Summary:
-    """Return the summary of named rows of the study, their ratios, and drifts of long runs (see `measured`)."""
+def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios]) -> Summary:
+    """Return the summary of named rows of the study and their ratios."""
     measured = points(supported_rows(table), RANDOM, untimed=True)
     reached = costs(measured, DECADES, [*LINE, "version", "series"])
     families = map(display_name, reached["family"], reached["version"], [""] * len(reached))
     best = cheapest_of_each(reached.assign(name=list(families)), "name")
-    return Summary(
-        sentence(ratios), joined([_means(best, measured["scene"].nunique())]), classes_table(measured, reached, drifts, {})
-    )
+    return Summary(sentence(ratios), joined([_means(best, measured["scene"].nunique())]))
 
 
 def _means(reached: pd.DataFrame, bodies: int) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Cheapest, Contest, cheapest, contests, costs
+from conservative.benchmarks.contest import Cheapest, Contest, contests, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.each_step import ERROR
 
@@ -51,15 +51,6 @@ class EachStep:
             f"every {self.interval:.3g} s stored, engines without conversion": self.own_loop,
             f"every {self.interval:.3g} s, final state only": self.final,
         }
-
-    def sample_text(self, kind: MethodClass) -> str:
-        """Return the costs of a sample in a class, µs, and the methods."""
-        stored, final = (cheapest(of_classes(reached, kind)) for reached in (self.stored, self.final))
-        if stored is None or final is None:
-            return DASH
-        other = "" if final.name == stored.name else f" {final.name}"
-        times = [factor(1e6 * each.time * self.interval) for each in (stored, final)]
-        return f"{times[0]} {stored.name}; final state only: {times[1]}{other}"
 
 
 def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:

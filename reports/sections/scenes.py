@@ -16,22 +16,20 @@ from conservative.scene import Scene
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
-from ..document.model import Block, Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
+from ..document.model import Block, Cell, Emphasis, Figure, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_measure, of_study, outcomes
-from ..rows.points import front, under
+from ..rows.points import front
 from . import scene_contests
-from .drift import spheres_figure
-from .measured import Measured, long_run_drifts, of_scene, scenes_in_trouble
-from .summary import SAMPLE_TERMS, TERMS, Summary
+from .drift import drift_figure, spheres_figure
+from .measured import Measured, long_run_drifts, of_scene
+from .summary import SAMPLE_TERMS, Summary
 from .summary import of_scene as summary_of_scene
 
 
 def summarize(measured: Measured, scene: Scene) -> Summary:
     """Return the summary of a scene."""
-    troubles = scenes_in_trouble(measured.scene_rows)
-    points, drifts, failed = (of_scene(rows, scene.name) for rows in (measured.points, measured.long_drifts, troubles))
-    return summary_of_scene(points, drifts, failed, scene.integrable, measured.every_step[scene.name])
+    return summary_of_scene(of_scene(measured.points, scene.name), scene.integrable)
 
 
 def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
@@ -39,11 +37,10 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     name, rows, points = scene.name, measured.scene_rows, of_scene(measured.points, scene.name)
     contests = scene_contests.as_table(points, scene.t_end / step_ladder.SAMPLES, measured.every_step[name])
     sample = f"A sample is one of {step_ladder.SAMPLES} in the duration; in the last rows, each of the scene's own steps."
-    classes = replace(summary.classes, caption=f"{name}: µs of computing per simulated second, by class of methods")
     decades = replace(contests, caption=f"{name}: fastest method of each class at each decade of the error")
     drift_words = (
         f"Largest drift over {long_runs.DURATIONS:g} durations, relative (✓ up to {tolerance(CONSERVED)}, ≈ up to "
-        f"{tolerance(SMALL)}, ✗ more). The picture shows zero as 1e-17."
+        f"{tolerance(SMALL)}, ✗ more)."
     )
     order_words = (
         "Fit of log(error) over log(step), with standard error, between the steps that are too large to converge and the "
@@ -56,11 +53,9 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         f"relative to `{DEFAULT_METHOD}`."
     )
     picture = figures.work_precision(points, front(points[points["class"] != MethodClass.SOLUTION]), name)
-    terms = Paragraph(f"{TERMS} {SAMPLE_TERMS}", Emphasis.NOTE)
     work: list[Block] = [
         Figure(f"work_precision_{name}", f"{name}: time against attitude error", picture=picture),
-        classes,
-        terms,
+        Paragraph(SAMPLE_TERMS, Emphasis.NOTE),
     ]
     if decades.rows:
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))
@@ -74,7 +69,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
             Section("Work against precision", work),
-            Section("Drift over time", filled(_drift_figure(measured, name), Paragraph(drift_words), conservation(rows, name))),
+            Section("Drift over time", filled(drift_figure(measured, scene), Paragraph(drift_words), conservation(rows, name))),
             Section("Drift at the scene's own step", filled(drift(rows, name)), folded=True),
             Section("Convergence", [_convergence_figure(errors, fits, name), Paragraph(order_words)]),
             Section("Orders and errors as tables", orders, folded=True),
@@ -83,23 +78,6 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         ),
         name,
         folded=True,
-    )
-
-
-def _drift_figure(measured: Measured, name: str) -> Figure:
-    """Return the drift over time; the page has fewer samples than the picture."""
-    drifts = of_scene(lines.drifts(measured.samples), name)
-    thin = lines.thin(drifts)
-    floored = thin.assign(shown=thin["drift"].clip(lower=figures.FLOOR), panel=thin["quantity"])
-    members = [(str(line), rows.sort_values(["panel", "t"])) for line, rows in floored.groupby("name", sort=False)]
-    return Figure(
-        f"drift_{name}",
-        f"{name}: drift over time",
-        " ".join(["A panel for each quantity: a level line is conserved, a rising one drifts.", *under(members, "t", "shown")]),
-        figures.drift(drifts, name),
-        vega_embed.embed(figures.drift(thin, name), ("name", "t", "drift"), 220),
-        vega_embed.legend(families_of(drifts), marks=False),
-        Layout.PAIRS,
     )
 
 

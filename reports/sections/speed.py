@@ -23,7 +23,7 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     """Return the section, from the summary of each scene; random bodies are included if the report has them."""
     pictures = {name: summary.points for name, summary in of_scenes.items()}
     if measured.ratios:
-        pictures["random bodies"] = random_bodies.summary(measured.rows, measured.ratios, measured.long_drifts).points
+        pictures["random bodies"] = random_bodies.summary(measured.rows, measured.ratios).points
     name = measured.main_scene.name
     sentence = _sentence(name, of_scene(measured.points, name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""

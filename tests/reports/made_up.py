@@ -47,7 +47,7 @@ def table():
 def measurements():
     """Rows and lines."""
     t = np.linspace(0.5, 60, 120)
-    common = {"study": "long_runs", "scene": "brick_flip", "role": Role.OURS, "dt": 0.1, "quantity": "energy"}
+    common = {"study": "motion", "scene": "brick_flip", "role": Role.OURS, "dt": 0.1, "quantity": "drift of energy"}
     names = ({"method": name, "label": name, "series": name, **parts(name)} for name in ("reduced", "mujoco"))
     lines = [Samples(**names_of, t=t, value=1e-15 * t, **common) for names_of in names]
     return Measurements(

@@ -51,10 +51,11 @@ def test_convergence_is_in_seconds_and_drift_is_relative():
     spec = figures.convergence(errors, lines.fit_ends(lines.fits(errors)), "made_up").to_dict()
     assert set(axes(spec)) == {("x", "dt", "step, s"), ("y", "error", "largest attitude error over the run, rad")}
     drifts = pd.DataFrame({"family": "a", "name": "a", "t": [1.0, 2.0], "quantity": "energy", "drift": [0.0, 1e-9]})
-    spec = figures.drift(drifts, "made_up").to_dict()
-    (panel,) = spec["vconcat"]
-    assert (panel["encoding"]["x"]["title"], panel["encoding"]["y"]["axis"]["title"]) == ("t, s", "largest so far, relative")
-    assert drawn(spec, "shown") == [figures.FLOOR, 1e-9]
+    spec = figures.signed_drift(drifts).to_dict()
+    (panel,) = spec["hconcat"]
+    assert (panel["encoding"]["x"]["title"], panel["encoding"]["y"]["axis"]["title"]) == ("t, s", "relative change")
+    assert panel["encoding"]["y"]["axis"]["values"] == [0.0, 1e-12, 1e-9]
+    assert drawn(spec, "drift") == [0.0, 1e-9]
 
 
 def test_lines_have_the_colour_of_their_family_and_the_mark_of_their_place():
@@ -94,7 +95,7 @@ def test_a_logarithmic_axis_has_a_label_at_each_power_of_ten(low, high, powers):
 def test_a_picture_of_a_full_report_has_all_its_samples_and_names_all_its_lines():
     many = pd.DataFrame({"t": np.arange(1.0, 131.0), "quantity": "energy", "drift": 1e-9})
     drifts = pd.concat([many.assign(name=f"a order={i}", family="a") for i in range(40)])  # 5,200 rows, 40 lines
-    drawn = svg_text(figures.drift(drifts, "made_up"))
+    drawn = svg_text(figures.signed_drift(drifts))
     assert all(f">a order={i}<" in drawn for i in range(40))
 
 

@@ -39,7 +39,7 @@ PICTURE = Figure(
 GRID = Table(
     ["case", "m"], [["needle", Cell("both", parts=(Cell("✓ 1", Grade.GOOD), Cell("✗ 2", Grade.BAD)))]], "Grid", Style.GRID
 )
-CARDS = Table(["class", "µs"], [[Cell("ours", note="a, b"), Cell("12", note="a")]], "Cards", Style.CARDS)
+NOTES = Table(["class", "µs"], [[Cell("ours", note="a, b"), Cell("12", note="a")]], "Notes")
 SORTED = Table(["method", "ratio"], [["<b>|", Cell("1.100", Grade.BAD, interval=Interval(1.1, 1.0, 1.2, 1.05))]], "Sorted")
 FACTS = Facts([("command", "`conservative`")])
 DOCUMENT = Document(
@@ -57,7 +57,7 @@ DOCUMENT = Document(
             "first",
         ),
         Section(
-            "Second", [GRID, CARDS, Section("Folded", [SORTED], folded=True), Facts([("command", "`conservative`")])], "second"
+            "Second", [GRID, NOTES, Section("Folded", [SORTED], folded=True), Facts([("command", "`conservative`")])], "second"
         ),
     ],
     data={"value": math.nan, "outcome": OK, "grade": Grade.GOOD, "rows": [{"x": 1.0}]},
@@ -79,7 +79,7 @@ def test_markdown_has_every_block_and_the_picture_in_a_file():
         "## Second",
         "Grid",
         "| case | m |\n| --- | ---: |\n| needle | both |",
-        "Cards",
+        "Notes",
         "| class | µs |\n| --- | ---: |\n| ours (a, b) | 12 (a) |",
         "### Folded",
         "Sorted",

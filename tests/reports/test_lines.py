@@ -22,42 +22,13 @@ from .made_up import curves
 T = np.linspace(0.5, 60, 120)
 
 
-def drifts(*settings):
-    """The drifts of one engine: pairs of a shared setting and a tolerance."""
-    common = {
-        "study": "long_runs",
-        "scene": "made_up",
-        "family": "engine",
-        "role": Role.ENGINE,
-        "dt": 0.1,
-        "quantity": "energy",
-    }
-    found = [
-        Samples(
-            method=f"{kept}{tol}",
-            label="",
-            series=kept,
-            setting=f"{kept},tol={tol}",
-            series_setting=kept,
-            t=T,
-            value=T,
-            **common,
-        )
-        for kept, tol in settings
-    ]
-    return lines.drifts(with_names(measurement.samples_frame(found)))
-
-
-def test_of_several_tolerances_the_loosest_and_the_tightest_are_drawn():
-    found = drifts(("stol=3", 1e-3), ("stol=3", 1e-6), ("stol=3", 1e-9), ("stol=4", 1e-3))
-    names = ["engine stol=3,tol=0.001", "engine stol=3,tol=1e-9", "engine stol=4,tol=0.001"]
-    assert found["name"].unique().tolist() == names
-
-
-def test_fewer_samples_keep_the_last_of_each_line():
-    found = lines.thin(drifts(("a", 1e-3), ("b", 1e-3)))
-    assert found.groupby("name")["t"].max().tolist() == [60, 60]
-    assert found.groupby("name").size().tolist() == [lines.THIN] * 2
+def test_drifts_of_motions_have_their_sign_and_the_name_without_a_tolerance():
+    who = {"method": "engine:tol=1e-9", "label": "", "series": "engine", "family": "engine", "setting": "tol=1e-9"}
+    common = {"study": "motion", "scene": "made_up", "role": Role.ENGINE, "dt": 0.1, **who}
+    found = [Samples(quantity=f"drift of {name}", t=T, value=-T, **common) for name in ("energy", "momentum")]
+    drifts = lines.signed_drifts(with_names(measurement.samples_frame([*found, Samples(quantity="x", t=T, value=T, **common)])))
+    assert drifts.groupby("quantity")["drift"].min().to_dict() == {"energy": -T.max(), "momentum": -T.max()}
+    assert set(drifts["name"]) == {"engine"}
 
 
 @pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])

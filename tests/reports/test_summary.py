@@ -13,23 +13,17 @@ from conservative.reports.rows.names import MethodClass, class_of, with_names
 from conservative.reports.rows.points import points
 from conservative.reports.sections import random_bodies, summary
 
-from .rows import frame, point, row
-from .test_random_ratios import ENGINE_ALONE, TWICE, line
+from .rows import frame, point
+from .test_random_ratios import ENGINE_ALONE, TWICE
 
 SOLUTION = point("lame", "ours", 1e-12, 1e-7)
 OURS = [*point("gauss", "ours", 1e-3, 2e-6), *point("gauss", "ours", 1e-7, 4e-6, 0.01)]
 SOLVER = [*point("scipy", "engine", 1e-3, 6e-6), *point("scipy", "engine", 1e-7, 8e-6, 0.01)]
 ENGINE = point("mujoco:RK4", "engine", 1e-4, 5e-4)
-NOTHING = frame([])
 
 
-def told(*lines, drifts=NOTHING, troubles=NOTHING, integrable=True):
-    return summary.of_scene(points(frame([each for line in lines for each in line])), drifts, troubles, integrable)
-
-
-def cells(found, kind):
-    (line,) = [line for line in found.classes.rows if str(line[0]).startswith(kind)]
-    return dict(zip(found.classes.header, map(str, line), strict=True))
+def told(*lines, integrable=True):
+    return summary.of_scene(points(frame([each for line in lines for each in line])), integrable)
 
 
 @pytest.mark.parametrize(
@@ -88,44 +82,6 @@ def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
     assert words in told(*lines).sentence
 
 
-def test_a_class_has_its_times_and_its_error_at_equal_cost():
-    found = told(OURS, SOLVER, SOLUTION, ENGINE)
-    assert [str(line[0]).partition(" (")[0] for line in found.classes.rows] == [
-        kind.value for kind in MethodClass if kind != MethodClass.BASELINE
-    ]
-    ours = cells(found, MethodClass.GENERAL)
-    assert (ours["µs at 1e-3 rad"], ours["µs at 1e-6 rad"], ours["µs at 1e-9 rad"]) == ("2.0 (gauss)", "3.4 (gauss)", "–")
-    assert float(ours["error at equal cost"]) == 1e-7  # no smaller one was measured, at any cost
-    assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
-    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 (lame)"
-    assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
-    assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not support these motions, or was not measured"
-
-
-def test_the_fastest_line_stands_for_its_class_in_any_order():
-    faster = point("taylor", "ours", 1e-8, 1e-6)
-    for lines in ((OURS, faster, SOLVER), (faster, OURS, SOLVER)):
-        assert cells(told(*lines), MethodClass.GENERAL)["µs at 1e-6 rad"] == "1.0 (taylor)"
-
-
-def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_for_other_scenes():
-    outcomes = (("diverged", "gauss:stages=2"), ("diverged", "taylor"), ("unsupported", "gauss:stages=8"))
-    found = [row("convergence", name, "attitude error max", math.nan, outcome=outcome) for outcome, name in outcomes]
-    other = point("taylor", "ours", 1e-3, 1e-5)
-    ours = cells(told(OURS, other, troubles=frame(found)), MethodClass.GENERAL)
-    assert ours["where it fails"] == "diverged at some settings: gauss, taylor"
-
-
-def test_a_class_conserves_the_invariants_of_its_best_setting():
-    found = [row("long_runs", f"gauss:{k}", "energy drift max", drift) for k, drift in enumerate((1e-3, 1e-15))]
-    found += [
-        row("long_runs", "gauss", f"{name} drift max", drift) for name, drift in (("momentum", 1e-6), ("a momentum", 1e-15))
-    ]
-    drifts = frame(found)
-    assert cells(told(OURS, drifts=drifts), MethodClass.GENERAL)["conserves"] == "✓ energy; ≈ momenta"
-    assert cells(told(OURS), MethodClass.GENERAL)["conserves"] == "not measured"
-
-
 def test_the_best_of_a_family_is_its_front():
     bad = point("gauss:stages=2", "ours", 1e-2, 9e-6)
     picture = told(OURS, bad, SOLVER).points
@@ -135,25 +91,15 @@ def test_the_best_of_a_family_is_its_front():
 def test_at_most_eight_families_are_shown_at_first_of_both_sides():
     lines = [point(f"ours{k}", "ours", 10.0**-k, 1e-6) for k in range(1, 8)]
     lines += [point(f"engine{k}", "engine", 10.0**-k, 1e-6) for k in range(1, 8)]
-    shown = told(*lines).shown
+    shown = families.first_names(told(*lines).points)
     assert len(shown) == 8
     assert sorted(name[:4] for name in shown) == ["engi"] * 4 + ["ours"] * 4
-    assert told(OURS, SOLVER).shown == ("gauss", "scipy")
+    assert families.first_names(told(OURS, SOLVER).points) == ("gauss", "scipy")
 
 
-def random(*lines, drifts=NOTHING):
+def random(*lines):
     table = with_names(measurement.frame([each for rows in lines for each in rows]))
-    return random_bodies.summary(table, random_bodies.ratios(table), drifts)
-
-
-def test_random_bodies_have_a_row_a_class_too():
-    found = random(*TWICE)
-    ours, engine = cells(found, MethodClass.GENERAL), cells(found, MethodClass.SOLVER)
-    assert (ours["µs at 1e-6 rad"], engine["µs at 1e-6 rad"]) == ("1,000,000 (gauss)", "2,000,000 (heyoka)")
-    assert (float(ours["error at equal cost"]), ours["where it fails"]) == (1e-12, "nowhere here")
-    missed = random(*TWICE, *ENGINE_ALONE)
-    assert cells(missed, MethodClass.GENERAL)["where it fails"] == "misses 1e-6 on 1 of 2 bodies; misses 1e-9 on 1 of 2 bodies"
-    assert cells(missed, MethodClass.GENERAL)["µs at 1e-6 rad"] == "–"  # one of two is no mean of all
+    return random_bodies.summary(table, random_bodies.ratios(table))
 
 
 def test_random_bodies_have_points_where_most_of_them_get_there():
@@ -168,13 +114,6 @@ def test_hidden_lines_are_named():
     one, other = (pd.DataFrame({"x": [1.0, 2.0], "y": [y, 4.0]}) for y in (1e-16, 1.1e-16))
     lines = [("a", one), ("b", one), ("c", other), ("d", one)]  # drawn in this order, the last on top
     assert list(families.under(lines, "x", "y")) == ["Exactly under d: a, b."]
-
-
-def test_a_class_misses_no_body_that_its_adapters_do_not_support():
-    refused = line(3, "scipy", "engine", [(math.nan, math.nan)], outcome="unsupported")
-    found = random(*TWICE, line(0, "scipy", "engine", [(1e-13, 9.0)]), line(3, "gauss", "ours", [(1e-13, 1.0)]), refused)
-    assert cells(found, MethodClass.SOLVER)["where it fails"] == "nowhere here"
-    assert cells(found, MethodClass.SOLVER)["µs at 1e-6 rad"] == "2,000,000 (heyoka)"
 
 
 def test_the_sentence_has_the_interval_over_processes():

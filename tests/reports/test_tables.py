@@ -18,7 +18,6 @@ from conservative.reports.rows.points import points
 from conservative.reports.run import single_run
 from conservative.reports.sections import failures, hard_cases, recommendation, scene_contests, scenes
 from conservative.reports.sections import run as single
-from conservative.reports.sections.measured import scenes_in_trouble
 from conservative.trajectory import Trajectory
 
 from . import made_up, rows
@@ -220,15 +219,6 @@ def test_methods_are_ranked_by_their_drift():
     assert [line[0] for line in body] == ["reduced", "mujoco", "b"]
 
 
-def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
-    found = [
-        made_up.row("convergence", "a", "attitude error max", math.nan, outcome="unsupported"),
-        made_up.row("long_runs", "a", "energy drift max", 1e-15),
-    ]
-    assert scenes_in_trouble(frame(found)).empty
-    assert len(scenes_in_trouble(frame(found[:1]))) == 1
-
-
 @pytest.mark.parametrize(
     ("value", "text", "grade"),
     [
@@ -291,4 +281,3 @@ def test_longest_steps_are_a_matrix():
     ]
     body = hard_cases.stability(frame(found)).rows
     assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
-    assert scenes_in_trouble(frame(found)).empty

@@ -11,7 +11,7 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.rows import points as work_precision
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.rows.points import points
-from conservative.reports.sections import random_bodies, ratios, scene_contests, summary
+from conservative.reports.sections import random_bodies, ratios, scene_contests
 
 from .rows import frame, point, row, table, texts
 from .test_random_ratios import SLOWER, TWICE
@@ -124,17 +124,6 @@ TABLE = frame(
     ]
 )
 FOUND = scene_contests.each_step(TABLE, "made_up")
-
-
-def test_the_first_table_has_the_fastest_of_each_class_with_every_step_stored():
-    told = summary.of_scene(points(TABLE), frame([]), frame([]), integrable=True, each=FOUND)
-    position = told.classes.header.index("µs a sample, every step stored")
-    assert [line[position] for line in told.classes.rows] == [
-        "0.30 gauss; final state only: 0.10 reduced",
-        "0.10 lame; final state only: 0.010",
-        "0.60 heyoka; final state only: 0.050",
-        "–",  # its only error is too large
-    ]
 
 
 def test_contests_end_with_both_kinds_of_runs_in_the_units_of_their_columns():
