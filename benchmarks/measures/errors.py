@@ -67,21 +67,32 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
         position = np.linalg.norm(c - flight.fall(trajectory.scene, trajectory.t)[0], axis=1)
     if position is not None:
         measured += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
-    return measured + measure_drifts(trajectory)
+    return measured + measure_drifts(trajectory, truth)
 
 
-def measure_drifts(trajectory: Trajectory) -> list[Value]:
-    """Return the measures that need no reference solution: drift of each invariant, and orthonormality."""
+def measure_drifts(trajectory: Trajectory, truth: Trajectory | None = None) -> list[Value]:
+    """Return the drift of each invariant, and orthonormality.
+
+    With a truth, the drift of a balance is also given with the work or impulse of the truth, which is the truth's change of
+    energy or momentum, in place of the method's own.
+    """
     drifts: list[Value] = []
-    for invariant in trajectory.scene.invariants:
-        relative = trajectory.drift(invariant)
+    scene, n = trajectory.scene, len(trajectory)
+    relatives = {invariant.name: trajectory.drift(invariant) for invariant in scene.invariants}
+    if truth is not None:
+        R_ref, w_ref = scene.in_field_axes(truth.R_WB[:n], truth.t[:n]), truth.w_WB_B[:n]
+        R = scene.in_field_axes(trajectory.R_WB, trajectory.t)
+        for balance in (each for each in scene.invariants if each.supplied):
+            off = balance.evaluate(R, trajectory.w_WB_B) - balance.evaluate(R_ref, w_ref)
+            relatives[f"{balance.name}, loads of the truth"] = np.asarray(off / balance.scale)
+    for name, relative in relatives.items():
         size = sizes(relative)
         slope, stderr = secular_slope(trajectory.t, relative)
         drifts += [
-            Value(Measure.DRIFT_MAX, float(size.max()), invariant.name),
-            Value(Measure.DRIFT_FINAL, float(size[-1]), invariant.name),
-            Value(Measure.DRIFT_SLOPE, slope, invariant.name),
-            Value(Measure.DRIFT_SLOPE_STDERR, stderr, invariant.name),
+            Value(Measure.DRIFT_MAX, float(size.max()), name),
+            Value(Measure.DRIFT_FINAL, float(size[-1]), name),
+            Value(Measure.DRIFT_SLOPE, slope, name),
+            Value(Measure.DRIFT_SLOPE_STDERR, stderr, name),
         ]
     return [*drifts, Value(Measure.ORTHONORMALITY, float(orthonormality(trajectory.R_WB).max()))]
 

@@ -152,7 +152,7 @@ if COMPILED:
 
     @intrinsic
     def save_rows(typing, array, index, stride, values):
-        """Store the numbers of a tuple of tuples at index, index + stride and so on."""
+        """Store the numbers of a tuple of tuples at index, index + stride and so on. An array of rows counts as flat."""
 
         def build(context, builder, sig, args):
             at = args[1]
@@ -241,7 +241,7 @@ else:
 
     def save(array, index, value):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Store a number at index."""
-        array[index : index + np.size(value)] = value
+        array.reshape(-1)[index : index + np.size(value)] = value
 
     def save_rows(array, index, stride, values):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Store the numbers of a tuple of tuples at index, index + stride and so on."""

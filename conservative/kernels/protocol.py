@@ -73,7 +73,7 @@ def record(row, q, L, q_out, L_out):
 @small
 def record_supply(row, supplied, L_out):
     """Store the sums of work and impulse of the loads behind the momentum; nothing without loads."""
-    save_rows(L_out.reshape(-1), row * L_out.shape[1] + 3, 1, supplied[:4])
+    save_rows(L_out, row * L_out.shape[1] + 3, 1, supplied[:4])
 
 
 @small

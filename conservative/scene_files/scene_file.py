@@ -21,6 +21,7 @@ from ..check import describe, finite_array, finite_number, rotation, unit_vector
 from ..deferred_imports import BODY_FILES, list_entries, load_entry
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
+from ..potentials.load import Damping, Torque
 from ..potentials.point_to_point import LinearSpring, PointAttraction
 from ..potentials.potential import AnyPotential, Potential
 from ..potentials.turning import Orbit, Turning
@@ -29,7 +30,7 @@ from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
 from .toml_reader import TomlTable, keys_of, read
 
-_TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "start")
+_TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "torque", "damping", "start")
 # The keys of a potential or a shape are the parameters of its constructor.
 _POTENTIALS: dict[str, Callable[..., Potential]] = {
     "uniform_gravity": UniformGravity,
@@ -84,9 +85,10 @@ def load(path: str | Path) -> Scene:
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
     if flight and mass is None:
         raise top.bad("body", "the inertia alone", "inertia_com, mass and com_B, or a shape, together with p_WB or v_WB")
+    loads = {key: _load(top, key) for key in ("torque", "damping")}
     with top.blame(p_WB0="start", v_WB0="start"):
         moving = mass if flight and mass else body
-        return Scene(name, moving, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path), **flight)
+        return Scene(name, moving, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path), **loads, **flight)
 
 
 def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
@@ -158,6 +160,20 @@ def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None)
         return table.call(GravityGradient, inertia=body.inertia)
     table.only(known)
     return table.call(_POTENTIALS[kind])
+
+
+def _torque_table(times: ArrayLike, values: ArrayLike, frame: str = "body") -> Torque:
+    return Torque((times, values), frame)
+
+
+def _load(top: TomlTable, key: str) -> Any:
+    """Return the torque or the damping under `key`, or None."""
+    if key not in top:
+        return None
+    table = top.table(key, "value, N m, or times, s, and values" if key == "torque" else "matrix, N m s")
+    build: Callable[..., Any] = Damping if key == "damping" else _torque_table if "times" in table else Torque
+    table.only(keys_of(build))
+    return table.call(build)
 
 
 def _start(table: TomlTable) -> tuple[Array, Array, dict[str, Any]]:

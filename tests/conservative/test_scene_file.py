@@ -289,3 +289,32 @@ def test_windows_line_ends_do_not_move_the_lines(written):
     with pytest.raises(BadFile) as caught:
         scene_file.load(written(text))
     assert caught.value.line == 14
+
+
+LOADS = """
+[torque]
+times = [0.0, 1.0, 3.0]
+values = [[0, 0, 0], [0, 0, 0.1], [0.2, 0, 0]]
+frame = "world"
+[damping]
+matrix = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.02]]
+"""
+
+
+def test_torque_and_damping_of_a_file(tmp_path):
+    path = tmp_path / "loaded.toml"
+    path.write_text(scene_file.template() + LOADS)
+    scene = scene_file.load(path)
+    np.testing.assert_allclose(scene.torque.at(2.0), [0.1, 0, 0.05])
+    assert scene.torque.frame == "world"
+    assert scene.damping.matrix[2, 2] == 0.02
+    for good, bad, said in (
+        ("[0.2, 0, 0]]", "[0.2, 0, 0], [1, 1, 1]]", r"torque\.values: got shape \(4, 3\)"),
+        ("1.0, 3.0", "1.0, 0.5", r"torque\.times: got 0\.5 after 1"),
+        ("1.0, 3.0", "1.0, 1.5", r"torque: got a table from 0 to 1\.5 s at t = 1\.56"),
+        ("matrix", "tensor", r"damping\.tensor: got the unknown key 'tensor'"),
+        ("0.02]", "-0.02]", r"damping\.matrix: got .* with the eigenvalue -0\.02"),
+    ):
+        path.write_text(scene_file.template() + LOADS.replace(good, bad))
+        with pytest.raises(BadFile, match=said):
+            scene_file.load(path)
