@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -253,7 +254,9 @@ def find_misplaced(result: Trajectory, grid: Grid) -> str | None:
     if len(result) > len(t) or not np.allclose(result.t, t[: len(result)], rtol=1e-12, atol=0):
         return "samples at times that are not in the grid"
     R_off = np.abs(result.R_WB[:1] - scene.R_WB0) > START_TOLERANCE
-    w_off = np.abs(result.w_WB_B[:1] - scene.w_WB_B0) > START_TOLERANCE * np.abs(scene.w_WB_B0).max()
+    # At rest, rates are relative to the fastest that the energy allows.
+    speed = float(np.abs(scene.w_WB_B0).max()) or math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
+    w_off = np.abs(result.w_WB_B[:1] - scene.w_WB_B0) > START_TOLERANCE * speed
     off = bool(R_off.any() or w_off.any())
     if scene.flight and result.frame:
         arm = np.linalg.norm(scene.flight.com_B) * np.array([1.0, np.linalg.norm(scene.w_WB_B0)])

@@ -18,6 +18,7 @@ from .free_bodies import spherical_body as spherical_body
 from .free_bodies import stable_spin as stable_spin
 from .free_bodies import symmetric_body as symmetric_body
 from .free_bodies import thrown_box as thrown_box
+from .free_bodies import tiny_body as tiny_body
 from .free_bodies import tumbling_box as tumbling_box
 from .free_bodies import turned_brick as turned_brick
 from .free_bodies import unstable_spin as unstable_spin

@@ -203,6 +203,12 @@ def _box(name: str, sides: ArrayLike, mass: float, rates: ArrayLike, t_end: floa
     return _free_body(name, mass / 12 * (squares.sum() - squares), rates, t_end, 0.01, source)
 
 
+def tiny_body(t_end: float = 1.0) -> Scene:
+    """Return a body with moments of 1e-14 kg m^2. LAMMPS took moments below 1e-6 for zero until 2020, and did not turn it."""
+    inertia, source = (1e-14, 9.5e-15, 1e-15), "LAMMPS, issue 1657 (size of the moments; the start is ours)"
+    return _free_body("tiny_body", inertia, (1.0, 2.0, 3.0), t_end, 0.001, source)
+
+
 def needle(spin: float = 100.0, t_end: float = 2.0, slow: float = 1.0) -> Scene:
     """Return a needle with rates spin (0.2, 1, 0.1), `slow` times slower (see `slow_motion`).
 

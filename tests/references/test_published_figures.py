@@ -21,6 +21,7 @@ from conservative import registry
 from conservative.attitude import angle_between, rotation_about, to_quaternion
 from conservative.grid import Grid, grid_for
 from conservative.references.truth import reference
+from conservative.shapes import MassDistribution
 
 from ..environments import ROOT
 
@@ -68,6 +69,40 @@ MOTIONS = {
     "newton-body": free((0.2, 0.5, 0.4), (0.7, -0.5, 0.9), 0.2),
     "jsbsim-top": free((10, 20, 26), (1, 15, 1), 10),
     "jsbsim-start": free((10, 20, 26), (1, 15, 1), 0.1),  # before the first-order methods have lost the motion
+}
+
+# The circular orbit of RUN_10A at the semi-major axis of its initial state, and the long axis 5 and 1 degrees off the vertical.
+RATE = 0.0011362601963379464  # rad/s
+OFF = rotation_about((0, 0, 1), np.radians(5)) @ rotation_about((0, 1, 0), np.radians(1))
+CYLINDER = np.diag((500.0, 12250.0, 12250.0))
+EARTH = 7.292115e-5  # rotation, rad/s
+# y' = (y2 y3, -y1 y3, -0.51 y1 y2) in units SCALE of the rates of a body with these moments.
+KROGH, SCALE = (2.0, 3.0, 1.0), np.sqrt((1.53, 0.51, 3.0))
+BOX = MassDistribution(10, (0, 0, 0), (0.80833333, 0.68333333, 0.14166667))
+MOTIONS |= {
+    "gazebo-flight": cv.Scene("published", BOX, START, (0.1, 5, 0.1), 10, BOX.gravity(9.8), v_WB0=(-2, 2, 8)),
+    "nesc-brick": free((0.00189422, 0.006211019, 0.007194665), np.radians((10, 20, 30)), 30),
+    "jeod-cylinder": cv.Scene(
+        "published",
+        cv.RigidBody(CYLINDER),
+        OFF,
+        OFF.T @ (0, 0, RATE),
+        28800,
+        cv.Orbit(RATE, (0, 0, 1)).gravity_gradient(CYLINDER, (1, 0, 0)),
+    ),
+    "krogh": free(KROGH, SCALE * (0, 1, 1), 20),
+    "krogh-12": free(KROGH, SCALE * (0, 1, 1), 12),
+    "solfec-pendulum": cv.Scene(
+        "published",
+        cv.RigidBody((1, 1, 1)),
+        rotation_about((0, 1, 0), np.pi / 2),
+        (0, 0, 0),
+        26,
+        cv.UniformGravity(np.pi**2, (0, 0, -1)),
+    ),
+    "poinsot-symmetric": free((1, 1.1, 1), (0.5, 10, 0), 20),
+    "poinsot-flip": free((0.3, 0.35, 0.4), (0.1, 15, 0.1), 60),
+    "tiny-body": cv.scenes.tiny_body(),
 }
 
 
@@ -204,6 +239,89 @@ def halving_ratio(figure):  # of the quaternion's error against a step 16 times 
 def position_ratio(figure):  # of the centre of mass's error
     com = MOTIONS[figure.motion].potential.com_B
     return np.divide(*(np.linalg.norm((end(figure, part=k).R_WB[-1] - true_end(figure, k).R_WB[-1]) @ com) for k in (1, 2)))
+
+
+def flight_energy_error(figure):  # relative to the initial energy
+    trajectory = every_step(figure)
+    total = next(each for each in trajectory.scene.invariants if each.name == "total energy")
+    start = trajectory.scene.initial_value(total)
+    return np.abs(trajectory.drift(total)).max() * total.scale / start
+
+
+def flight_position_error(figure):  # of the centre of mass, m
+    trajectory = every_step(figure)
+    flight = trajectory.scene.flight
+    c, _ = flight.centre(trajectory.R_WB, trajectory.w_WB_B, *trajectory.place)
+    return np.linalg.norm(c - flight.fall(trajectory.scene, trajectory.t)[0], axis=1).max()
+
+
+def rates_in_degrees(figure):
+    return np.degrees(end(figure).w_WB_B[-1])
+
+
+def euler_angles_in_north_east_down(figure):  # yaw, pitch, roll; the axes turn about the first one with the Earth
+    R = rotation_about((1, 0, 0), -EARTH * end(figure).t[-1]) @ end(figure).R_WB[-1]
+    return np.degrees((np.arctan2(R[1, 0], R[0, 0]), -np.arcsin(R[2, 0]), np.arctan2(R[2, 1], R[2, 2])))
+
+
+def libration(figure):  # of the first body axis in the orbit's plane and out of it, rad
+    trajectory = every_step(figure)
+    (x, y, z), turn = trajectory.R_WB[:, :, 0].T, RATE * trajectory.t
+    return trajectory.t, np.arctan2(y * np.cos(turn) - x * np.sin(turn), x * np.cos(turn) + y * np.sin(turn)), np.arcsin(z)
+
+
+def in_plane_period(figure):
+    return period(*libration(figure)[:2])
+
+
+def out_of_plane_period(figure):
+    return period(*libration(figure)[::2])
+
+
+def in_plane_amplitude(figure):
+    return np.degrees(np.abs(libration(figure)[1]).max())
+
+
+def out_of_plane_amplitude(figure):
+    return np.degrees(np.abs(libration(figure)[2]).max())
+
+
+def period(t, x):  # mean over the run
+    i = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    times = t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])
+    return np.diff(times).mean()
+
+
+def krogh_state(figure):
+    return end(figure).w_WB_B[-1] / SCALE
+
+
+def period_of_the_first_rate(figure):
+    return period(every_step(figure).t, every_step(figure).w_WB_B[:, 0])
+
+
+def periods_of_the_first_rate(figure):
+    return every_step(figure).t[-1] / period_of_the_first_rate(SimpleNamespace(**vars(figure) | {"motion": "krogh"}))
+
+
+def period_of_the_second_rate(figure):
+    return period(every_step(figure).t, every_step(figure).w_WB_B[:, 1])
+
+
+def swing(figure):
+    return period(every_step(figure).t, every_step(figure).w_WB_B[:, 1])
+
+
+def ten_swings(figure):
+    return 10 * swing(figure)
+
+
+def energy_above_rest(figure):
+    return energy(figure) + MOTIONS[figure.motion].potential.scale()
+
+
+def turn(figure):
+    return angle_between(*end(figure).R_WB)
 
 
 def agrees(figure, measured):

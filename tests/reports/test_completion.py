@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
     [
         ("my_", ["my_body.toml"]),
         ("bric", ["brick_flip", "brick_of_mine.toml"]),
-        ("t", ["thrown_box", "tumbling_box", "tumbling_satellite", "turned_brick", "turned_top", "tops/"]),
+        ("t", ["thrown_box", "tiny_body", "tumbling_box", "tumbling_satellite", "turned_brick", "turned_top", "tops/"]),
         ("tops/", ["tops/deeper/", "tops/top.toml"]),
         ("./m", ["./my_body.toml"]),
         (".", [".hidden.toml"]),
