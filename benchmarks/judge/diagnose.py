@@ -32,9 +32,9 @@ EXPLAINED, FIRST_ROW = 0.5, 0.05  # largest shares of the error that are left, t
 CHANGE, LIMIT = 1e-6, 3.2  # of fitted numbers: for slopes, and their largest size
 READINGS = {
     "transposed": "The attitudes are transposed, or the quaternions conjugated: they map world to body",
-    "order xyzw": "The quaternion order is xyzw, but was read as wxyz",
-    "order wxyz": "The quaternion order is wxyz, but was read as xyzw",
-    "world rates": "The rates are in world axes",
+    "order xyzw": "The quaternion order is xyzw, but was read as wxyz: correct the names of the columns or --quaternion",
+    "order wxyz": "The quaternion order is wxyz, but was read as xyzw: correct the names of the columns or --quaternion",
+    "world rates": "The rates are in world axes; --rates world converts them",
 }
 NO_TERM = "The gyroscopic term is missing: without a torque the angular velocity is constant"
 DAMPED = "The rates are damped by {damping:.4g} per second"
@@ -52,7 +52,7 @@ FITTED: dict[str, tuple[str, Sequence[str]]] = {
         [f"turn_{i}" for i in (1, 2, 3)],
     ),
     "another body": (
-        "It is the motion of another body, with principal moments {moments} kg m^2 (or multiples, if it is free)",
+        "It is the motion of another body, with principal moments {moments} kg m^2 (if free: or multiples). Correct --body",
         [f"stretch_{ij}" for ij in (11, 12, 13, 22, 23, 33)],
     ),
     "first row": (
@@ -173,7 +173,9 @@ def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Findin
 def _finding(case: Case, name: str, text: str, values: dict[str, float], read: Case, motion: Motion) -> Finding:
     """Return the finding of a hypothesis: a reading of the case, and the motion next to it."""
     left, plain = read.errors(motion).max(axis=1).tolist(), case.error.max(axis=1).tolist()
-    text = text.format(**values, moments=np.sort(read.scene.body.moments).round(9).tolist())
+    moments, given = np.sort(read.scene.body.moments), case.scene.body.moments
+    moments = moments * (sum(given) / sum(moments) if case.scene.free else 1.0)  # only their ratios matter to a free body
+    text = text.format(**values, moments=", ".join(f"{each:.6g}" for each in moments))
     return Finding(name, text, values, left, plain, max(left) / max(*plain, FLOOR))
 
 
@@ -209,10 +211,11 @@ def _fitted(case: Case, name: str) -> Finding:
     def fit(p: Array) -> Finding:
         for of in (case.first(NEAR, 10), case) if names else ():
             better: Array | None = p
-            while better is not None:  # Gauss and Newton's method, with shorter steps where it overshoots
+            while better is not None:  # Gauss and Newton's method; where it overshoots, in fewer directions
                 p, now = better, residuals(better, of)
                 slopes = np.stack([residuals(p + each, of) - now for each in CHANGE * np.eye(len(p))], axis=1) / CHANGE
-                trials = p + np.array([[1.0], [0.3], [0.1], [0.01]]) * np.linalg.lstsq(slopes, -now, rcond=CHANGE)[0]
+                steps = (np.linalg.lstsq(slopes, -now, rcond=cut)[0] for cut in (CHANGE, 0.01, 0.1, 0.5))
+                trials = (p + share * step for step in steps for share in (1.0, 0.3))
                 better = next((q for q in trials if np.linalg.norm(residuals(q, of)) < 0.9 * np.linalg.norm(now)), None)
         return _finding(case, name, text, dict(zip(names, (p * units).tolist(), strict=True)), *build(p, case))
 
@@ -232,7 +235,7 @@ def _readings(case: Case, quaternion: bool) -> Iterator[Finding]:
     if quaternion:
         rolled = (from_quaternion(np.roll(to_quaternion(R), by, axis=1)) for by in (1, -1))
         attitudes |= dict(zip(("order xyzw", "order wxyz"), rolled, strict=True))
-    for name, world in list(product(attitudes, ("", "world rates")))[1:]:
+    for name, world in list(product(attitudes, ("", "world rates")[: 1 + (w is not None)]))[1:]:
         names = [each for each in (name, world) if each]
         read = case.read(attitudes[name], (w[:, None] @ attitudes[name])[:, 0] if world and w is not None else w)
         text = ". ".join(READINGS[each] for each in names)

@@ -146,7 +146,10 @@ def _choose(path: Path, names: list[str], euler: str | None, units: str | None) 
             texts = [str(split[name][1] or usual) for name in chosen]
             if not set(texts) <= UNITS.keys():
                 got = f"{path}, columns {', '.join(chosen)}, without a known unit"
-                raise BadInput("run", got, f"a header such as {chosen[0]} (deg/s), or --units deg, or --units rad")
+                header = re.sub(r"\s*[(\[].*", "", chosen[0])
+                raise BadInput(
+                    "run", got, f"a header such as {header} (deg/s), or a header without a unit and --units deg or --units rad"
+                )
             found[kind] = {name: UNITS[text] for name, text in zip(chosen, texts, strict=True)}
     if not found["time"] or not (found["rates"] or len(found) > 3):
         got = f"{path} without columns of {'attitudes or rates' if found['time'] else 'the time'}: {', '.join(names)[:300]}"
