@@ -36,29 +36,20 @@ READINGS = {
     "order wxyz": "The quaternion order is wxyz, but was read as xyzw: correct the names of the columns or --quaternion",
     "world rates": "The rates are in world axes; --rates world converts them",
 }
+TURN = "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad"
+BODY = "It is the motion of another body, with principal moments {moments} kg m^2 (if free: or multiples). Correct --body"
+FIRST = "The first row does not fit the others: the motion starts at another attitude or other rates"
 NO_TERM = "The gyroscopic term is missing: without a torque the angular velocity is constant"
 DAMPED = "The rates are damped by {damping:.4g} per second"
 FITTED: dict[str, tuple[str, Sequence[str]]] = {
     "time shift": ("Constant time shift: the file is {shift:+.4g} s ahead of the exact motion", ("shift",)),
-    "phase drift": (
-        "Phase drift of order 1: the motion is {rate:+.3g} s per second too fast, so that errors grow in proportion to time",
-        ("shift", "rate"),
-    ),
+    "phase drift": ("Phase drift of order 1: {rate:+.3g} s per second too fast, in proportion to time", ("shift", "rate")),
     "damped": (DAMPED, ("damping",)),
     "no gyroscopic term": (NO_TERM, ()),
     "no gyroscopic term, damped": (f"{NO_TERM}. {DAMPED}", ("damping",)),
-    "body axes": (
-        "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
-        [f"turn_{i}" for i in (1, 2, 3)],
-    ),
-    "another body": (
-        "It is the motion of another body, with principal moments {moments} kg m^2 (if free: or multiples). Correct --body",
-        [f"stretch_{ij}" for ij in (11, 12, 13, 22, 23, 33)],
-    ),
-    "first row": (
-        "The first row does not fit the others: the motion starts at another attitude or other rates",
-        [f"start_{name}_{i}" for name in ("turn", "rate") for i in (1, 2, 3)],
-    ),
+    "body axes": (TURN, [f"turn_{i}" for i in (1, 2, 3)]),
+    "another body": (BODY, [f"stretch_{ij}" for ij in (11, 12, 13, 22, 23, 33)]),
+    "first row": (FIRST, [f"start_{name}_{i}" for name in ("turn", "rate") for i in (1, 2, 3)]),
 }
 """Sentences of the hypotheses with fitted numbers, and the names of these."""
 

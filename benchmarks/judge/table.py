@@ -76,9 +76,8 @@ def read(path: Path, quaternion: str | None, euler: str | None, world: bool, uni
         }
         for what, bad in wrong.items():
             if np.any(bad):
-                raise BadInput(
-                    "run", f"{path}, row {rows + 1 + np.argmax(bad)}: {what}", "a file in which that row is repaired"
-                )
+                got = f"{path}, row {rows + 1 + np.argmax(bad)}: {what}"
+                raise BadInput("run", got, "a file in which that row is repaired")
         kept.append(values[-rows % every :: every])
         rows, last = rows + len(values), values[-1, 0]
         while sum(map(len, kept)) > 2 * ROWS:
@@ -96,15 +95,11 @@ def read(path: Path, quaternion: str | None, euler: str | None, world: bool, uni
         R = Rotation.from_euler(euler.upper(), rest).as_matrix()
     if world and w is not None:
         if R is None:
-            raise BadInput(
-                "rates", "'world', for a file without attitudes", "body, or a file with attitudes, which convert them"
-            )
+            raise BadInput("rates", "'world', for a file without attitudes", "body, or a file with attitudes to convert them")
         w = (w[:, None] @ R)[:, 0]
-    norm = np.linalg.norm(rest, axis=1) if "quaternion" in found else None
+    norm, known = np.linalg.norm(rest, axis=1) if "quaternion" in found else None, quaternion is not None or not numbered
     degrees = any(size < 1 for size in found["rates"].values())
-    return Recording(
-        values[:, 0] - values[0, 0], (R, w), norm, quaternion is not None or not numbered, degrees, list(found["ignored"]), rows
-    )
+    return Recording(values[:, 0] - values[0, 0], (R, w), norm, known, degrees, list(found["ignored"]), rows)
 
 
 def _chunks(path: Path) -> Iterator[pd.DataFrame]:
@@ -147,9 +142,7 @@ def _choose(path: Path, names: list[str], euler: str | None, units: str | None) 
             if not set(texts) <= UNITS.keys():
                 got = f"{path}, columns {', '.join(chosen)}, without a known unit"
                 header = re.sub(r"\s*[(\[].*", "", chosen[0])
-                raise BadInput(
-                    "run", got, f"a header such as {header} (deg/s), or a header without a unit and --units deg or --units rad"
-                )
+                raise BadInput("run", got, f"a header such as {header} (deg/s), or one without a unit and --units deg or rad")
             found[kind] = {name: UNITS[text] for name, text in zip(chosen, texts, strict=True)}
     if not found["time"] or not (found["rates"] or len(found) > 3):
         got = f"{path} without columns of {'attitudes or rates' if found['time'] else 'the time'}: {', '.join(names)[:300]}"

@@ -98,7 +98,7 @@ WRONG = {
     "one rate": (lambda c: [c.pop(name) for name in list(c)[2:]], "without columns of attitudes or rates"),
     "no unit": (
         lambda c: c.update({f"w_{axis}": c.pop(f"w_{axis} (rad/s)") for axis in "xyz"}),
-        "--units deg",
+        "--units deg or rad",
     ),
     "backwards": (lambda c: c.update(time=np.where(T[7] == T, 0, T)), "row 8: a time that is not later"),
     "not a number": (lambda c: c.update(q_w=np.where(T[4] == T, np.nan, Q[:, 0])), "row 5: a value that is not a finite"),
