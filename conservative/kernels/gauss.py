@@ -3,11 +3,12 @@
 Unknowns are the momentum L and the vertical gamma = R' e_z, both in principal axes (for a free body gamma is the direction of
 the world momentum): a closed system of six,
 
-    L' = L x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
+    L' = (L + r) x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
 
-with the quadratic invariants energy L.w/2 + c.gamma, L.gamma and gamma.gamma, which collocation at Gauss points keeps at any
-step. What is left of the attitude is one angle about the vertical, a quadrature. With the minimal rotation M that takes gamma
-to a unit vector a fixed in the body, and a constant rotation C that takes a to e_z,
+with the momentum r of a rotor and the quadratic invariants energy L.w/2 + c.gamma, (L + r).gamma and
+gamma.gamma, which collocation at Gauss points keeps at any step. What is left of the attitude is one angle about the vertical,
+a quadrature. With the minimal rotation M that takes gamma to a unit vector a fixed in the body, and a constant rotation C that
+takes a to e_z,
 
     R = Rz(phi) C M(gamma),    phi' = w.(gamma + a) / (1 + gamma.a),    R1 = Rz(phi1 - phi0) R0 M(gamma0)' M(gamma1).
 
@@ -29,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .fields import whole
 from .lanes import FOUR, lane_of, load, save, splat
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers
@@ -56,7 +58,7 @@ class Model(NamedTuple):
 
     1/J and the moment c of the field in these units; `loose` is 1 for each component of L from which round-off may be removed,
     else 0; L and gamma at the start, the attitude q there against axes whose third is along gamma, and `left`, which takes
-    those axes to the world's.
+    those axes to the world's. `rotor` is the momentum of the rotor, which L does not contain, or None.
     """
 
     unit: float
@@ -67,6 +69,7 @@ class Model(NamedTuple):
     gamma: Any
     q: Any
     left: Any
+    rotor: Any
 
 
 class Coefficients(NamedTuple):
@@ -81,10 +84,12 @@ class Coefficients(NamedTuple):
 
 
 @small
-def rates(J_inverse, c, L, g):
+def rates(J_inverse, rotor, c, L, g):
     """(L', gamma') of four states."""
     w = (J_inverse[0] * L[0], J_inverse[1] * L[1], J_inverse[2] * L[2])
     v = (-J_inverse[0] * L[0], -J_inverse[1] * L[1], -J_inverse[2] * L[2])
+    if rotor is not None:
+        L = (L[0] + splat(rotor[0]), L[1] + splat(rotor[1]), L[2] + splat(rotor[2]))
     x = fuse(L[1], w[2], fuse(L[2], v[1], fuse(splat(-c[1]), g[2], c[2] * g[1])))
     y = fuse(L[2], w[0], fuse(L[0], v[2], fuse(splat(-c[2]), g[0], c[0] * g[2])))
     z = fuse(L[0], w[1], fuse(L[1], v[0], fuse(splat(-c[0]), g[1], c[1] * g[0])))
@@ -138,7 +143,7 @@ def add_squares(a, b, total):
 
 
 @small
-def sweep(M, s, h, J_inverse, c, L0, g0, F, old, new, Z):
+def sweep(M, s, h, J_inverse, rotor, c, L0, g0, F, old, new, Z):
     """Z = (L0, g0) + h F M' of the rates from F[old] on; write those at Z to F[new] and return the square of the change of Z.
 
     Z holds six rows of stages, their number a multiple of four.
@@ -147,7 +152,7 @@ def sweep(M, s, h, J_inverse, c, L0, g0, F, old, new, Z):
     for i in range(0, width, FOUR):
         dL, dg = combine(M, s, width, i, F, old)
         L, g = shift(L0, step, dL), shift(g0, step, dg)
-        n, v = rates(J_inverse, c, L, g)
+        n, v = rates(J_inverse, rotor, c, L, g)
         put_six(F, width, new + i, n, v)
         before = load_six(Z, width, i)
         square = add_squares(g, before[1], add_squares(L, before[0], square))
@@ -156,7 +161,7 @@ def sweep(M, s, h, J_inverse, c, L0, g0, F, old, new, Z):
 
 
 @partial(small, ahead=True)  # a step of 2 to 6 stages takes 7 to 10 % longer without
-def solve_stages(A, s, h, J_inverse, c, L, g, F, old, Z):
+def solve_stages(A, s, h, J_inverse, rotor, c, L, g, F, old, Z):
     """Iterate Z = (L, g) + h A f(Z) from the rates at F[old].
 
     Return where those at Z are, the number of sweeps, the square of the last change and whether it is of round-off.
@@ -164,7 +169,7 @@ def solve_stages(A, s, h, J_inverse, c, L, g, F, old, Z):
     before = earlier = 0.0
     new = Z.shape[0] - old
     for sweeps in range(1, MOST_SWEEPS + 1):
-        square = sweep(A, s, h, J_inverse, c, L, g, F, old, new, Z)
+        square = sweep(A, s, h, J_inverse, rotor, c, L, g, F, old, new, Z)
         old, new = new, old
         fast = 4.0 * square < before
         if (fast and square * square <= ENOUGH * before) or (not fast and square < STAGNATION):
@@ -177,9 +182,9 @@ def solve_stages(A, s, h, J_inverse, c, L, g, F, old, Z):
 
 
 @small
-def hold_rates(J_inverse, c, L, g, F, width):
+def hold_rates(J_inverse, rotor, c, L, g, F, width):
     """Write the rates of one state to F for all stages."""
-    n, v = rates(J_inverse, c, (splat(L[0]), splat(L[1]), splat(L[2])), (splat(g[0]), splat(g[1]), splat(g[2])))
+    n, v = rates(J_inverse, rotor, c, (splat(L[0]), splat(L[1]), splat(L[2])), (splat(g[0]), splat(g[1]), splat(g[2])))
     for i in range(0, width, FOUR):
         put_six(F, width, i, n, v)
 
@@ -279,9 +284,9 @@ def add_carried(v, carry, d):
 
 
 @small
-def values(J_inverse, c, L, g):
+def values(J_inverse, rotor, c, L, g):
     """Energy and vertical momentum, in the units of the model."""
-    return 0.5 * dot(L, times(J_inverse, L)) + dot(c, g), dot(L, g)
+    return 0.5 * dot(L, times(J_inverse, L)) + dot(c, g), dot(whole(rotor, L), g)
 
 
 move = trace(shortest_move)
@@ -289,14 +294,14 @@ move = trace(shortest_move)
 
 
 @small
-def remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, g, g_carry):
+def remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, g, g_carry):
     """Bring energy and momentum back to `kept` and the length of gamma to 1, where they are off by more than ROUND_OFF."""
-    now = values(J_inverse, c, L, g)
+    now = values(J_inverse, rotor, c, L, g)
     e, m, longer = kept[0] - now[0], kept[1] - now[1], 0.5 - 0.5 * dot(g, g)
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
         return L, L_carry, g, g_carry
     w, T = times(J_inverse, L), cross(g, c)
-    dL, turn, _ = move(loose, (size, 1.0), w, L, T, e - longer * dot(c, g), m - longer * now[1], g)
+    dL, turn, _ = move(loose, (size, 1.0), w, whole(rotor, L), T, e - longer * dot(c, g), m - longer * now[1], g)
     L, L_carry = add_carried(L, L_carry, dL)
     g, g_carry = add_carried(g, g_carry, add(scale(longer, g), cross(g, turn)))
     return L, L_carry, g, g_carry
@@ -305,21 +310,21 @@ def remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, g, g_carry):
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where its sweeps do not converge; the size is the change of the last."""
-    unit, J_inverse, c, loose, L, gamma, q, left = model
+    unit, J_inverse, c, loose, L, gamma, q, left, rotor = model
     s, A, E, b, b_low, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     width = b.shape[0]
     F, Z, at = np.zeros(12 * width), np.zeros(6 * width), 0
     none = (0.0, 0.0, 0.0)
     L_carry, g_carry, q_carry, phi, phi_carry = none, none, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0
-    kept = values(J_inverse, c, L, gamma)
+    kept = values(J_inverse, rotor, c, L, gamma)
     size = 0.5 * dot(L, times(J_inverse, L)) + math.sqrt(dot(c, c))
     store(0, left, phi, q, gamma, unit, L, q_out, L_out)
-    hold_rates(J_inverse, c, L, gamma, F, width)
+    hold_rates(J_inverse, rotor, c, L, gamma, F, width)
     guess, row, work, square, until_pause = A, 0, 0, 0.0, pause
     for step in range(1, n_steps + 1):
-        sweep(guess, s, h, J_inverse, c, L, gamma, F, at, 6 * width - at, Z)
-        at, sweeps, square, good = solve_stages(A, s, h, J_inverse, c, L, gamma, F, 6 * width - at, Z)
+        sweep(guess, s, h, J_inverse, rotor, c, L, gamma, F, at, 6 * width - at, Z)
+        at, sweeps, square, good = solve_stages(A, s, h, J_inverse, rotor, c, L, gamma, F, 6 * width - at, Z)
         work += sweeps
         if not good:
             return Result(step - 1, (step - 1) * s, work, None, math.sqrt(square), False)
@@ -331,7 +336,7 @@ def march(model, coefficients, workspace):
         dL, dg = weigh(b, b_low, F, at)
         L, L_carry = add_carried(L, L_carry, scale(h, dL))
         gamma, g_carry = add_carried(gamma, g_carry, scale(h, dg))
-        L, L_carry, gamma, g_carry = remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, gamma, g_carry)
+        L, L_carry, gamma, g_carry = remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, gamma, g_carry)
         q, q_carry = carry_attitude(q, q_carry, a, length, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1

@@ -22,7 +22,10 @@ The integrands are even and have no singularity where |y| is below about 1/nu, w
 Gauss's quadrature with eight nodes, of which four are evaluated, is therefore exact to round-off for nu h < 1/2; longer
 rotations are made in parts.
 
-AXES: rotations about the axes 3, 2, 1, 2, 3, as if the body had no other rate.
+With the momentum r of a rotor, the kinetic energy (L - r)'J^-1(L - r)/2 also has the part -L.J^-1 r, whose exact flow turns the
+body at a constant rate: half of it is taken before the exact rotation, half after it.
+
+AXES: rotations about the axes 3, 2, 1, 2, 3, as if the body had no other rate. With a rotor each has the rate (L_i - r_i)/J_i.
 
 ENDS, MIDDLE: discrete Moser-Veselov (DMV) steps, q1 = q0 (1, c) / sqrt(1 + c.c). The Cayley vector c solves
 
@@ -42,7 +45,7 @@ import numpy as np
 
 from . import entry, kernel, small
 from .elliptic import sine_and_cosine
-from .fields import at_time, body_torque
+from .fields import at_time, body_torque, whole
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import add_momentum, turn_attitude
 from .signals import call_handlers, end_of_block
@@ -64,7 +67,8 @@ NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.lege
 class Model(NamedTuple):
     """Moments, kg m^2, and their inverses, field or None, attitude and momentum, kg m^2/s, at the start.
 
-    Principal axes; the second moment is the intermediate one. `kind` is that of the rotations.
+    Principal axes; the second moment is the intermediate one. `kind` is that of the rotations. `rotor` is the momentum of the
+    rotor, kg m^2/s, which L does not contain, or None. The steps are those of the whole momentum L + rotor.
     """
 
     J: Any
@@ -73,6 +77,7 @@ class Model(NamedTuple):
     q: Any
     L: Any
     kind: int
+    rotor: Any
 
 
 class Coefficients(NamedTuple):
@@ -161,10 +166,10 @@ def rotate_exactly(h, k, q, q_carry, L, L_carry):
 
 
 @small
-def rotate_about_axis(axis, h, k, q, L):
+def rotate_about_axis(axis, h, k, rotor, q, L):
     """Return attitude and momentum after a rotation about a principal axis, as if the body had no other rates."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    s, c = sine_and_cosine(0.5 * h * k[axis] * L[axis])
+    s, c = sine_and_cosine(0.5 * h * k[axis] * (L[axis] if rotor is None else L[axis] - rotor[axis]))
     sine, cosine = 2.0 * s * c, 1.0 - 2.0 * s * s
     u, v = cosine * L[i] + sine * L[j], cosine * L[j] - sine * L[i]
     a, b, d, e = q[0], q[1 + axis], q[1 + i], q[1 + j]
@@ -174,6 +179,20 @@ def rotate_about_axis(axis, h, k, q, L):
     if axis == 1:
         return (a, e, b, d), (v, L[1], u)
     return (a, d, e, b), (u, v, L[2])
+
+
+@small
+def turn_with_rotor(h, k, rotor, q, q_carry, L, L_carry):
+    """Return attitude and momentum after h of the part -L.J^-1 r of the energy: a constant rate -J^-1 r of the body."""
+    rate = times(k, rotor)
+    speed = math.sqrt(dot(rate, rate))
+    s, c = sine_and_cosine(0.5 * h * speed)
+    a = scale(-s / (c * speed), rate)
+    turned = cross(a, L)
+    gain = scale(2.0 / (1.0 + dot(a, a)), subtract(cross(a, turned), turned))
+    q, q_carry = turn_attitude(a, q, q_carry)
+    L, L_carry = add_momentum(L, L_carry, gain)
+    return q, q_carry, L, L_carry
 
 
 @small
@@ -214,14 +233,14 @@ def solve(h, t, J, J_inverse, field, middle, q, L):
 
 
 @small
-def rotate(kind, h, t, J, k, field, q, q_carry, L, L_carry):
+def rotate(kind, h, t, J, k, rotor, field, q, q_carry, L, L_carry):
     """Return attitude and momentum after a rotation from time t, s; corrections, size of the last, and whether it exists."""
     if kind == AXES:
-        q, L = rotate_about_axis(2, 0.5 * h, k, q, L)
-        q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
-        q, L = rotate_about_axis(0, h, k, q, L)
-        q, L = rotate_about_axis(1, 0.5 * h, k, q, L)
-        q, L = rotate_about_axis(2, 0.5 * h, k, q, L)
+        q, L = rotate_about_axis(2, 0.5 * h, k, rotor, q, L)
+        q, L = rotate_about_axis(1, 0.5 * h, k, rotor, q, L)
+        q, L = rotate_about_axis(0, h, k, rotor, q, L)
+        q, L = rotate_about_axis(1, 0.5 * h, k, rotor, q, L)
+        q, L = rotate_about_axis(2, 0.5 * h, k, rotor, q, L)
         return q, q_carry, L, L_carry, 0, 0.0, True
     if kind == EXACT:
         w, (g1, g2, g3) = times(k, L), (k[2] - k[1], k[0] - k[2], k[1] - k[0])
@@ -230,8 +249,12 @@ def rotate(kind, h, t, J, k, field, q, q_carry, L, L_carry):
         parts = 1.0 + abs(h) * math.sqrt(4.0 * nu_squared + 0.25 * dot(w, w))
         if not parts < MOST_PARTS:
             return q, q_carry, L, L_carry, 0, parts, False
+        if rotor is not None:
+            q, q_carry, L, L_carry = turn_with_rotor(0.5 * h, k, rotor, q, q_carry, L, L_carry)
         for _ in range(int(parts)):
             q, q_carry, L, L_carry = rotate_exactly(h / int(parts), k, q, q_carry, L, L_carry)
+        if rotor is not None:
+            q, q_carry, L, L_carry = turn_with_rotor(0.5 * h, k, rotor, q, q_carry, L, L_carry)
         return q, q_carry, L, L_carry, 0, 0.0, True
     c, l, kick, corrections, size, found = solve(h, t, J, k, field, kind == MIDDLE, q, L)  # noqa: E741
     turned = cross(c, l)
@@ -244,13 +267,14 @@ def rotate(kind, h, t, J, k, field, q, q_carry, L, L_carry):
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`)."""
-    J, k, field, q, L, kind = model
+    J, k, field, q, L, kind, rotor = model
     rotations, kicks, nodes, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     stages = len(rotations)
     pause = max(1, pause // stages) if pause > 0 else 0
     q_carry, L_carry = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     record(0, q, L, q_out, L_out)
+    L = whole(rotor, L)
     row, until_sample, done, corrections, size = 0, every, 0, 0, 0.0
     T = torque(field, 0.0, q)
     while done < n_steps:
@@ -260,7 +284,7 @@ def march(model, coefficients, workspace):
                 part, t = rotations[stage], (step - 1) * h + nodes[stage]
                 if part != 0.0:
                     q, q_carry, L, L_carry, more, size, found = rotate(
-                        kind, part, t - part, J, k, field, q, q_carry, L, L_carry
+                        kind, part, t - part, J, k, rotor, field, q, q_carry, L, L_carry
                     )
                     corrections += more
                     if not found:
@@ -273,7 +297,7 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                record(row, q, L, q_out, L_out)
+                record(row, q, L if rotor is None else subtract(L, rotor), q_out, L_out)
         done = last
         if done < n_steps:
             call_handlers()

@@ -3,7 +3,9 @@
 The third of the axes D is the field's axis; for a free body it is the direction of the momentum. The state consists of g and
 a, the third and the first row of the attitude's matrix relative to D, and the rates w, all in principal axes:
 
-    g' = g x w        a' = a x w        J w' = J w x w + T        T = g x dV/dg
+    g' = g x w        a' = a x w        J w' = (J w + r) x w + T        T = g x dV/dg
+
+with the momentum r of a rotor.
 
 If the field turns about an axis perpendicular to its own, the axes D turn with it at the rate u, about the second of them.
 Then g' has the additional term u a and a' the additional term -u g. The Jacobi integral E - u b.L, with the second row b, is
@@ -54,7 +56,8 @@ class Model(NamedTuple):
     `J` and `J_inverse` are the moments and their inverses. `loose` is 1 for each component of L that a projection may change,
     otherwise 0. `scales` are the reference scales of energy, J, and momentum, kg m^2/s. `left` is the quaternion of the
     rotation from axes D to world axes. `g` and `a` are the third and the first row of the matrix relative to D, `q` and `L` the
-    attitude in the world and the momentum, all at the start.
+    attitude in the world and the momentum, all at the start. `rotor` is the momentum of the rotor, which L does not contain; ()
+    without one.
     """
 
     J: Any
@@ -67,6 +70,7 @@ class Model(NamedTuple):
     a: Any
     q: Any
     L: Any
+    rotor: Any = ()
 
 
 class Coefficients(NamedTuple):
@@ -94,35 +98,42 @@ class Free(NamedTuple):
         return lambda c, n: None
 
 
-def values(field, constants, L, n, g, w):
+def whole(rotor, L):
+    """Return the momentum L of the body with that of its rotor, which is () without one."""
+    return add(L, rotor) if rotor else L
+
+
+def values(field, constants, L, rotor, n, g, w):
     """Return energy and momentum about the axis for n g instead of g, to first order, and dV/dg."""
     V, slope = field.slope(constants, g)
-    return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
+    return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(whole(rotor, L), g), slope
 
 
-def turning_values(field, constants, L, n, g, upright, w):
+def turning_values(field, constants, L, rotor, n, g, upright, w):
     """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, for n g and `upright` as g and a."""
-    energy, momentum, slope = values(field, constants, L, n, g, w)
+    energy, momentum, slope = values(field, constants, L, rotor, n, g, w)
     o = scale(field.rate * n, cross(g, upright))
-    return energy - dot(L, o), momentum, slope, o
+    return energy - dot(whole(rotor, L), o), momentum, slope, o
 
 
 @trace
 def begin(model):
-    """Return (constants of the field, (J, J_inverse, loose), conserved values, scales and their inverses), K, and the rates.
+    """Return (constants of the field, (J, J_inverse, loose, r), conserved values, scales and their inverses), K, and the rates.
 
-    K = ((J2 - J3)/J1, (J3 - J1)/J2, (J1 - J2)/J3).
+    K = ((J2 - J3)/J1, (J3 - J1)/J2, (J1 - J2)/J3), and with a rotor of momentum r also J^-1 (r2, r3, r1) and J^-1 (r3, r1, r2).
     """
-    J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
+    J, J_inverse, field, scales, rotor = model.J, model.J_inverse, model.field, model.scales, getattr(model, "rotor", ())
     constants, w = field.find_constants(J_inverse), times(J_inverse, model.L)
     K = times((J[1] - J[2], J[2] - J[0], J[0] - J[1]), J_inverse)
+    if rotor:
+        K = (*K, *times(J_inverse, (rotor[1], rotor[2], rotor[0])), *times(J_inverse, (rotor[2], rotor[0], rotor[1])))
     n, upright, _ = straighten(model.g, model.a)
     if isinstance(field, Turned):
-        kept = turning_values(field, constants, times(J, w), n, model.g, upright, w)[:2]
+        kept = turning_values(field, constants, times(J, w), rotor, n, model.g, upright, w)[:2]
     else:
-        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
+        kept = values(field, constants, times(J, w), rotor, n, model.g, w)[:2]
     scales = scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1]
-    return (constants, (J, J_inverse, model.loose), kept, scales), K, w
+    return (constants, (J, J_inverse, model.loose, rotor), kept, scales), K, w
 
 
 def expand(field, constants, order, h, K, g, a, w):
@@ -130,12 +141,24 @@ def expand(field, constants, order, h, K, g, a, w):
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
     turn = series.spread(field.rate) if isinstance(field, Turned) else None
-    ratio = series.vector(*constants) if isinstance(field, Free) else None
+    ratio = series.vector(*constants) if isinstance(field, Free) and len(K) == 3 else None
     accelerate, terms = field.series(constants, g, series), Vectors(series, len(start))
-    sums = sum_orders(series, terms, series.spread(h), start, series.vector(*K), accelerate, turn, ratio)
+    if len(K) > 3:
+        accelerate = add_rotor(accelerate, series.vector(*K[3:6]), series.vector(*K[6:]))
+    sums = sum_orders(series, terms, series.spread(h), start, series.vector(*K[:3]), accelerate, turn, ratio)
     change, last, before = sum_to_order(order, sums)
     end = tuple(v + d for v, d in zip(start, change, strict=True))
     return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
+
+
+def add_rotor(accelerate, first, second):
+    """Return `accelerate` with the torque r x w of a rotor of momentum r; the vectors are those of `begin`."""
+
+    def accelerate_all(c, n):
+        torque, own = accelerate(c, n), first * c[n, 5] - second * c[n, 4]
+        return own if torque is None else torque + own
+
+    return accelerate_all
 
 
 @trace
@@ -174,35 +197,37 @@ def correct_in_field(field, constants, body, kept, scales, g, a, w):
     that no product waits for another. The remaining defect is of the size of the square of the first one, plus the share that
     regularisation leaves.
     """
-    J, J_inverse, loose = body
+    J, J_inverse, loose, rotor = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
-    energy, momentum, slope = values(field, constants, L, n, g, w)
+    energy, momentum, slope = values(field, constants, L, rotor, n, g, w)
     e, m = kept[0] - energy, kept[1] - momentum
     wanted = significant(e, scales[0]), significant(m, scales[1])
-    dL, turn, rest = shortest_move(loose, scales, w, L, cross(g, slope), *wanted, g)
+    dL, turn, rest = shortest_move(loose, scales, w, whole(rotor, L), cross(g, slope), *wanted, g)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
     return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3] + off, rest
 
 
 def correct_free(field, constants, body, kept, scales, g, a):
     """Correct a free body: the momentum is along g, so w follows from g, and rotating g restores the energy."""
-    J_inverse, (n, upright, off) = body[1], straighten(g, a)
+    (_, J_inverse, _, rotor), (n, upright, off) = body, straighten(g, a)
     L = scale(n * field.momentum, g)
-    e, slope = kept[0] - 0.5 * dot(L, times(J_inverse, L)), cross(times(J_inverse, L), L)
+    own = subtract(L, rotor) if rotor else L
+    e, slope = kept[0] - 0.5 * dot(own, times(J_inverse, own)), cross(times(J_inverse, own), L)
     flat = FLAT * (scales[0] * scales[0])
     over = 1.0 / (dot(slope, slope) + flat + TINY)
     turn = scale(significant(e, scales[0]) * over, slope)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
-    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off, flat * over
+    L = scale(field.momentum, g)
+    return g, a, times(J_inverse, subtract(L, rotor) if rotor else L), abs(e) * scales[2] + off, flat * over
 
 
 def correct_revolving(field, constants, body, kept, scales, g, a, w):
     """Correct a state in a field that turns at rates o: the gradients of the Jacobi integral are w - o and -(T + L x o)."""
-    J, J_inverse, _ = body
+    J, J_inverse, _, rotor = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
-    jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
+    jacobi, _, slope, o = turning_values(field, constants, L, rotor, n, g, upright, w)
     e = kept[0] - jacobi
-    v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
+    v, T = subtract(w, o), add(cross(g, slope), cross(whole(rotor, L), o))
     square, flat = scales[1] * scales[1], FLAT * (scales[0] * scales[0])
     over = 1.0 / (square * dot(v, v) + dot(T, T) + flat + TINY)
     x = significant(e, scales[0]) * over
@@ -214,7 +239,7 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
 def find_correction(field, constants, body, kept, scales, g, a, w):
     """Return (g, a, w) closer to orthonormality and to the values `kept`, the relative defect before, and the share left.
 
-    `body` is (J, J_inverse, loose) of `Model`. The share is the part of the defect that regularisation leaves.
+    `body` is (J, J_inverse, loose, rotor) of `Model`. The share is the part of the defect that regularisation leaves.
     """
     if isinstance(field, Free):
         return correct_free(field, constants, body, kept, scales, g, a)

@@ -68,8 +68,8 @@ def moments_of_gravity(bodies: Batch, R_BP: Array) -> Array:
 
 
 def in_gravity_or_free(bodies: Batch) -> bool:
-    """Return whether kernels with lanes support the field of the bodies."""
-    return isinstance(bodies.scene.potential, UniformGravity | None)
+    """Return whether kernels with lanes support the field of the bodies, which have no rotor."""
+    return bodies.scene.body.rotor_momentum is None and isinstance(bodies.scene.potential, UniformGravity | None)
 
 
 def take_pieces(n_steps: int, cost: float, take: Callable[[int, int], object]) -> None:

@@ -70,6 +70,7 @@ class Gauss(Method):
         colour="indigo",
         kernel="gauss",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
+        rotors=True,
     )
 
     def __post_init__(self) -> None:
@@ -103,13 +104,15 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its initial state in principal axes, and the kernel's model."""
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
-    R_WP, L, size = from_quaternion(start.q), np.array(start.L), math.hypot(*start.L)
+    R_WP, L = from_quaternion(start.q), np.array(start.L)
+    whole = L if start.rotor is None else L + start.rotor
+    size = math.hypot(*whole)
     # For a free body, the direction of the momentum replaces the vertical.
     falls = start.field is not None or size == 0
-    R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
+    R_WV = np.eye(3) if falls else axes_about(R_WP @ whole / size)
     moment = np.zeros(3) if start.field is None else np.array(start.field)
     # A power of two, so that scaling does not round. For a body at rest, the momentum that its field can produce.
-    largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
+    largest = max(size, math.hypot(*start.L), math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
     unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
     model = kernels("gauss").Model(
         unit,
@@ -117,9 +120,10 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
         triple(moment / unit),
         (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # the momentum about the axis of symmetry does not change
         triple(L / unit),
-        triple(R_WP[2] if falls else L / size),
+        triple(R_WP[2] if falls else whole / size),
         quadruple(R_WV.T @ R_WP),
         quadruple(R_WV),
+        None if start.rotor is None else triple(np.array(start.rotor) / unit),
     )
     return replace(method, frame=frame).label, start, model
 

@@ -17,7 +17,7 @@ from ..grid import Grid
 from ..method import Method, Role, Run
 from ..scene import Scene
 from .bounds import within_round_off
-from .coefficients.splittings import Lengths, lengths_of
+from .coefficients.splittings import SEQUENCES, Lengths, lengths_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
 from .units import in_own_units
@@ -61,6 +61,7 @@ class Splitting(Method):
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
         time_dependent=True,
+        rotors=True,
     )
     kind: ClassVar[str] = "EXACT"
 
@@ -80,12 +81,18 @@ class Splitting(Method):
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
+        if scene.body.rotor_momentum is None:
+            return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
+        if self.kind in ("ENDS", "MIDDLE"):
+            return "it is for bodies without a rotor; Splitting() and NoSquish() take one and are symplectic as well"
+        return "its sequence needs exact free rotations, which a rotor has not" if self.composition in SEQUENCES else None
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
-        return prepare_run(scene, grid, label, start, kernels("symplectic"), model, find_coefficients(self, grid.dt))
+        return prepare_run(
+            scene, grid, label, start, kernels("symplectic"), model, find_coefficients(self, grid.dt, start.rotor is None)
+        )
 
 
 @dataclass(frozen=True)
@@ -159,13 +166,13 @@ def convert(scene: Scene, method: Splitting) -> tuple[str, PrincipalStart, Any]:
     R_PS[:, 2] *= np.linalg.det(R_PS)
     start = start_along(scene, scene.body.R_BP @ R_PS, scene.body.moments[order])
     kind = getattr(kernel, method.kind)
-    return method.label, start, kernel.Model(start.J, start.J_inverse, start.field, start.q, start.L, kind)
+    return method.label, start, kernel.Model(start.J, start.J_inverse, start.field, start.q, start.L, kind, start.rotor)
 
 
 @lru_cache(maxsize=256)
-def find_coefficients(method: Splitting, dt: float) -> Any:
-    """Return the kernel's coefficients of a step dt, s."""
-    rotations, kicks = method.lengths
+def find_coefficients(method: Splitting, dt: float, exact: bool) -> Any:
+    """Return the kernel's coefficients of a step dt, s. Without `exact` free rotations it is a composition of order 2."""
+    rotations, kicks = method.lengths if exact else lengths_of(method.order, method.composition, exact=False)
     if method.kind == "MIDDLE":
         kicks = (0 * kicks[0],) * len(kicks)
     nodes = itertools.accumulate(rotations)

@@ -111,6 +111,7 @@ class Taylor(Method):
         kernel="taylor",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
         time_dependent=True,
+        rotors=True,
     )
 
     def __init__(self, order: int | None = None, tolerance: float | None = None) -> None:
@@ -218,22 +219,23 @@ def turning_rate(scene: Scene) -> float | None:
 def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start, loose = start_about_symmetry(scene)
-    kernel, R_WD, momentum = kernels("taylor"), axes_of(scene), math.hypot(*start.L)
+    rotor = start.rotor or ()
+    kernel, R_WD, momentum = kernels("taylor"), axes_of(scene), math.hypot(*(np.add(start.L, rotor) if rotor else start.L))
     free = not (field_axis(scene) or isinstance(scene.potential, Turning))
-    if free and momentum > 0 and not start.spin:
+    if free and momentum > 0 and not start.spin and not rotor:
         # The momentum of a free body circulates about the axis of the largest or of the smallest moment: here about the third.
         J, L = np.array(start.J), np.array(start.L)
         shift = 2 - int(np.argmax(J) if L @ (L / J) * np.median(J) < L @ L else np.argmin(J))
         start = principal_axes.start_along(scene, np.roll(scene.body.R_BP, shift, axis=1), np.roll(scene.body.moments, shift))
     R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
     found = None
-    if method.tolerance is None and free and momentum > 0:
+    if method.tolerance is None and free and momentum > 0 and not rotor:
         found = reduce_free(start, R_DP)
     elif method.tolerance is None and isinstance(start.field, UniformField) and loose[2] == 0:
         found = reduce_top(start, R_DP)
     field, *rows = found or (kernel.Free(momentum) if free else start.field, triple(R_DP[2]), triple(R_DP[0]))
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
-    return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L)
+    return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L, rotor)
 
 
 def reduce_free(start: PrincipalStart, R_DP: Array) -> tuple[Any, ...]:
@@ -295,7 +297,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
     What `convert` makes of one scene is made of all bodies at once, in units in which each is of order one.
     """
     potential, n, s = bodies.scene.potential, len(bodies), grid.n_samples
-    if potential is not None and not isinstance(potential, FieldPotential):
+    if bodies.scene.body.rotor_momentum is not None or not isinstance(potential, FieldPotential | None):
         return None
     kernel = kernels("taylor")
     moments, J, R_BP, symmetric = find_frames(bodies)
