@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -52,16 +53,17 @@ def install(
     from conservative.references.environments.lock import Source
 
     from ..sections.environments import installation_line
+    from ..terminal.progress import announce
 
     for name in names:
         check(name)  # all of them, before the first takes minutes
 
     def install_each() -> Iterable[Installation]:
         for name in names:
-            click.echo(f"installing {name}", err=True)
+            announce(f"installing {name}")
             yield install(name, Source(find_links, allow_build), force)
 
-    done = _show(install_each(), installation_line, as_json)
+    done = _show(install_each(), installation_line, as_json, f"installing {', '.join(names)}")
     ctx.exit(int(any(each.trouble for each in done)))
 
 
@@ -93,7 +95,9 @@ def check(ctx: click.Context, command: str, as_json: bool) -> None:
     from conservative.references.environments.programs import read_program
 
     program = list_programs().get(command) or read_program(command, "program")
-    results = _show(check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json)
+    results = _show(
+        check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json, f"testing {command}"
+    )
     ctx.exit(int(not all(right for right, _ in results)))
 
 
@@ -120,15 +124,21 @@ def remove(names: tuple[str, ...], as_json: bool) -> None:
     _show((gone for name in names for gone in remove(name)), removal_line, as_json)
 
 
-def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:
-    """Return values. Each is printed in a line as soon as it is available, or all of them as JSON."""
+def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool, what: str = "") -> list[Value]:
+    """Return values. Each is printed in a line as soon as it is available, after a bar titled `what`, or all as JSON."""
     from ..document import json
+    from ..terminal.progress import show_waiting
 
-    shown = []
-    for value in values:
-        shown.append(value)
+    shown: list[Value] = []
+    rest = iter(values)
+    while True:
+        with show_waiting(what):
+            found = list(islice(rest, 1))
+        if not found:
+            break
+        shown += found
         if not as_json:
-            click.echo(line(value))
+            click.echo(line(found[0]))
     if as_json:
         click.echo(json.render(shown))
     return shown

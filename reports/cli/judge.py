@@ -52,8 +52,9 @@ def judge(run: Path, body: str, rates: str, start: str, error: float, as_json: b
 
     from ..charts import figures, style
     from ..sections.judge import build
+    from ..terminal.progress import show_waiting
 
-    with output_files(out, FILES) as write:
+    with output_files(out, FILES) as write, show_waiting(run.name):
         recording = table.read(run, world=rates == "world", **reading)
         summary, rows = diagnose.judge(registry.scene(body), recording, start == "row")
         document = build(summary, run.name, error)

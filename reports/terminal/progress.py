@@ -53,7 +53,7 @@ def progress() -> Iterator[Step]:
 @contextmanager
 def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[None]:
     """Show a bar if a piece of work takes longer than `DELAY`."""
-    if not has_terminal():
+    if not has_terminal() or find_spec("rich") is None:
         yield
         return
     from .bars import Bar
