@@ -1,5 +1,6 @@
 """An animation in a real, headless chromium: `pytest --browser`."""
 
+import numpy as np
 import pytest
 
 import conservative as cv
@@ -36,8 +37,9 @@ def browser(page, tmp_path_factory):
 
 
 def at(browser, time):
-    """Move the slider to a time, s, and return the colours of each panel: the numbers of pixels by colour."""
+    """Move the slider to a time, s, and return the numbers of pixels of each panel: of each face, +x to -z, and by colour."""
     script = """
+        const HUES = [[15, 35, 'x'], [190, 215, 'y'], [36, 55, 'z'], [150, 170, 'green'], [-60, -20, 'purple']];
         const slider = document.querySelector('.time');
         slider.value = arguments[0];
         slider.dispatchEvent(new Event('input'));
@@ -45,10 +47,11 @@ def at(browser, time):
           const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height), counts = {};
           for (let k = 0; k < data.length; k += 4) {
             if (data[k + 3] < 255) continue;
-            const [r, g, b] = data.subarray(k, k + 3);
-            const green = g > 1.5 * r && g > b, purple = r > 1.3 * g && b > 1.3 * g;
-            const name = green ? 'green' : purple ? 'purple' : r > 1.5 * b ? 'warm' : b > 1.2 * r ? 'blue' : 'other';
-            counts[name] = (counts[name] ?? 0) + 1;
+            const [r, g, b] = data.subarray(k, k + 3), top = Math.max(r, g, b), range = top - Math.min(r, g, b);
+            const hue = 60 * (top === r ? (g - b) / range : top === g ? 2 + (b - r) / range : 4 + (r - g) / range);
+            const name = range < 30 ? 'grey' : HUES.find(([from, to]) => from < hue && hue < to)?.[2] ?? 'other';
+            const face = 'xyz'.includes(name) ? (range > 0.7 * top ? '+' : '-') + name : name;
+            counts[face] = (counts[face] ?? 0) + 1;
           }
           return counts;
         });
@@ -60,14 +63,29 @@ def values(browser):
     return browser.execute_script("return [...document.querySelectorAll('dd')].map((e) => [e.textContent, e.className])")
 
 
-def test_it_draws_body_momentum_and_trace_and_nothing_goes_wrong(browser):
+def seen(counts):
+    """Return the numbers of pixels of the faces +x, -x, +y, -y, +z, -z."""
+    return np.array([counts.get(sign + axis, 0) for axis in "xyz" for sign in "+-"])
+
+
+def test_it_draws_momentum_and_trace_and_nothing_goes_wrong(browser):
     begin, end = at(browser, 0), at(browser, 6)
-    for counts in (*begin, *end):
-        assert min(counts["green"], counts["warm"] + counts["blue"]) > 100  # measured 234 and 4,300
+    assert min(counts["green"] for counts in (*begin, *end)) > 100  # measured 234
     assert end[0]["purple"] > 3 * begin[0]["purple"]  # the trace
-    assert abs(begin[0]["warm"] - begin[1]["warm"]) < 0.1 * begin[1]["warm"]  # 0.047: the same start, below an outline
-    assert abs(end[0]["warm"] - end[1]["warm"]) > 0.2 * end[1]["warm"]  # 0.6 rad later
+    assert np.abs(seen(begin[0]) - seen(begin[1])).sum() < 0.2 * seen(begin[1]).sum()  # the same start, below the outline
+    assert np.abs(seen(end[0]) - seen(end[1])).sum() > 0.4 * seen(end[1]).sum()  # 0.6 rad later
     assert [entry for entry in browser.get_log("browser") if entry["source"] != "rendering"] == []  # a slow renderer says so
+
+
+def test_it_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(browser):
+    times = np.linspace(0, 6, 13)
+    eye = np.array([np.cos(0.35) * np.cos(0.6), np.cos(0.35) * np.sin(0.6), np.sin(0.35)])
+    sides = np.array([1.0, 3.0, 2.0])  # of the brick
+    for time, R in zip(times, Exact().solve(cv.scenes.brick_flip(), cv.Grid(times[1], 12)).R_WB, strict=True):
+        areas = np.repeat(R.T @ eye * sides.prod() / sides, 2) * np.tile([1, -1], 3)
+        pixels = seen(at(browser, time)[1]) * np.maximum(areas, 0).sum()
+        expected = np.maximum(areas, 0) * pixels.sum() / np.maximum(areas, 0).sum()
+        assert np.abs(pixels - expected).sum() < 0.45 * expected.sum()  # measured 0.31: perspective, and what covers the faces
 
 
 def test_numbers_are_the_largest_so_far_with_their_colours(browser):
