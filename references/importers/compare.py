@@ -42,25 +42,15 @@ CATALOGUE = Path(__file__).parent / "models"
 class Finding:
     """The answer of an engine for a file.
 
-    Attributes
-    ----------
-    engine, file
-        Label such as "mujoco 3.13.0", and name of the file.
-    outcome
-        "right", "wrong", "refused", "crashed", or "" if the engine has no loader for this format.
-    words
-        What is wrong, or the words of the engine.
-    seen
-        The body that explains its accelerations best.
-    error
-        Largest difference of its accelerations from those of the file's body, relative to the largest one.
+    The outcome is "right", "wrong", "refused", "crashed", or "" if the engine has no loader for the format, with `words`.
+    `seen` has mass, com and inertia that explain the accelerations best, and `error` is their largest relative error.
     """
 
     engine: str
     file: str
     outcome: str
     words: str = ""
-    seen: Part | None = None
+    seen: dict[str, Any] | None = None
     error: float = 0.0
 
 
@@ -211,16 +201,8 @@ def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
     raised = np.maximum(moments, np.diag(axes.T @ seen.inertia @ axes))
     if distance(replace(wanted, inertia=(axes * raised) @ axes.T), seen) < tolerance:
         return f"small principal moments are raised: {_list(raised)} instead of {_list(moments)} kg m^2"
-    differences = []
-    for name, value in (
-        ("mass", lambda b: np.array([b.mass])),
-        ("centre of mass", lambda b: b.com),
-        ("inertia", lambda b: b.inertia),
-    ):
-        right, found = value(wanted), value(seen)
-        if np.abs(found - right).max() > tolerance * np.abs(right).max():
-            differences.append(f"{name} {_list(found)} instead of {_list(right)}")
-    return f"no known mistake explains {'; '.join(differences)}"
+    found = f"mass {seen.mass:.4g}, centre of mass {_list(seen.com)}, inertia {_list(seen.inertia)}"
+    return f"no known mistake explains {found} instead of {wanted.mass:.4g}, {_list(wanted.com)}, {_list(wanted.inertia)}"
 
 
 def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[[float, str], None]) -> list[Finding]:
@@ -270,19 +252,21 @@ class Program:
         except (EngineCrashed, EngineTimeout) as failure:
             return answer("crashed", str(failure.outcome))
         if words := result.get("refused", ""):
-            return answer("right" if flaw else "refused", words)
+            return answer("right" if flaw else "refused", words.replace(f"{path.resolve().parent}/", ""))
         measured = result["accelerations"]
         if not np.isfinite(measured).all():
             return answer("wrong", "accelerations that are not finite")
         seen = identify(cases, measured, wanted)
         expected = accelerations(wanted, cases)
         worst = float(np.abs(measured - expected).max() / np.abs(expected).max())
+        answer = partial(answer, seen={name: np.asarray(value).tolist() for name, value in vars(seen).items()}, error=worst)
         tolerance = 1e-2 if self.engine in SINGLE else 1e-4
         if distance(wanted, seen) < tolerance and not flaw:
-            return answer("right", "", seen, worst)
-        said = re.search(r"[^.:]*(inertia|mass|moment)[^.]*", result["output"], re.IGNORECASE)
+            return answer("right")
+        said = re.search(
+            r"[^.:]*(inertia|mass|moment)[^.]*", result["output"].replace(f"{path.resolve().parent}/", ""), re.IGNORECASE
+        )
         prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
-        if flaw and said and seen.flaw == "":
-            return answer("right", f"it repairs the inertia{prints}", seen, worst)
-        what = f"{flaw}, and it does not say so" if flaw else explain(path, links, seen, tolerance)
-        return answer("wrong", what + prints, seen, worst)
+        if flaw and said and not seen.flaw:
+            return answer("right", f"it repairs the inertia{prints}")
+        return answer("wrong", (f"{flaw}, and it does not say so" if flaw else explain(path, links, seen, tolerance)) + prints)

@@ -31,7 +31,6 @@ ROOTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf"}
 DENSITY = 1000.0
 """Density of geometry that has none in a file, kg/m^3."""
 ONE = "one free rigid body, whose parts are on fixed joints"
-_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,21 +63,15 @@ class Part:
 class Link:
     """A link, fixed to the root link.
 
-    Attributes
-    ----------
-    pose, frame
-        Pose (4, 4) of the link in the root link, and of the inertial frame in the link, m.
-    mass, inertia
-        Mass, kg, and inertia (3, 3) in the inertial frame, about its origin, kg m^2.
-    geometry
-        The part that the geometry is with `DENSITY`, axes of the link; its mass is 0 if there is none.
+    `pose` (4, 4) is its pose in the root link, and `frame` (4, 4) that of the inertial frame in the link, m. `inertia` (3, 3)
+    is in the inertial frame, kg m^2. `geometry` is its geometry with `DENSITY`.
     """
 
     pose: Array
     mass: float = 0.0
     frame: Array = field(default_factory=lambda: np.eye(4))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    geometry: Part = Part(0.0, np.zeros(3), np.zeros((3, 3)))  # frozen
+    geometry: Part = Part(0.0, np.zeros(3), np.zeros((3, 3)))
 
     def filled(self, part: Part) -> Link:
         """Return the link with mass and inertia of a part in its axes."""
@@ -116,28 +109,21 @@ def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Arra
 
 
 def kind_of(path: Path) -> str:
-    """Return "urdf", "mjcf", "sdf" or "usd". Raise `BadInput` for another file."""
+    """Return "urdf", "mjcf", "sdf" or "usd". Raise as `read_links`."""
     if path.suffix.lower() in (".usd", ".usda", ".usdc"):
         return "usd"
     try:
         return ROOTS[ElementTree.fromstring(path.read_bytes()).tag]
-    except OSError as error:
-        raise BadInput("file", f"{str(path)!r}: {error.strerror}", "a model file that can be read") from None
-    except ElementTree.ParseError as error:
-        raise BadInput("file", f"{str(path)!r}: {error}", "a file of XML, or .usd, .usda, .usdc") from None
-    except KeyError as error:
-        raise BadInput("file", f"{str(path)!r} with the root element {error}", f"one of {', '.join(ROOTS)}") from None
+    except (OSError, ElementTree.ParseError, KeyError) as error:
+        reason = f"the root element {error}" if isinstance(error, KeyError) else getattr(error, "strerror", None) or error
+        allowed = f"a file of XML with the root element {', '.join(ROOTS)}, or .usd, .usda, .usdc"
+        raise BadInput("file", f"{str(path)!r}: {reason}", allowed) from None
 
 
 def read_links(path: Path, angles: float = 1.0) -> list[Link]:
-    """Return the links of a file with one rigid body, the root link first.
+    """Return the links of a URDF, SDF, USD or MJCF file with one rigid body, the root link first.
 
-    Parameters
-    ----------
-    path
-        A URDF, SDF, USD or MJCF file.
-    angles
-        Factor of all angles in URDF and SDF; 180 / pi reads radians as degrees. Other than 1 in MJCF: the other unit.
+    All angles in URDF and SDF are multiplied by `angles`; if it is not 1, MJCF is read with the other unit of angles.
 
     Raises
     ------
@@ -147,18 +133,18 @@ def read_links(path: Path, angles: float = 1.0) -> list[Link]:
         MuJoCo, usd-core or trimesh is not installed.
     """
     file = _File(path, angles)
-    readers = {"urdf": _read_urdf, "mjcf": _read_mjcf, "sdf": _read_sdf, "usd": _read_usd}
     try:
-        links = readers[kind_of(path)](file)
-    except BadInput:
-        raise
+        links = {"mjcf": _read_mjcf, "usd": _read_usd}.get(kind_of(path), _read_xml)(file)
     except (ValueError, LookupError, AttributeError, TypeError) as error:
+        if isinstance(error, BadInput):
+            raise
         raise file.refuse(
             f"what cannot be read ({type(error).__name__}: {error})", "elements and numbers of its format"
         ) from None
     if not any(link.mass for link in links):
         raise file.refuse("no mass in any link", "mass and inertia of a link")
-    return links
+    base = np.linalg.inv(links[0].pose)
+    return [replace(link, pose=base @ link.pose) for link in links]
 
 
 @dataclass(frozen=True)
@@ -190,7 +176,7 @@ class _File:
     def weigh(self, element: ElementTree.Element, place: Array, density: float = DENSITY) -> list[Part]:
         """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane."""
         form = element[0]
-        values = form.attrib | {child.tag: child.text or "" for child in form}
+        values = _values(form)
         if form.tag == "mesh":
             name = values.get("filename", values.get("uri", ""))
             path = self.path.parent / name.removeprefix("file://")
@@ -209,15 +195,10 @@ class _File:
 
 
 def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Part]:
-    """Return the part of a shape after an affine map (4, 4), which may scale it; none for another kind.
+    """Return the part of a shape after an affine map `pose` (4, 4), which may scale it; none for another kind.
 
-    Parameters
-    ----------
-    kind, sizes
-        "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" or "capsule" (radius, length of the cylinder), all
-        about their centres and the third axis, or "mesh" (vertices and triangles), m.
-    pose, density
-        The map, and the density after it, kg/m^3.
+    Shapes are centred and about the third axis: "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" and
+    "capsule" (radius, length of the cylinder), "mesh" (vertices and triangles), m. The density is that after the map, kg/m^3.
     """
     centroid = np.zeros(3)
     if kind == "mesh":  # tetrahedra from the origin
@@ -248,81 +229,65 @@ def _numbers(text: str | None) -> list[float]:
     return [float(word) for word in (text or "").split()]
 
 
-def _symmetric(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> Array:
-    return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-
-
-def _read_urdf(file: _File) -> list[Link]:
-    links, joints = dict[str, Link](), dict[str, tuple[str, Array]]()
-    for element in file.root.findall("link"):
-        forms = [(each.find("geometry"), file.pose(each.find("origin"))) for each in element.findall("collision")]
-        link = Link(np.eye(4), geometry=join(part for form, at in forms if form is not None for part in file.weigh(form, at)))
-        if (own := element.find("inertial")) is not None:
-            values, mass = own.find("inertia").attrib, float(own.find("mass").attrib["value"])  # type: ignore[union-attr]
-            inertia = _symmetric(*(float(values.get(key, 0)) for key in _MOMENTS))
-            link = replace(link, mass=mass, frame=file.pose(own.find("origin")), inertia=inertia)
-        links[element.attrib["name"]] = link
-    for joint in file.root.findall("joint"):
-        kind, parent, child = joint.get("type"), *(joint.find(end).attrib["link"] for end in ("parent", "child"))  # type: ignore[union-attr]
-        if kind == "floating" and not links[parent].mass:
-            del links[parent]
-        elif kind == "fixed":
-            joints[child] = parent, file.pose(joint.find("origin"))
-        else:
-            raise file.refuse(f"the joint {joint.get('name')!r}, which moves ({kind})", ONE)
-    roots = [name for name in links if name not in joints]
-    if len(roots) != 1:
-        raise file.refuse(f"{len(roots)} root links", ONE)
-
-    def place(name: str) -> Array:
-        return joints[name][1] if joints[name][0] == roots[0] else place(joints[name][0]) @ joints[name][1]
-
-    return [links[roots[0]], *(replace(links[name], pose=place(name)) for name in joints)]
-
-
-def _read_sdf(file: _File) -> list[Link]:
-    models = [*file.root.findall("model"), *file.root.findall("world/model")]
+def _read_xml(file: _File) -> list[Link]:
+    """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
+    root, urdf = file.root, file.root.tag == "robot"
+    models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
         raise file.refuse(f"{len(models)} models, or one within another", "one model without includes")
     (model,) = models
-    frames = {each.get("name"): each for tag in ("link", "frame", "joint") for each in model.findall(tag)}
+    own, attribute = ("origin", "link") if urdf else ("pose", "")
+    frames = {each.attrib["name"]: each for tag in ("link", "frame", "joint") for each in model.findall(tag)}
+    bases, free = dict[str, tuple[str, Array]](), []
+    for joint in model.findall("joint"):
+        parent, child = ((end.get(attribute) or end.text or "") for name in ("parent", "child") for end in joint.findall(name))
+        if urdf and joint.get("type") == "floating" and frames[parent].find("inertial") is None:
+            free.append(parent)
+        elif joint.get("type") == "fixed" and parent != "world":
+            bases[child] = parent, file.pose(joint.find(own))
+        else:
+            raise file.refuse(f"the joint {joint.get('name')!r}, which moves or holds the body ({joint.get('type')})", ONE)
 
     def place(name: str) -> Array:
         """Return the pose of a link, frame or joint in the model."""
         if name in ("", "__model__"):
             return np.eye(4)
-        own, element = frames[name].find("pose"), frames[name]
-        base = ("" if own is None else own.get("relative_to", "")) or element.get("attached_to", "")
-        return place(base or element.findtext("child", "")) @ file.pose(own)
+        if urdf:
+            return place(bases[name][0]) @ bases[name][1] if name in bases else np.eye(4)
+        pose, element = frames[name].find(own), frames[name]
+        base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
+        return place(base or element.findtext("child", "")) @ file.pose(pose)
 
-    links = []
-    for element in model.findall("link"):
-        own = element.find("inertial")
-        if own is None:
-            raise file.refuse(f"the link {element.get('name')!r} without inertia", "<inertial> in each link")
-        link, forms = Link(place(element.attrib["name"])), []
-        for each in element.findall("collision"):
-            density = float(each.findtext("density") or own.findtext("density") or DENSITY)
-            forms += file.weigh(each.find("geometry"), file.pose(each.find("pose")), density)  # type: ignore[arg-type]
-        if own.get("auto") in ("true", "1"):
-            link = link.filled(join(forms))
-        else:
-            inertia = _symmetric(*(float(own.findtext(f"inertia/{key}") or key[1] == key[2]) for key in _MOMENTS))
-            link = replace(link, mass=float(own.findtext("mass") or 1), frame=file.pose(own.find("pose")), inertia=inertia)
-        links.append(replace(link, geometry=join(forms)))
-    joints = model.findall("joint")
-    for joint in joints:
-        if joint.get("type") != "fixed" or "world" in (joint.findtext("parent"), joint.findtext("child")):
-            raise file.refuse(f"the joint {joint.get('name')!r}, which moves or holds the body", ONE)
-    return _relative(file, links, len(joints))
+    links = {}
+    for name in (each.attrib["name"] for each in model.findall("link") if each.get("name") not in free):
+        inertial, link, forms = frames[name].find("inertial"), Link(place(name)), []
+        if inertial is None and not urdf:
+            raise file.refuse(f"the link {name!r} without inertia", "<inertial> in each link")
+        for each in frames[name].findall("collision"):
+            density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
+            forms += file.weigh(each.find("geometry"), file.pose(each.find(own)), float(density))  # type: ignore[arg-type]
+        link = replace(link, geometry=join(forms))
+        if inertial is not None and inertial.get("auto") in ("true", "1"):
+            link = link.filled(link.geometry)
+        elif inertial is not None:
+            mass: Any = inertial.find("mass")
+            given = _values(inertial.find("inertia"))
+            inertia = np.array(
+                [[float(given.get(f"i{min(a, b)}{max(a, b)}", a == b and not urdf)) for a in "xyz"] for b in "xyz"]
+            )
+            link = replace(
+                link, mass=float(mass.get("value") or mass.text), frame=file.pose(inertial.find(own)), inertia=inertia
+            )
+        links[name] = link
+    roots = [name for name in links if name not in bases]
+    if len(roots) != 1:
+        raise file.refuse(f"{len(roots)} root links", ONE)
+    return [links.pop(roots[0]), *links.values()]
 
 
-def _relative(file: _File, links: list[Link], joints: int) -> list[Link]:
-    """Return links with their poses in the first one. Raise `BadInput` unless fixed joints make them one body."""
-    if joints != len(links) - 1:
-        raise file.refuse(f"{len(links)} links on {joints} fixed joints", ONE)
-    base = np.linalg.inv(links[0].pose)
-    return [replace(link, pose=base @ link.pose) for link in links]
+def _values(element: ElementTree.Element | None) -> dict[str, str]:
+    """Return the attributes and the texts of the children of an element."""
+    return {} if element is None else {**element.attrib, **{child.tag: child.text or "" for child in element}}
 
 
 def _read_usd(file: _File) -> list[Link]:
@@ -360,10 +325,10 @@ def _read_usd(file: _File) -> list[Link]:
         return weigh({"cube": "box"}.get(kind, kind), sizes if len(sizes) == 2 else sizes[0], pose @ turn, density)
 
     links, joints = [], [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
-    for joint in joints:
-        if not joint.IsA(UsdPhysics.FixedJoint):
-            raise file.refuse(f"the joint {str(joint.GetPath())!r}, which moves", ONE)
-    for body in (prim for prim in prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)):
+    bodies = [prim for prim in prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    if not bodies or len(joints) != len(bodies) - 1 or not all(joint.IsA(UsdPhysics.FixedJoint) for joint in joints):
+        raise file.refuse(f"{len(bodies)} rigid bodies and the joints {[joint.GetName() for joint in joints]}", ONE)
+    for body in bodies:
         pose = world(body)
         pose[:3, :3] /= metre
         if np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max() > 1e-5:
@@ -389,7 +354,7 @@ def _read_usd(file: _File) -> list[Link]:
             inertia = np.diag(np.array(moments, float)) * kilogram * metre**2
             link = replace(link, frame=make_pose(link.frame[:3, 3], turn), inertia=inertia)
         links.append(link)
-    return _relative(file, links, len(joints))
+    return links
 
 
 def _read_mjcf(file: _File) -> list[Link]:
@@ -419,4 +384,4 @@ def _read_mjcf(file: _File) -> list[Link]:
     for body in range(1, model.nbody):
         link = Link(make_pose(data.xpos[body], data.xmat[body].reshape(3, 3))).filled(part(model, body))
         links.append(replace(link, geometry=part(shapes, body)) if shapes else link)
-    return _relative(file, links, model.nbody - 2)
+    return links

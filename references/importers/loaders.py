@@ -93,7 +93,7 @@ def _mjwarp(path, kind):
         data.qvel.assign(v[None].astype(np.float32))
         data.qfrc_applied.assign(force[None].astype(np.float32))
         mujoco_warp.forward(model, data)
-        return data.qacc.numpy()[0]
+        return data.qacc.numpy()[0].copy()
 
     return accelerate
 

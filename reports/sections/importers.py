@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Table, filled
 
 if TYPE_CHECKING:
@@ -28,9 +26,7 @@ def build(findings: Sequence[Finding]) -> Document:
         Items([Item(f"{each.file}: {each.words}", f"{each.engine} {each.outcome}", True) for each in bad]),
     )
     checks = [Check(each.engine, each.file, failure=each.words if each in bad else "") for each in used]
-    bodies = [each.seen and {name: np.asarray(value).tolist() for name, value in vars(each.seen).items()} for each in findings]
-    listed = [{**vars(each), "seen": body} for each, body in zip(findings, bodies, strict=True)]
-    data = {"right": not bad, "findings": listed}
+    data = {"right": not bad, "findings": findings}
     failures = [f"{each.engine}, {each.file}: {each.words}" for each in bad]
     return Document(
         "conservative importers", f"Importers: {len(files)} files", blocks, data=data, checks=checks, failures=failures

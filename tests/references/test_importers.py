@@ -144,7 +144,7 @@ def test_other_wrong_bodies_are_described(tmp_path):
             replace(wanted, inertia=0.3 * np.eye(3)),
             "small principal moments are raised: 0.3, 0.3, 0.3 instead of 0.0932, 0.167, 0.194",
         ),
-        (replace(wanted, com=wanted.com + 0.01), "no known mistake explains centre of mass"),
+        (replace(wanted, com=wanted.com + 0.01), "no known mistake explains mass 3.6, centre of mass"),
     ):
         assert words in explain(GENERIC, links, seen, 1e-6)
 
@@ -196,7 +196,7 @@ MESH = '<collision><geometry><mesh filename="none.stl"/></geometry></collision>'
     ("suffix", "text", "words"),
     [
         ("urdf", '<robot name="r"><link name="a"/></robot>', "no mass"),
-        ("urdf", f'<robot name="r">{LINK.format("", "")}{JOINT}</robot>', "'j', which moves (revolute)"),
+        ("urdf", f'<robot name="r">{LINK.format("", "")}{JOINT}</robot>', "'j', which moves or holds the body (revolute)"),
         ("urdf", f'<robot name="r">{LINK.format(MOMENTS, MESH)}</robot>', "none.stl"),
         ("urdf", f'<robot name="r">{LINK.format(MOMENTS.replace("1", "one"), "")}</robot>', "one"),
         ("urdf", f'<robot name="r">{LINK.format(MOMENTS, "")}<link name="b"/></robot>', "2 root links"),
