@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -51,16 +52,17 @@ def draw(
         out, options = io.BytesIO(), {"save_all": True, "append_images": rest, "loop": 0, "comment": mark, "optimize": True}
         first.save(out, "GIF", duration=round(1000 / RATES[kind]), **options)
         return out.getvalue()
-    import imageio_ffmpeg
+    import imageio_ffmpeg  # only for its ffmpeg: its own writer leaves pipes open
 
     with tempfile.TemporaryDirectory() as folder:
         file, image = Path(folder, "video.mp4"), next(images)
-        output = ["-movflags", "+faststart", "-metadata", f"comment={mark}"]  # faststart: the comment comes first
-        writer = imageio_ffmpeg.write_frames(str(file), image.shape[1::-1], fps=RATES[kind], quality=8, output_params=output)
-        writer.send(None)
-        for each in (image, *images):
-            writer.send(each)
-        writer.close()
+        form = f"-f rawvideo -pix_fmt rgb24 -s {image.shape[1]}x{image.shape[0]} -r {RATES[kind]} -i -".split()
+        output = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-metadata", f"comment={mark}"]  # the comment comes first
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", *form, *output, str(file)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE) as ffmpeg:
+            assert ffmpeg.stdin is not None
+            for each in (image, *images):
+                ffmpeg.stdin.write(each.tobytes())
         return file.read_bytes()
 
 
