@@ -30,7 +30,7 @@ from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
 from .toml_reader import TomlTable, keys_of, read
 
-_TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "torque", "damping", "start")
+_TOP = ("name", "t_end", "dt", "body", "rotor", "potential", "orbit", "torque", "damping", "start")
 # The keys of a potential or a shape are the parameters of its constructor.
 _POTENTIALS: dict[str, Callable[..., Potential]] = {
     "uniform_gravity": UniformGravity,
@@ -80,11 +80,18 @@ def load(path: str | Path) -> Scene:
     t_end = top.value("t_end", "a finite duration above 0, s")
     body, mass = _body(top.table("body", "inertia, a shape or another file; `conservative new` shows them"))
     potential = _field(top, body, mass)
+    if "rotor" in top:
+        table = top.table("rotor", "momentum (3,), kg m^2/s, body axes")
+        table.only(("momentum",))
+        with table.blame(rotor_momentum="momentum"):
+            body = RigidBody(body.inertia, table.value("momentum", "three finite numbers (3,), kg m^2/s, body axes"))
     R_WB0, w_WB_B0, flight = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
     if flight and mass is None:
         raise top.bad("body", "the inertia alone", "inertia_com, mass and com_B, or a shape, together with p_WB or v_WB")
+    if flight and "rotor" in top:
+        raise top.bad("rotor", "a rotor in free flight", "no rotor, or no p_WB and v_WB, for the rotation alone")
     loads = {key: _load(top, key) for key in ("torque", "damping")}
     with top.blame(p_WB0="start", v_WB0="start"):
         moving = mass if flight and mass else body

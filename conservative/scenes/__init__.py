@@ -23,6 +23,10 @@ from .free_bodies import tumbling_box as tumbling_box
 from .free_bodies import turned_brick as turned_brick
 from .free_bodies import unstable_spin as unstable_spin
 from .random_body import random_body as random_body
+from .rotors import dual_spin_turn as dual_spin_turn
+from .rotors import flat_spin_recovery as flat_spin_recovery
+from .rotors import stabilised_brick as stabilised_brick
+from .rotors import volterra_gyrostat as volterra_gyrostat
 from .satellites import librating_satellite as librating_satellite
 from .satellites import stable_satellite as stable_satellite
 from .satellites import tumbling_satellite as tumbling_satellite

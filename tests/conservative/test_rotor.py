@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from conservative.invariants import kinetic_energy
 from conservative.references.collocation import collocate
 from conservative.references.precise import Precise
 from conservative.references.truth import confirm
+from conservative.scene_files.scene_file import load
 from conservative.scenes.random_body import FIELDS
 
 from .gyrostats import gyrostat
@@ -127,3 +130,34 @@ def test_samples_between_steps_and_many_bodies() -> None:
     assert max(values.max() for values in ensemble.drifts.values()) < 1e-13
     alone = cv.integrate(ensemble[3].scene, scene.t_end / 200, "reduced")
     assert np.array_equal(alone.R_WB, ensemble[3].R_WB)
+
+
+def momentum_range(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest and largest components (3,) of J w + h, relative to its length, in a scene."""
+    scene = registry.scene(name)
+    L = scene.body.momentum(cv.integrate(scene, scene.dt, "taylor").w_WB_B)
+    return L.min(axis=0) / np.linalg.norm(L[0]), L.max(axis=0) / np.linalg.norm(L[0])
+
+
+def test_a_rotor_decides_about_which_axis_the_momentum_circulates() -> None:
+    for name, axis, without in (("dual_spin_turn", 2, 0), ("flat_spin_recovery", 0, 2)):
+        low, high = momentum_range(name)
+        assert low[axis] > 0.6  # measured 0.62 and 0.83
+        assert low[without] < -0.5 < 0.5 < high[without]
+        low, high = momentum_range(f"{name}:rotor=0")
+        assert low[without] > 0.9
+    # The brick does not flip above a rotor of 30 kg m^2/s: (J3 w + h - J1 w) (J3 w + h - J2 w) > 0.
+    assert momentum_range("stabilised_brick:rotor=20")[0][2] < 0.5  # measured 0.44
+    assert momentum_range("stabilised_brick:rotor=60")[0][2] > 0.999
+
+
+def test_scene_file(tmp_path: Path) -> None:
+    path = tmp_path / "gyrostat.toml"
+    text = "t_end = 1.0\n[body]\ninertia = [1, 2, 2.5]\n[rotor]\nmomentum = [0.1, 0, 2]\n[start]\nw_WB_B = [0, 0, 1]\n"
+    path.write_text(text)
+    assert load(path).body.rotor_momentum.tolist() == [0.1, 0, 2]
+    for bad, line in (("momentum = [1, 2]", 5), ("speed = 3", 5), ("", 4)):
+        path.write_text(text.replace("momentum = [0.1, 0, 2]", bad))
+        with pytest.raises(cv.BadInput) as caught:
+            load(path)
+        assert getattr(caught.value, "line", None) == line
