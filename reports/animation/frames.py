@@ -15,8 +15,6 @@ from conservative.errors import BadInput
 from conservative.invariants import sizes
 from conservative.trajectory import Trajectory
 
-from ..document.cells import grade, number
-
 TURN = 0.35
 """Mean angle between two frames, rad: the player interpolates on the shorter way, which is the right one only below pi."""
 FRAMES = (200, 2000)
@@ -65,8 +63,10 @@ class Panel:
     def text(self, name: str, frame: int) -> tuple[str, str]:
         """Return the number of a frame in `sizes` with one digit, and its grade."""
         value = float(self.sizes[name][frame])
-        cell = grade(value, "< 1e-15" if value < 1e-15 else number(value, 1), LIMITS.get(name, (1e-10, 1e-3)))
-        return cell.text, str(cell.grade)
+        good, fair = LIMITS.get(name, (1e-10, 1e-3))
+        symbol, grade = ("✓", "good") if value <= good else ("≈", "fair") if value <= fair else ("✗", "bad")
+        short = f"{value:.1g}" if 0.01 <= value < 10 else f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
+        return f"{symbol} {short if value >= 1e-15 else '< 1e-15'}", grade
 
 
 def speeds(duration: float) -> list[float]:
