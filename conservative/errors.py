@@ -201,7 +201,7 @@ class AccuracyNotReached(UserWarning):
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka"),
-        "environments": ("uv", "platformdirs"),
+        "environments": ("uv", "platformdirs", "psutil"),
         "report": ("click", "rich", "jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
         "parquet": ("pyarrow",),

@@ -3,7 +3,7 @@
 A file is written under a temporary name next to its place, and renamed once all of it is on the disk. After a full disk, an
 exception or a kill, the previous file is unchanged. The process that creates a temporary file holds a lock on it, which ends
 with the process. A temporary file without a lock is a leftover of a killed process. It is removed when the same file is written
-again.
+again. Where the system has no locks, it is removed `_AGE` after its last change.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import os
 import re
 import shutil
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from importlib import import_module
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from .errors import NotWritten
+from .posix import NO_LOCK, lock, release
 
-try:
-    fcntl: Any = import_module("fcntl")
-except ImportError:  # not POSIX: no locks, so leftovers are unknown
-    fcntl = None
+_AGE = 7 * 86400.0
+"""Age, s, of a leftover on a system without locks."""
 
 
 @contextmanager
@@ -68,21 +68,20 @@ def make_folder(folder: Path, argument: str) -> None:
 
 
 @contextmanager
-def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, int]]:
-    """Yield the name and the handle of a temporary next to a place, which `make` creates and opens. It is removed after the
-    block.
+def temporary(place: Path, make: Callable[[Path], object]) -> Iterator[Path]:
+    """Yield the name of a temporary file or folder next to a place, which `make` creates. It is removed after the block.
 
     Leftovers are removed first. An `OSError` is not converted.
     """
     remove_leftovers(place)
     while True:
         fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
-        handle = make(fresh)
-        if try_lock(handle) and _is_at(handle, fresh):
+        make(fresh)
+        handle = lock(fresh)
+        if handle is not None:  # otherwise another process removed it as a leftover before it was locked
             break
-        os.close(handle)  # another process removed it as a leftover before it was locked
     try:
-        yield fresh, handle
+        yield fresh
     finally:
         remove(fresh)
         release(handle)
@@ -100,37 +99,9 @@ def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
     with suppress(OSError):  # in a folder that cannot be read, nothing can be removed
         for path in list(place.parent.iterdir()):
             if pattern.fullmatch(path.name) and (handle := lock(path)) is not None:
-                yield path
+                if handle != NO_LOCK or path.stat().st_mtime < time.time() - _AGE:
+                    yield path
                 release(handle)
-
-
-def lock(path: Path) -> int | None:
-    """Lock a file or a folder and return its handle; None if another process has the lock, or it does not exist."""
-    with suppress(OSError):
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
-        if try_lock(handle, without=False) and _is_at(handle, path):
-            return handle
-        os.close(handle)
-    return None
-
-
-def try_lock(handle: int, without: bool = True) -> bool:
-    """Lock a file or a folder. Return False if another process has the lock, `without` if the file system has no locks."""
-    try:
-        if fcntl is None:
-            return without
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return without and not isinstance(error, BlockingIOError)
-    return True
-
-
-def release(handle: int) -> None:
-    """Unlock and close. Closing alone would leave the lock to processes forked in the meantime."""
-    with suppress(OSError):
-        if fcntl is not None:
-            fcntl.flock(handle, fcntl.LOCK_UN)
-    os.close(handle)
 
 
 def remove(path: Path) -> None:
@@ -155,8 +126,8 @@ def sync(path: Path) -> None:
 class _RawFile(io.FileIO):
     """A file whose errors contain the name of its target. With `ignore` it discards everything written to it."""
 
-    def __init__(self, handle: int, target: Path, argument: str) -> None:
-        super().__init__(handle, "w", closefd=False)
+    def __init__(self, path: Path, target: Path, argument: str) -> None:
+        super().__init__(path, "w")
         self.target, self.argument, self.ignore = target, argument, False
 
     def write(self, content: Any) -> int:
@@ -172,23 +143,21 @@ class _RawFile(io.FileIO):
 @contextmanager
 def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     """Yield a raw file that replaces `target`, and has its permissions, when the block succeeds; or a device or pipe itself."""
-    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
     with ExitStack() as stack:
         with _errors(target, argument):
             place = Path(os.path.realpath(target))  # a link stays a link
             if target.exists() and not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
             if is_file := target.is_file() or not target.exists():
-                fresh, handle = stack.enter_context(temporary(place, lambda path: os.open(path, flags, 0o666)))
-                if place.exists():
-                    fresh.chmod(stat.S_IMODE(place.stat().st_mode))
-            else:
-                handle = os.open(target, os.O_WRONLY)  # of a folder, an error
-                stack.callback(os.close, handle)
-        yield _RawFile(handle, target, argument)
+                fresh = stack.enter_context(temporary(place, partial(Path.touch, exist_ok=False)))
+            raw = stack.enter_context(_RawFile(fresh if is_file else target, target, argument))  # an error for a folder
+            if is_file and place.exists():
+                fresh.chmod(stat.S_IMODE(place.stat().st_mode))
+        yield raw
         if is_file:
             with _errors(target, argument):
-                os.fsync(handle)  # before the renaming, because a crash of the machine could otherwise leave an empty file
+                os.fsync(raw.fileno())  # before the renaming: a crash of the machine could otherwise leave an empty file
+                raw.close()  # Windows does not rename an open file
                 fresh.replace(place)
             sync(place.parent)
 
@@ -199,9 +168,3 @@ def _errors(target: Path, argument: str) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:  # a ValueError: a NUL in the name
         raise NotWritten(argument, target, error) from None
-
-
-def _is_at(handle: int, path: Path) -> bool:
-    with suppress(OSError):
-        return os.path.samestat(os.fstat(handle), path.lstat())
-    return False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 
@@ -12,6 +11,7 @@ import numpy as np
 from .attitude import Array
 from .check import SMALLEST, build_unchecked, describe, positive_integer, positive_number, real_number, set_fields
 from .errors import BadInput
+from .posix import physical_memory
 from .scene import Scene
 
 MOST_STEPS = 2**53
@@ -111,11 +111,7 @@ _recall_grid = lru_cache(maxsize=16)(partial(build_unchecked, Grid))
 @lru_cache(maxsize=1)
 def most_samples() -> int:
     """Return the number of samples that fit into `MEMORY_SHARE` of this machine's memory."""
-    try:
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):  # not on every system
-        memory = USUAL_MEMORY
-    return int((memory if memory > 0 else USUAL_MEMORY) * MEMORY_SHARE / SAMPLE_BYTES)
+    return int((physical_memory() or USUAL_MEMORY) * MEMORY_SHARE / SAMPLE_BYTES)
 
 
 def require_memory(argument: str, n_steps: int, every: int) -> None:

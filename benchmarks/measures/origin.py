@@ -8,15 +8,20 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
+from llvmlite.binding import get_host_cpu_name
+
+from conservative.posix import first_values, physical_memory
+
 
 def machine() -> dict[str, str]:
-    """Return processor, architecture, cores that this process may use, memory (if Linux reports it) and operating system."""
+    """Return processor, architecture, cores that this process may use, memory (if it is known) and operating system."""
+    memory = physical_memory() // 1024
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
-        "processor": first_values("/proc/cpuinfo").get("model name", "") or platform.processor() or platform.machine(),
+        "processor": first_values("/proc/cpuinfo").get("model name", "") or f"{platform.processor()} ({get_host_cpu_name()})",
         "architecture": platform.machine(),
         "cores": str(usable),
-        "memory": first_values("/proc/meminfo").get("MemTotal", "unknown"),
+        "memory": first_values("/proc/meminfo").get("MemTotal") or (f"{memory} kB" if memory else "unknown"),
         "system": f"{platform.system()} {platform.release()}",
     }
 
@@ -26,16 +31,6 @@ def machine_title() -> str:
     numbers = first_values("/proc/cpuinfo")
     model = [f"{key} {numbers[key]}" for key in ("cpu family", "model") if key in numbers]
     return ", ".join((" ".join([machine()["processor"], *model]), platform.machine(), f"numba {metadata.version('numba')}"))
-
-
-def first_values(path: str) -> dict[str, str]:
-    """Return the first value of every key in a Linux file of lines `key: value`; empty if there is no such file."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return {}
-    pairs = ((key.strip(), value.strip()) for key, _, value in (line.partition(":") for line in reversed(lines)))
-    return dict(pairs)
 
 
 def git(folder: Path, *arguments: str) -> str:

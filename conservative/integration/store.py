@@ -25,7 +25,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import files
+from .. import files, posix
 from ..attitude import Array
 from ..batch import Batch
 from ..check import read_only
@@ -174,18 +173,15 @@ def _restore_failure(text: str) -> IntegrationFailed:
 def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
     """Yield the store of a run, which no other process can write to in the block.
 
-    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method. Raise
-    `BadInput` if the folder contains another run or another process writes to it; for other errors see `find_ensemble`.
+    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method.
+
+    Raise `BadInput` if the folder contains another run or, except on Windows, another process writes to it; for other errors
+    see `find_ensemble`.
     """
     place, record, stored = Path(path).absolute(), describe_run(label, bodies, grid), find_ensemble(path, resume)
     if stored is None:
-
-        def make_folder(fresh: Path) -> int:
-            fresh.mkdir()
-            return os.open(fresh, os.O_RDONLY)
-
         try:
-            with files.temporary(place, make_folder) as (fresh, _):
+            with files.temporary(place, Path.mkdir) as fresh:
                 _create(fresh, record, bodies, grid)
                 fresh.rename(place)
         except OSError as error:
@@ -201,15 +197,15 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
         if differences:
             got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differences)}"
             raise BadInput("path", got, "an ensemble of the same run")
-    handle = os.open(place, os.O_RDONLY)
+    handle = posix.lock(place)
+    if handle is None:
+        raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own")
     try:
-        if not files.try_lock(handle):
-            raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own")
         for leftover in place.rglob("*.partial"):  # of a chunk, after a kill
             files.remove(leftover)
         yield _open(place, record, "r+")
     finally:
-        files.release(handle)
+        posix.release(handle)
 
 
 def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:

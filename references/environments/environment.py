@@ -22,6 +22,7 @@ from pathlib import Path
 from conservative import registry
 from conservative.errors import BadInput, MissingEngine, require_extra
 from conservative.files import write_text
+from conservative.posix import physical_memory
 from conservative.programs import list_programs
 
 from ..worker import program
@@ -129,15 +130,16 @@ class Environment:
         variables
             Additional environment variables.
         memory
-            Another memory limit in bytes.
+            Another memory limit in bytes. Only Linux limits memory.
         """
-        memory = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
+        memory = memory or physical_memory() // 4 * 3
         if self.words:
             return Worker(self.words, temporary_folder(), memory=memory)
         home = self.folder / "home"
         home.mkdir(parents=True, exist_ok=True)
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "XDG_"))}
-        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory)
+        own = {"HOME": str(home), "USERPROFILE": str(home), **(variables or {})}
+        return Worker(self.command, temporary_folder(), kept | own, memory)
 
     def write(self) -> None:
         """Write the record, which turns a folder into an environment."""
@@ -176,7 +178,7 @@ def close_environment(folder: Path) -> None:
 
 def interpreter_of(folder: Path) -> Path:
     """Return the Python of a virtual environment."""
-    return folder / "bin" / "python"
+    return folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
 def find_node(name: str) -> str:
@@ -194,7 +196,7 @@ def build(folder: Path) -> Path:
         new, lock = done.with_suffix(f".{os.getpid()}"), (folder / LOCK).read_text(encoding="utf-8")
         libraries = run_tool("pkg-config", "--cflags", "--libs", *re.findall(r"^[^=]+", lock, re.MULTILINE)).split()
         run_tool("g++", "-O2", sources[0], "-o", new, *libraries, "-std=c++17")
-        new.rename(done)
+        new.replace(done)
     return done
 
 

@@ -7,7 +7,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -179,7 +179,7 @@ def make(engine: str, lock: Lock, folder: Path, source: Source, kind: str = "pyt
     """Create an environment in place of an old one. Raise `BadInput` if a package is missing or the disk is full."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with temporary(folder, _make_folder) as (scratch, _):
+        with temporary(folder, Path.mkdir) as scratch:
             (scratch / LOCK).write_text(lock.text, encoding="utf-8")
             runtime, packages = _KINDS[kind].fill(scratch, lock, source)
             Environment(engine, lock.version, scratch, runtime, packages, kind).write()
@@ -197,11 +197,6 @@ def make(engine: str, lock: Lock, folder: Path, source: Source, kind: str = "pyt
     environment = read_environment(folder)
     assert environment is not None
     return environment
-
-
-def _make_folder(path: Path) -> int:
-    path.mkdir()
-    return os.open(path, os.O_RDONLY)
 
 
 def import_trouble(environment: Environment, distribution: Distribution) -> str:
@@ -260,11 +255,9 @@ def clear_leftovers() -> None:
 
 def _is_alive(name: str) -> bool:
     """Return whether the process exists whose number is in a name such as `work-123-abc`."""
+    import psutil
+
     number = name.split("-")[1] if name.count("-") >= 2 else ""
-    try:
-        os.kill(int(number), 0)
-    except (ProcessLookupError, ValueError):
-        return False
-    except PermissionError:  # of another user
-        return True
+    with suppress(OSError):
+        return number.isdecimal() and psutil.pid_exists(int(number))
     return True

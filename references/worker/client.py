@@ -15,15 +15,16 @@ import subprocess
 import tempfile
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Timer
 from time import monotonic
 from typing import IO, Any, NoReturn
 
 from conservative.errors import IntegrationFailed
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.posix import life_line, limit_resources, session_options
 
 from . import program
 
@@ -38,6 +39,9 @@ LARGEST_FILE = 1 << 28
 _LAST_WORDS = 300
 _ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")  # above a stack, of Python and of Node
 _PATIENCE = 2.0  # s, for a program to end when its input closes
+_LONGEST_WAIT = 1e6  # s
+_CAN_WAIT = hasattr(select, "poll")  # not on Windows, where a thread ends a late process and so the waiting for it
+_READ, _WRITE, _PART = (select.POLLIN, select.POLLOUT, select.PIPE_BUF) if _CAN_WAIT else (0, 0, 1 << 16)
 
 _limit: ContextVar[float] = ContextVar("limit", default=TIME_LIMIT)
 _workers: weakref.WeakSet[Worker] = weakref.WeakSet()
@@ -95,7 +99,7 @@ class Worker:
     variables
         Environment variables of the process; by default those of this one.
     memory
-        Memory limit in bytes, where the system supports it; 0 for none.
+        Memory limit in bytes, which only Linux supports; 0 for none.
     show_output
         True if the output of the program goes to stderr. By default it is only used to describe a crash.
 
@@ -186,7 +190,7 @@ class Worker:
         self._binary = False
         self._work = self._folder and Path(tempfile.mkdtemp(prefix=f"work-{os.getpid()}-", dir=self._folder))
         self._output = None if self._show_output else tempfile.TemporaryFile(dir=self._work)  # noqa: SIM115  # closed in _end
-        life, self._life = os.pipe()
+        life, self._life = life_line()
         try:
             self._process = subprocess.Popen(
                 self._command,
@@ -196,19 +200,20 @@ class Worker:
                 bufsize=0,
                 cwd=self._work,
                 env=self._variables,
-                pass_fds=[life],
-                start_new_session=True,  # Ctrl-C in a terminal goes to this process only
+                **session_options(life),
             )
         except OSError as error:
             self._end()
             raise EngineCrashed(f"{self._command[0]} cannot be started: {error.strerror}") from None
         finally:
-            os.close(life)
+            if life >= 0:
+                os.close(life)
         self.starts += 1
-        _limit_resources(self._process.pid, self._memory)
+        if self._memory:
+            limit_resources(self._process.pid, self._memory, LARGEST_FILE)
         with self._ended_by_failure(limit) as deadline:
-            greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"], "life": life}
-            self._greeting = self._exchange(greeting, deadline)
+            greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"]}
+            self._greeting = self._exchange(greeting | ({"life": life} if life >= 0 else {}), deadline)
             if self._greeting.get("protocol") != program.PROTOCOL:
                 raise program.Unreadable(self._greeting)
             self._binary = self._greeting.get("framing") == "binary"
@@ -225,12 +230,20 @@ class Worker:
     @contextmanager
     def _ended_by_failure(self, limit: float) -> Iterator[float]:
         """Give the block its deadline. End the process if the block fails: a late answer would be taken for the next one."""
+        expired: list[float] = []
+        timer = None if _CAN_WAIT else Timer(min(limit, _LONGEST_WAIT), self._kill_late, (expired, limit))
+        if timer:
+            timer.daemon = True
+            timer.start()
         try:
             yield monotonic() + limit
         except TimeoutError:
             self._end(at_once=True)
             raise EngineTimeout(limit) from None
-        except (EOFError, BrokenPipeError):
+        except (EOFError, OSError):  # Windows has several errors for a pipe without a reader
+            if expired:
+                self._end(at_once=True)
+                raise EngineTimeout(limit) from None
             raise EngineCrashed(self._autopsy()) from None
         except (program.Unreadable, ValueError, KeyError, TypeError, MemoryError):
             self._end(at_once=True)
@@ -241,6 +254,14 @@ class Worker:
         except BaseException:  # such as KeyboardInterrupt
             self._end(at_once=True)
             raise
+        finally:
+            if timer:
+                timer.cancel()
+
+    def _kill_late(self, expired: list[float], limit: float) -> None:
+        expired.append(limit)
+        if process := self._process:
+            process.kill()
 
     def _autopsy(self) -> str:
         """Return how the process ended."""
@@ -296,30 +317,19 @@ def close_workers() -> None:
             worker.close()
 
 
-def _limit_resources(process: int, memory: int) -> None:
-    """Keep a process that needs too much memory or prints too much from harming others, where the system supports it."""
-    if not memory:
-        return
-    with suppress(ImportError, OSError, ValueError, AttributeError):
-        import resource
-
-        limits = {resource.RLIMIT_DATA: memory, resource.RLIMIT_FSIZE: LARGEST_FILE, resource.RLIMIT_CORE: 0}
-        for which, most in limits.items():
-            resource.prlimit(process, which, (most, most))
-        Path(f"/proc/{process}/oom_score_adj").write_text("1000")  # first to be ended when memory runs out
-
-
 def _wait(descriptor: int, event: int, deadline: float) -> None:
     """Wait until a pipe can be read or written, or its other end is gone. Raise TimeoutError after the deadline."""
+    if not _CAN_WAIT:
+        return
     poll = select.poll()
     poll.register(descriptor, event)
-    while not poll.poll(max(0.0, min(deadline - monotonic(), 1e6)) * 1000):
+    while not poll.poll(max(0.0, min(deadline - monotonic(), _LONGEST_WAIT)) * 1000):
         if monotonic() >= deadline:
             raise TimeoutError
 
 
 def _read_some(pipe: IO[bytes], most: int, deadline: float) -> bytes:
-    _wait(pipe.fileno(), select.POLLIN, deadline)
+    _wait(pipe.fileno(), _READ, deadline)
     part = os.read(pipe.fileno(), min(most, 1 << 20))
     if not part:
         raise EOFError
@@ -352,5 +362,5 @@ def _write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
     """Write bytes. Raise BrokenPipeError if the reader is gone, and TimeoutError after the deadline."""
     descriptor, rest = pipe.fileno(), memoryview(data)
     while rest:
-        _wait(descriptor, select.POLLOUT, deadline)
-        rest = rest[os.write(descriptor, rest[: select.PIPE_BUF]) :]
+        _wait(descriptor, _WRITE, deadline)
+        rest = rest[os.write(descriptor, rest[:_PART]) :]

@@ -45,9 +45,9 @@ static Json answer(const Json &request) {
     static std::map<long, Prepared> runs;
     static long count = 0;
     const std::string what = request["do"];
-    if (what == "hello") { // `life` sends a signal that ends this process when the client ends, also in a loop
-        fcntl(request["life"], F_SETOWN, getpid());
-        fcntl(request["life"], F_SETFL, O_ASYNC);
+    if (what == "hello") { // `life`, if there, sends a signal that ends this process when the client ends, also in a loop
+        fcntl(request.value("life", -1), F_SETOWN, getpid());
+        fcntl(request.value("life", -1), F_SETFL, O_ASYNC);
         return {{"protocol", 1}, {"program", "C++"}, {"version", __VERSION__}, {"framing", "lines"}};
     }
     for (const long run : request["forget"]) runs.erase(run);

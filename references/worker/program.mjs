@@ -63,9 +63,11 @@ const runs = new Map();
 let engine, count = 0;
 const operations = {
   hello: ({ life }) => {
-    // The end of the client also ends a loop of an engine: another thread waits for it.
-    const end = `on('close', () => process.kill(process.pid, 'SIGKILL')).resume()`;
-    new Worker(`new (require('net').Socket)({ fd: ${life} }).${end}`, { eval: true }).unref();
+    // The end of the client also ends a loop of an engine: another thread waits for it, or looks for it every second.
+    const end = `() => process.kill(process.pid, 'SIGKILL')`;
+    const wait = `new (require('net').Socket)({ fd: ${life} }).on('close', ${end}).resume()`;
+    const look = `setInterval(() => { try { process.kill(${process.ppid}, 0) } catch { (${end})() } }, 1000)`;
+    new Worker(life === undefined ? look : wait, { eval: true }).unref();
     return { protocol: 1, program: 'node', version: process.versions.node, framing: 'lines' };
   },
   check: async ({ module }) => void (await load(module)),

@@ -21,6 +21,7 @@ import math
 import os
 import struct
 import sys
+from functools import partial
 from time import perf_counter
 from types import ModuleType, SimpleNamespace
 
@@ -218,15 +219,17 @@ def serve() -> None:
     requests, answers = _take_pipes()
     faulthandler.enable()
     greeting = requests.readline()
+    receive: Callable[[], Message] = partial(unpack, partial(_read, requests))
     if greeting:
-        _end_with(from_json(greeting)["life"])
+        if not _end_with(from_json(greeting).get("life")):
+            receive = _receive_in_thread(receive)
         version = ".".join(map(str, sys.version_info[:3]))
         answers.write(to_json({"protocol": PROTOCOL, "program": "python", "version": version, "framing": "binary"}))
         answers.flush()
     runs = Runs()
     while True:
         try:
-            request = unpack(lambda count: _read(requests, count))
+            request = receive()
         except EOFError:
             os._exit(0)  # some engines crash in their exit handlers
         answers.write(pack(answer(runs, **request)))
@@ -248,15 +251,42 @@ def _take_pipes() -> tuple[Any, Any]:
     return requests, answers
 
 
-def _end_with(life: int) -> None:
-    """Have the system end this process when the client is gone and the pipe `life` closes, even inside an engine's loop."""
+def _end_with(life: int | None) -> bool:
+    """Have the system end this process when the client is gone and the pipe `life` closes, even inside an engine's loop.
+
+    Return False if that is not possible.
+    """
+    if life is None:
+        return False
     try:
         import fcntl
 
         fcntl.fcntl(life, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(life, fcntl.F_SETFL, fcntl.fcntl(life, fcntl.F_GETFL) | os.O_ASYNC)  # sends SIGIO
     except (ImportError, OSError, AttributeError):  # not available on this system
-        return
+        return False
+    return True
+
+
+def _receive_in_thread(receive: Callable[[], Message]) -> Callable[[], Message]:
+    """Return a function that returns the next request, from a thread that ends this process when stdin closes, also in a run.
+
+    An engine that keeps the interpreter ends with its run.
+    """
+    from queue import SimpleQueue
+    from threading import Thread
+
+    requests: Any = SimpleQueue()
+
+    def read() -> None:
+        try:
+            while True:
+                requests.put(receive())
+        finally:
+            os._exit(0)
+
+    Thread(target=read, daemon=True).start()
+    return requests.get
 
 
 if __name__ == "__main__":

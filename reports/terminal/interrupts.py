@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 _NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -48,14 +49,16 @@ def _interrupt(number: int, frame: object) -> None:
         raise received[0]
     if number == signal.SIGINT:
         signal.signal(number, signal.SIG_DFL)
-        os.kill(os.getpid(), number)
+        signal.raise_signal(number)
 
 
 def _send_again(unraisable: Any) -> None:
     """Send a signal again if its exception was ignored, as in callbacks of weak references, which imports use."""
     if unraisable.exc_value in received:
         received.clear()
-        threading.Timer(_AGAIN, os.kill, (os.getpid(), unraisable.exc_value.number)).start()
+        # On Windows os.kill would end the process at once. Elsewhere it also ends a wait of the main thread.
+        send = signal.raise_signal if os.name == "nt" else partial(os.kill, os.getpid())
+        threading.Timer(_AGAIN, send, (unraisable.exc_value.number,)).start()
     else:
         sys.__unraisablehook__(unraisable)
 

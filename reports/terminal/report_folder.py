@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from conservative import files
+from conservative import files, posix
 from conservative.errors import BadInput, NotWritten
 
 from .interrupts import unstoppable
@@ -47,7 +47,7 @@ def report_folder(target: Path) -> Iterator[Path]:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             recover(target)
-            fresh, _ = stack.enter_context(files.temporary(target, _make))
+            fresh = stack.enter_context(files.temporary(target, Path.mkdir))
         except OSError as error:
             raise NotWritten("out", target, error, _FOLDER) from None
         try:
@@ -91,11 +91,6 @@ def _manifest(path: Path) -> list[str] | None:
         return None
 
 
-def _make(path: Path) -> int:
-    path.mkdir()
-    return os.open(path, os.O_RDONLY)
-
-
 def _swap(fresh: Path, target: Path) -> None:
     """Replace a folder by another. Files are deleted last."""
     files.sync(fresh)
@@ -112,7 +107,7 @@ def _swap(fresh: Path, target: Path) -> None:
     for old, handle in aside:
         _move_foreign(old, target)
         if handle is not None:
-            files.release(handle)
+            posix.release(handle)
     files.sync(target.parent)
 
 
@@ -122,7 +117,7 @@ def _step_aside(target: Path) -> tuple[Path, int | None]:
     If another process holds the lock, it has just written this report and is about to release it.
     """
     end = time.monotonic() + _SWAP_TIME
-    while (handle := files.lock(target)) is None and target.exists() and time.monotonic() < end:
+    while (handle := posix.lock(target)) is None and target.exists() and time.monotonic() < end:
         time.sleep(0.01)
     return target.rename(target.with_name(f".{target.name}-{os.urandom(6).hex()}{_ASIDE}")), handle
 

@@ -2,6 +2,7 @@ import platform
 import subprocess
 
 import pytest
+from llvmlite.binding import get_host_cpu_name
 
 from conservative.benchmarks.measures import origin
 from conservative.benchmarks.measures.origin import commit, machine, machine_title
@@ -46,8 +47,10 @@ def test_the_title_contains_what_affects_round_off(linux):
 def test_other_systems_are_described_by_python(tmp_path, monkeypatch):
     monkeypatch.setattr(origin, "first_values", lambda path: {})
     described = machine()
-    assert described["processor"]
-    assert described["memory"] == "unknown"
+    assert get_host_cpu_name() in described["processor"]
+    assert 2**20 < int(described["memory"].removesuffix(" kB")) < 2**40
+    monkeypatch.setattr(origin, "physical_memory", lambda: 0)
+    assert machine()["memory"] == "unknown"
     assert origin.first_values(str(tmp_path / "nothing")) == {}
 
 

@@ -168,13 +168,12 @@ def test_a_temporary_file_removed_by_another_writer_is_made_again(tmp_path, monk
     made = []
 
     def make(path):
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
+        path.touch(exist_ok=False)
         made.append(path)
         if len(made) == 1:
             path.unlink()  # as another writer may do before it is locked
-        return handle
 
-    with files.temporary(tmp_path / "run.csv", make) as (fresh, _):
+    with files.temporary(tmp_path / "run.csv", make) as fresh:
         assert fresh == made[1]
         assert fresh.exists()
     assert names(tmp_path) == []
