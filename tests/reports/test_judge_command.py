@@ -86,6 +86,7 @@ def test_a_motion_that_the_integrator_turns_to_the_intermediate_axis_is_noted(tm
     assert not any("L^2" in note for note in judge(tmp_path, late(), "--json")[1]["notes"])
 
 
+@pytest.mark.slow
 def test_the_start_of_the_scene_shows_an_error_of_the_first_row(tmp_path):
     w = exact(BRICK.rename("faster", w_WB_B0=1.01 * BRICK.w_WB_B0), T)[1]
     assert judge(tmp_path, w)[0].exit_code == 0

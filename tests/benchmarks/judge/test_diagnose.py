@@ -86,7 +86,7 @@ def test_noise_of_other_bodies_is_not_accused(seed):
     assert diagnosed(scene, *noisy(scene, 1e-6, seed)) is None
 
 
-@pytest.mark.parametrize("name", ["spherical_body", "needle"])
+@pytest.mark.parametrize("name", ["spherical_body", pytest.param("needle", marks=pytest.mark.slow)])
 def test_random_rows_have_no_diagnosis(name):
     scene = registry.scene(name)
     random = np.random.default_rng(1)
