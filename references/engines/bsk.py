@@ -30,6 +30,7 @@ ENGINE = {
         "variants": ("Euler", "RK2", "RK4", "RKF78"),
         "suite": ("RK4", "RKF78"),
         "as_installed": ("RK4",),
+        "rotors": True,
     },
 }
 
@@ -69,6 +70,8 @@ def _build(given):
     hub.sigma_BNInit = (given.q0[1:, None] / (1 + given.q0[0])).tolist()
     hub.omega_BN_BInit = given.w0[:, None].tolist()
     simulation.AddModelToTask("task", craft)
+    if hasattr(given, "rotor"):
+        _add_wheel(given, simulation, craft)
     integrator = getattr(svIntegrators, f"svIntegrator{given.integrator}")(craft)
     craft.setIntegrator(integrator)
     if given.integrator in ADAPTIVE:
@@ -78,6 +81,24 @@ def _build(given):
     simulation.InitializeSimulation()
     simulation.ConfigureStopTime(given.n_steps * step)
     return simulation, craft, recorder
+
+
+def _add_wheel(given, simulation, craft):
+    """Add a balanced reaction wheel without torque, whose absolute momentum about its axis is constant.
+
+    The hub's inertia contains that of the wheel about its axis, which the constant momentum leaves out of the scene's.
+    """
+    from Basilisk.simulation import reactionWheelStateEffector
+    from Basilisk.utilities import simIncludeRW
+
+    size = float(np.linalg.norm(given.rotor))
+    axis, spin = given.rotor / size, 0.01 * float(given.moments.max())
+    craft.hub.IHubPntBc_B = (np.diag(given.moments) + spin * np.outer(axis, axis)).tolist()
+    wheels, effector = simIncludeRW.rwFactory(), reactionWheelStateEffector.ReactionWheelStateEffector()
+    wheels.create("custom", axis.tolist(), Js=spin, useMaxTorque=False).Omega = size / spin - float(axis @ given.w0)
+    wheels.addToSpacecraft("wheels", effector, craft)
+    simulation.AddModelToTask("task", effector)
+    simulation.kept = wheels, effector  # the simulation has pointers to both
 
 
 def _quaternion(sigma):

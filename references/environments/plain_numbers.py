@@ -76,6 +76,7 @@ def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
         "n_steps": grid.n_steps,
         "every": grid.every,
         "steps": grid.steps.astype(int),
+        **({} if axes.scene.body.rotor_momentum is None else {"rotor": axes.rotor}),
         **({"p_WB0": flight.p_WB0, "v_WB0": flight.v_WB0} if flight else {}),
     }
 

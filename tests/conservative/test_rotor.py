@@ -94,6 +94,15 @@ def test_an_engine_agrees(kind: str, method: str) -> None:
     assert errors(method, gyrostat(kind, 2), 0.05)[0] < 1e-9
 
 
+@pytest.mark.engine("bsk")
+def test_a_reaction_wheel_of_basilisk_is_the_same_motion() -> None:
+    scene = gyrostat("free", 2)
+    grid = Grid(round(scene.t_end / 500 * 1e9) * 1e-9, 500)  # whole nanoseconds
+    found, truth = registry.method("bsk:RKF78").solve(scene, grid), cv.Taylor().solve(scene, grid)
+    assert found.ok
+    assert angle_between(found.R_WB, truth.R_WB).max() < 1e-12  # measured 1.3e-14
+
+
 @pytest.mark.parametrize(
     "method", ["moser_veselov", "lame", "convected", "rattle", "lie_variational", "textbook", "exact", "mujoco", "pinocchio"]
 )
