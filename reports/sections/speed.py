@@ -78,7 +78,7 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
         for sentence in under(((str(name), line) for name, line in points.groupby("name", sort=False)), "error", "time")
     )
     return Figure(
-        "speed",
+        "time_against_error",
         "Computing time against attitude error, each family at its best settings",
         " ".join(["Lower left is better. Ours are solid, engines dashed.", *same]),
         panels=panels,

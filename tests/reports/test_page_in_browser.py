@@ -1,6 +1,7 @@
 """The page in a real, headless chromium: `pytest --browser`, with Debian's packages chromium and chromium-driver."""
 
 import base64
+import io
 import json
 import os
 import shutil
@@ -9,6 +10,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from conservative import registry
@@ -80,6 +82,18 @@ def opened(folder, tmp_path_factory):
         yield browser
 
 
+@pytest.fixture(scope="module")
+def unfolded(opened):
+    """The same page with every folded part open and drawn."""
+    unfold(opened)
+    return opened
+
+
+def unfold(browser):
+    browser.execute_script("document.querySelectorAll('main details').forEach(d => { d.open = true })")
+    wait(browser, "return [...document.querySelectorAll('.chart')].every(e => e.querySelector('svg'))")
+
+
 def wait(browser, script):
     end = time.monotonic() + PATIENCE
     while not browser.execute_script(script):
@@ -96,10 +110,45 @@ def requests(browser):
 
 def test_nothing_is_asked_for_but_the_file_and_nothing_goes_wrong(opened, folder):
     assert set(requests(opened)) == {(folder / "index.html").as_uri()}
-    assert opened.get_log("browser") == []
+    assert [entry for entry in opened.get_log("browser") if entry["source"] != "rendering"] == []  # a slow renderer says so
 
 
-def test_every_chart_has_marks(opened):
+def test_the_first_look_is_short(opened, folder):
+    words = opened.execute_script(
+        "return [...document.querySelectorAll('#motion > p:not(.csv)')].map(e => e.textContent).join(' ')"
+    )
+    assert 10 < len(words.split()) <= 60
+    entries = opened.execute_script(
+        "return [...document.querySelectorAll('.legend')].map(l => [...l.querySelectorAll('.entry')]"
+        ".filter(e => e.checkVisibility()).length).filter(n => n)"
+    )
+    assert entries
+    assert max(entries) <= 8
+    assert (folder / "index.html").stat().st_size < 2e6  # measured 1.2e6
+    assert opened.execute_script("return document.querySelectorAll('#motion .motion figure').length") >= 3
+
+
+def test_a_table_has_its_rows_as_csv(opened):
+    link = opened.find_element("css selector", "#motion .csv a")
+    opened.execute_script("arguments[0].click()", link)
+    wait(opened, "return document.querySelector('#motion .csv a').download")
+    text = opened.execute_async_script("fetch(arguments[0].href).then(r => r.text()).then(arguments[1])", link)
+    found = pd.read_csv(io.StringIO(text))
+    measured = pd.read_csv(Path(opened.current_url.removeprefix("file://")).parent / "measurements.csv")
+    expected = measured[(measured["study"] == "motion") & (measured["scene"] == "brick_flip")].reset_index(drop=True)
+    assert len(expected) > 10
+    pd.testing.assert_frame_equal(found, expected, check_dtype=False)
+
+
+def test_a_chart_in_a_folded_part_is_drawn_when_it_is_opened(opened):
+    inside = "document.querySelectorAll('#brick_flip .chart svg').length"
+    assert opened.execute_script(f"return {inside}") == 0
+    opened.execute_script("document.getElementById('brick_flip').open = true")
+    wait(opened, f"return {inside}")
+
+
+def test_every_chart_has_marks(unfolded):
+    opened = unfolded
     marks = "svg .mark-symbol path, svg .mark-line path"
     script = "return [...document.querySelectorAll('.chart')].map(e => e.querySelectorAll(arguments[0]).length)"
     counts = opened.execute_script(script, marks)
@@ -108,27 +157,28 @@ def test_every_chart_has_marks(opened):
 
 
 def drawn_symbols(browser, colour):
-    script = 'return document.querySelectorAll(`#work_precision_brick_flip .chart svg path[fill="${arguments[0]}"]`).length'
+    script = 'return document.querySelectorAll(`#time_against_error .chart svg path[fill="${arguments[0]}"]`).length'
     return browser.execute_script(script, colour)
 
 
 def test_a_button_of_the_legend_hides_its_line_and_brings_it_back(opened):
     from selenium.webdriver.common.keys import Keys
 
-    button = opened.find_element("css selector", "#work_precision_brick_flip .entry[data-series^=mujoco]")
+    button = opened.find_element("css selector", "#time_against_error .entry[data-series^=mujoco]")
     colour = button.find_element("css selector", "path").get_attribute("fill")
     before = drawn_symbols(opened, colour)
     assert before > 1
     button.send_keys(Keys.ENTER)  # as a keyboard does it
-    wait(opened, f"return !document.querySelectorAll('#work_precision_brick_flip .chart path[fill=\"{colour}\"]').length")
-    assert button.get_attribute("aria-pressed") == "false"
-    assert opened.execute_script(
-        "return document.querySelectorAll('#work_precision_brick_flip .chart .mark-symbol path').length"
+    wait(
+        opened,
+        f"return !document.querySelectorAll('#time_against_error .chart path[fill=\"{colour}\"]').length",
     )
+    assert button.get_attribute("aria-pressed") == "false"
+    assert opened.execute_script("return document.querySelectorAll('#time_against_error .chart .mark-symbol path').length")
     button.send_keys(Keys.SPACE)
     wait(
         opened,
-        f"return document.querySelectorAll('#work_precision_brick_flip .chart path[fill=\"{colour}\"]').length == {before}",
+        f"return document.querySelectorAll('#time_against_error .chart path[fill=\"{colour}\"]').length == {before}",
     )
     assert button.get_attribute("aria-pressed") == "true"
 
@@ -136,7 +186,7 @@ def test_a_button_of_the_legend_hides_its_line_and_brings_it_back(opened):
 def test_hovering_shows_exact_values(opened):
     from selenium.webdriver import ActionChains
 
-    mark = opened.find_element("css selector", "#work_precision_brick_flip .chart .mark-symbol path")
+    mark = opened.find_element("css selector", "#time_against_error .chart .mark-symbol path")
     opened.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", mark)
     ActionChains(opened).move_to_element(mark).perform()
     wait(opened, "return document.querySelector('#vg-tooltip-element.visible')")
@@ -151,7 +201,8 @@ def column(browser, table, number):
     )
 
 
-def test_a_table_sorts_by_number_both_ways(opened):
+def test_a_table_sorts_by_number_both_ways(unfolded):
+    opened = unfolded
     region = "[aria-label^='brick_flip: wall time']"
     table = opened.find_element("css selector", f"{region} table.sortable")
     head = table.find_elements("css selector", "thead th")[2]
@@ -231,6 +282,7 @@ def engines_page(tmp_path_factory):
     file = tmp_path_factory.mktemp("page") / "index.html"
     file.write_text(html.render(document), encoding="utf-8")
     with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
+        unfold(browser)
         yield browser
 
 
