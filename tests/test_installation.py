@@ -33,6 +33,7 @@ def test_a_wheel_out_of_the_sdist_has_every_module_once_below_conservative(wheel
     assert {PurePosixPath(name).parts[0].partition("-")[0] for name in names} == {"conservative", "conservative_rotation"}
     assert sorted(name for name in names if name.endswith(".py")) == modules()
     assert "conservative/py.typed" in names
+    assert not [name for name in names if name.endswith(".gif")]
 
 
 @pytest.mark.slow
