@@ -11,7 +11,7 @@ import numpy as np
 from . import small
 from .lanes import load_rows, save_rows
 from .traced import trace
-from .vector import accumulate, add, dot
+from .vector import accumulate, add, dot, subtract
 
 
 @trace
@@ -28,6 +28,12 @@ def finite_torque(field, q, a):
 def whole(rotor, L):
     """Return the momentum L of a body with that of its rotor, which is None without one."""
     return L if rotor is None else add(L, rotor)
+
+
+@small
+def own(rotor, L):
+    """Return the momentum L of a body without that of its rotor, which is None without one."""
+    return L if rotor is None else subtract(L, rotor)
 
 
 @trace

@@ -45,7 +45,7 @@ import numpy as np
 
 from . import entry, kernel, small
 from .elliptic import sine_and_cosine
-from .fields import at_time, body_torque, whole
+from .fields import at_time, body_torque, own, whole
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import add_momentum, turn_attitude
 from .signals import call_handlers, end_of_block
@@ -297,7 +297,7 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                record(row, q, L if rotor is None else subtract(L, rotor), q_out, L_out)
+                record(row, q, own(rotor, L), q_out, L_out)
         done = last
         if done < n_steps:
             call_handlers()

@@ -19,6 +19,7 @@ from conservative.scene_files.scene_file import load
 from conservative.scenes.random_body import FIELDS
 
 from .gyrostats import gyrostat
+from .volterra import momenta_of_volterra
 
 KINDS = ("free", *FIELDS)
 
@@ -170,3 +171,14 @@ def test_scene_file(tmp_path: Path) -> None:
         with pytest.raises(cv.BadInput) as caught:
             load(path)
         assert getattr(caught.value, "line", None) == line
+
+
+@pytest.mark.parametrize("index", [None, 5, 6, 7])
+def test_the_momentum_is_that_of_volterras_closed_form(index: int | None) -> None:
+    scene = cv.scenes.volterra_gyrostat(10.0) if index is None else gyrostat("free", index)
+    grid = Grid(scene.t_end / 10, 10)
+    exact = momenta_of_volterra(scene.body, scene.w_WB_B0, grid.t)
+    size, found = np.linalg.norm(exact[0]), scene.body.momentum(Precise(128).solve(scene, grid).w_WB_B)
+    assert np.abs(found - exact).max() < 1e-14 * size  # measured 1.6e-15
+    wrong = momenta_of_volterra(cv.RigidBody(scene.body.inertia, 1.001 * scene.body.rotor_momentum), scene.w_WB_B0, grid.t)
+    assert np.abs(wrong - exact).max() > 1e-4 * size
