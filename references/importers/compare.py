@@ -112,6 +112,9 @@ MISTAKES: dict[str, Mistake] = {
     "the rotation of fixed children is ignored": _children(lambda k: {"pose": make_pose(k.pose[:3, 3])}),
     "the place of fixed children is ignored": _children(lambda k: {"pose": make_pose(R=k.pose[:3, :3])}),
     "fixed children are moved to the origin of the root link, not to the common centre of mass": _collapsed,
+    "links without inertia have mass 1 and the unit inertia": _all(
+        lambda k: {} if k.mass else {"mass": 1.0, "inertia": np.eye(3)}
+    ),
     "the inertia is lost": _all(lambda k: {"inertia": np.zeros((3, 3))}),
     "the inertia is the unit matrix": _all(lambda k: {"inertia": np.eye(3)}),
     "mass and inertia are 1": _all(lambda k: {"mass": 1.0, "inertia": np.eye(3)}),
@@ -269,4 +272,5 @@ class Program:
         prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
         if flaw and said and not seen.flaw:
             return answer("right", f"it repairs the inertia{prints}")
-        return answer("wrong", (f"{flaw}, and it does not say so" if flaw else explain(path, links, seen, tolerance)) + prints)
+        accepts = f"it accepts that {flaw}" if not said else f"{flaw}, and it does not repair that"
+        return answer("wrong", (accepts if flaw else explain(path, links, seen, tolerance)) + prints)

@@ -144,15 +144,22 @@ def _drake(path, kind):
 
 
 def _dart(path, kind):
+    import dartpy
     from dartpy import utils
 
     world = _choose(
         kind, urdf=utils.DartLoader().parseSkeleton, sdf=utils.SdfParser.readSkeleton, mjcf=utils.MjcfParser.readWorld
     )(path)
     skeleton = world.getSkeleton(0) if kind == "mjcf" else world
+    if skeleton is None:
+        raise ValueError("DART's loader returned nothing")
     skeleton.setGravity([0, 0, 0])
     skeleton.setPositions(np.zeros(skeleton.getNumDofs()))
-    body = skeleton.getBodyNode(0)
+    body, joint = skeleton.getBodyNode(0), skeleton.getRootJoint()
+    joint.setTransformFromParentBodyNode(
+        dartpy.math.Isometry3()
+    )  # the body starts at the identity, wherever the file places it
+    joint.setTransformFromChildBodyNode(dartpy.math.Isometry3())
 
     def accelerate(v, force):
         skeleton.setVelocities(np.roll(v, 3))
