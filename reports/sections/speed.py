@@ -27,16 +27,9 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     name = measured.main_scene.name
     sentence = _sentence(name, of_scene(measured.points, name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
-    return Section(
-        "How wrong, how fast",
-        filled(
-            Paragraph(sentence, Emphasis.LEAD) if sentence else None,
-            figure(pictures),
-            Paragraph(f"{CAVEAT}{rough}", Emphasis.NOTE),
-        ),
-        "speed",
-        "Speed",
-    )
+    lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
+    blocks = filled(lead, figure(pictures), Paragraph(f"{CAVEAT}{rough}", Emphasis.NOTE))
+    return Section("How wrong, how fast", blocks, "speed", "Speed")
 
 
 def _sentence(scene: str, points: pd.DataFrame) -> str:
