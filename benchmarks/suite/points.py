@@ -118,6 +118,8 @@ def motion_numbers(scene: Scene) -> list[list[float]]:
         [] if scene.potential is None else [float(energy_at(scene.potential, *at)) for at in zip(PROBES, times, strict=True)]
     )
     values: tuple[Any, ...] = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
+    if scene.body.rotor_momentum is not None:
+        values = (*values, scene.body.rotor_momentum)
     if flight := scene.flight:
         values = (*values, [flight.mass, flight.g], flight.com_B, flight.p_WB0, flight.v_WB0)
     return [_digits(each) for each in values]

@@ -17,7 +17,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
 
     Engines that limit rates need it: game engines stop at 100 rad/s, and the top of Krenk & Nielsen turns at 141. With f = slow
 
-        R'(f t) = R(t)     w' = w / f     weight' = weight / f^2
+        R'(f t) = R(t)     w' = w / f     weight' = weight / f^2     h' = h / f
 
     If f is a power of two, both motions have the same digits. The result for f = 1 is the scene itself.
 
@@ -27,7 +27,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         `slow` is not a finite number above 0, the field is not uniform gravity, or the scene has extra invariants, whose
         scaling is unknown.
     """
-    factor, field, flight = positive_number("slow", slow), scene.potential, scene.flight
+    factor, field, flight, rotor = positive_number("slow", slow), scene.potential, scene.flight, scene.body.rotor_momentum
     if factor == 1:
         return scene
     if isinstance(field, UniformGravity):
@@ -38,6 +38,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         raise BadInput("scene", "a scene with extra_invariants", "a scene without")
     return scene.rename(
         f"{scene.name}:slow={factor:g}",
+        body=RigidBody(scene.body.inertia, None if rotor is None else rotor / factor),
         w_WB_B0=scene.w_WB_B0 / factor,
         flight=flight and replace(flight, v_WB0=flight.v_WB0 / factor, g=flight.g / factor**2),
         t_end=scene.t_end * factor,
@@ -50,7 +51,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
 def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
     """Return the same motion in a body frame turned by the rotation F (3, 3), which maps old body components to new ones.
 
-        J' = F J F'     R_WB' = R_WB F'     w' = F w     com' = F com
+        J' = F J F'     R_WB' = R_WB F'     w' = F w     com' = F com     h' = F h
 
     Engines have dropped this rotation or applied it twice. The result of a correct method satisfies R_WB' F = R_WB.
 
@@ -67,4 +68,5 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
         raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
     flight = scene.flight and replace(scene.flight, com_B=F @ scene.flight.com_B)
     start = {"R_WB0": scene.R_WB0 @ F.T, "w_WB_B0": F @ scene.w_WB_B0}
-    return scene.rename(name, body=RigidBody(F @ scene.body.inertia @ F.T), potential=field, flight=flight, **start)
+    body = RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T))
+    return scene.rename(name, body=body, potential=field, flight=flight, **start)

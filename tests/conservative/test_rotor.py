@@ -17,6 +17,7 @@ from conservative.references.precise import Precise
 from conservative.references.truth import confirm
 from conservative.scene_files.scene_file import load
 from conservative.scenes.random_body import FIELDS
+from conservative.scenes.transforms import in_body_frame, slow_motion
 
 from .gyrostats import gyrostat
 from .volterra import momenta_of_volterra
@@ -116,15 +117,11 @@ def test_others_refuse(method: str) -> None:
 
 def test_other_frame_and_units_are_the_same_motion() -> None:
     scene, R = gyrostat("free", 3), rotation_about((1.0, -2.0, 0.5), 0.9)
-    turned = scene.rename(
-        "turned",
-        body=cv.RigidBody(R @ scene.body.inertia @ R.T, R @ scene.body.rotor_momentum),
-        R_WB0=scene.R_WB0 @ R.T,
-        w_WB_B0=R @ scene.w_WB_B0,
-    )
+    turned, slow = in_body_frame(scene, R, "turned"), slow_motion(scene, 4)
     small = scene.rename("small", body=cv.RigidBody(scene.body.inertia * 1e-12, scene.body.rotor_momentum * 1e-12))
     one = cv.integrate(scene, scene.t_end / 200, "reduced").R_WB
     assert angle_between(cv.integrate(turned, scene.t_end / 200, "reduced").R_WB @ R, one).max() < 1e-12
+    assert angle_between(cv.integrate(slow, slow.t_end / 200, "reduced").R_WB, one).max() < 1e-12
     assert angle_between(cv.integrate(small, scene.t_end / 200, "reduced").R_WB, one).max() < 1e-12
 
 
