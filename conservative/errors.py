@@ -205,6 +205,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "report": ("click", "rich", "jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
         "parquet": ("pyarrow",),
+        "video": ("matplotlib", "imageio_ffmpeg"),
         "models": ("pxr", "trimesh"),
         "cluster": ("distributed", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),

@@ -16,7 +16,13 @@ from conservative.errors import EXTRAS
 from .environments import LEAN, ROOT, run_python, variables
 
 ROOMS = ("references", "benchmarks", "reports")
-IMPORTED_AS = {"pin": "pinocchio", "vl-convert-python": "vl_convert", "pytest-benchmark": "pytest_benchmark"}
+IMPORTED_AS = {
+    "pin": "pinocchio",
+    "vl-convert-python": "vl_convert",
+    "pytest-benchmark": "pytest_benchmark",
+    "usd-core": "pxr",
+    "imageio-ffmpeg": "imageio_ffmpeg",
+}
 
 
 def modules():
