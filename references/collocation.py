@@ -32,11 +32,11 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
     """Return the motion of a scene at the samples of a grid, with `parts` steps between two samples.
 
     The field is one that kernels know. A step that is too long to converge gives a wrong result, or one that is not finite.
-    Steps also end at the times of a table of torques, where the motion is not smooth.
+    Steps also end where a torque is not smooth (`Torque.breaks`).
     """
     c, b, A = _tableau()
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
-    bends = scene.torque.value[0] if scene.torque is not None and isinstance(scene.torque.value, tuple) else ends[:0]
+    bends = scene.torque.breaks if scene.torque is not None else ends[:0]
     stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
     y = np.concatenate([q / np.sqrt(q @ q), scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0])

@@ -105,22 +105,31 @@ class Torque:
         linear in between. The times have to cover the run, including its last step. A step calls Python if it is no constant.
     frame
         "body" or "world": the axes of its components.
+    breaks
+        Times (n,), s, at which the function is not smooth: steps of the reference solution end there. A table has its own.
 
     Raises
     ------
     BadInput
-        The value is of another kind or shape or not finite, the times do not increase, or frame has another value.
+        The value is of another kind or shape or not finite, times do not increase, or frame has another value.
     TorqueFailed
         During integration, the function raised an exception or did not return three finite numbers, or the table ended.
     """
 
     value: Value
-    frame: str = "body"
+    frame: str
+    breaks: Array
 
     def __init__(
-        self, value: ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], ArrayLike], frame: str = "body"
+        self,
+        value: ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], ArrayLike],
+        frame: str = "body",
+        breaks: ArrayLike = (),
     ) -> None:
         choice("frame", frame, FRAMES)
+        times = real_array(breaks)
+        if times is None or times.ndim != 1 or not np.isfinite(times).all():
+            raise BadInput("breaks", describe(breaks), "finite times (n,), s")
         if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[1]) > 0:
             times = real_array(value[0])
             if times is None or times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
@@ -132,7 +141,7 @@ class Torque:
             value = read_only(times), finite_array("values", value[1], ((len(times), 3),), allowed)
         elif not callable(value):
             value = finite_array("value", cast(ArrayLike, value), ((3,),), _ALLOWED)
-        set_fields(self, value=value, frame=frame)
+        set_fields(self, value=value, frame=frame, breaks=read_only(times))
         if callable(value):
             self.require(0.0)
 
@@ -170,7 +179,7 @@ class Torque:
             value = self.value[0] / time, self.value[1] / energy
         else:
             value = _Scaled(self, energy, time)
-        return replace_unchecked(self, value=value)
+        return replace_unchecked(self, value=value, breaks=self.breaks / time)
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,16 @@ KROGH, SCALE = (2.0, 3.0, 1.0), np.sqrt((1.53, 0.51, 3.0))
 BOX = MassDistribution(10, (0, 0, 0), (0.80833333, 0.68333333, 0.14166667))
 MOTIONS |= {
     "gazebo-flight": cv.Scene("published", BOX, START, (0.1, 5, 0.1), 10, BOX.gravity(9.8), v_WB0=(-2, 2, 8)),
+    "eulr": cv.Scene(
+        "published",
+        cv.RigidBody((0.5, 2, 3)),
+        START,
+        (1, 0, 0.9),
+        20,
+        torque=cv.Torque(
+            lambda t: (0, 0, np.sin(t) ** 2 / 4 if 3 * np.pi <= t <= 4 * np.pi else 0), breaks=(3 * np.pi, 4 * np.pi)
+        ),
+    ),
     "nesc-brick": free((0.00189422, 0.006211019, 0.007194665), np.radians((10, 20, 30)), 30),
     "jeod-cylinder": cv.Scene(
         "published",
@@ -257,6 +267,10 @@ def flight_position_error(figure):  # of the centre of mass, m
 
 def rates_in_degrees(figure):
     return np.degrees(end(figure).w_WB_B[-1])
+
+
+def rates_error_at_every_sample(figure):
+    return np.abs(every_step(figure).w_WB_B - every_step(figure, "truth").w_WB_B).max()
 
 
 def euler_angles_in_north_east_down(figure):  # yaw, pitch, roll; the axes turn about the first one with the Earth
