@@ -43,6 +43,7 @@ def scenes() -> list[cv.Scene]:
         lambda R, t: (1 + t) * R[2] @ HOOK, lambda R, t: (1 + t) * np.outer([0, 0, 1], HOOK), time_dependent=True
     )
     orbit = cv.Orbit(0.7, (0, 0, 1))
+    heavy = in_field("heavy", cv.UniformGravity(3.0, (0.2, 0.1, 0.4)))
     return [
         cv.scenes.brick_flip(),
         cv.Scene("about the least axis", BODY, TURN, TURN @ [2.0, 0.1, 0.2], 2.0),
@@ -57,6 +58,9 @@ def scenes() -> list[cv.Scene]:
         in_field("function", quartic),
         in_field("growing", growing).rename("growing", dt=1e-3),  # nothing holds its energy where steps are long
         in_field("satellite", orbit.gravity_gradient(BODY.inertia, (1, 0, 0))),
+        cv.scenes.volterra_gyrostat(),
+        heavy.rename("gyrostat", body=cv.RigidBody(BODY.inertia, rotor_momentum=(0.4, -0.7, 1.1))),
+        heavy.rename("loads", torque=cv.Torque((0.3, 0.1, -0.2), "world"), damping=cv.Damping(0.05 * np.eye(3))),
     ]
 
 

@@ -21,7 +21,7 @@ def test_every_method_is_a_frozen_value_that_is_read_back_from_its_name(name):
     ("text", "hint"),
     [
         ("lagrange", "'lagrange_top' (nearest)"),
-        ("zzz", "one of 39 names; list them with: conservative list"),
+        ("zzz", f"one of {len(registry.list_scenes())} names; list them with: conservative list"),
     ],
 )
 def test_the_nearest_names_of_an_unknown_scene_are_listed(text, hint):

@@ -145,7 +145,8 @@ def test_scipy_supports_loose_tolerances(field):
 def test_heyoka_and_scipy_support_every_registered_scene():
     for name in registry.list_scenes():
         for method in (Heyoka(), Heyoka(frame="lean"), Heyoka(frame="base_vectors"), SciPy()):
-            assert method.unsupported(registry.scene(name)) is None
+            scene = registry.scene(name)
+            assert (method.unsupported(scene) is None) == (scene.flight is None), name
 
 
 def test_the_reason_of_an_unsupported_field_names_the_table_of_expressions():

@@ -90,7 +90,7 @@ def test_constant_rates_between_steps_are_detected(case, monkeypatch):
     """The negative control: between steps the body turns at the rates of the step."""
     scene, R_WB, w_WB_B = case
 
-    def turn_on(scene, t, gaps, R_WB, w_WB_B):
+    def turn_on(scene, t, gaps, R_WB, w_WB_B, supplied):
         turns = [rotation_about(w, np.linalg.norm(w) * gap) if gap else np.eye(3) for w, gap in zip(w_WB_B, gaps, strict=True)]
         return R_WB @ np.array(turns), w_WB_B, len(t)
 

@@ -171,7 +171,7 @@ def advice(reached):
 
 def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds():
     answer = SimpleNamespace(conditions=SimpleNamespace(cost_limit=1.0), advice=(advice(True), advice(False)))
-    reaching, failing, probes = recommendation.tables(answer)
+    (reaching, failing), probes = recommendation.tables(answer), recommendation.probe_table(answer)
     assert dict(zip(reaching.header, reaching.rows[0], strict=True)) == {
         "method": "reduced",
         "setting": "dt = 0.25 s",
