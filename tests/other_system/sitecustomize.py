@@ -3,7 +3,6 @@
 What is missing or refused: modules and functions of POSIX, its signals, /proc, opened folders, links, `Popen` with options of
 POSIX, and, as on Windows, to rename or remove an open file or a folder with one. Modules of the standard library that need what
 is missing are imported before. Python processes that start from here are on the same system.
-missing are imported before. Python processes that start from here are on the same system.
 """
 
 import asyncio  # noqa: F401
