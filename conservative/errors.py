@@ -208,6 +208,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "video": ("matplotlib", "imageio_ffmpeg"),
         "models": ("pxr", "trimesh"),
         "cluster": ("distributed", "cloudpickle"),
+        "docs": ("sphinx", "myst_nb", "furo", "sphinx_click"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }
 )
