@@ -17,8 +17,8 @@ from .summary import ERRORS
 
 HEADER = ("motion", "error, rad", "use", "µs per simulated s", "fastest engine", "engine's time / ours", "repeat with")
 _OWN = (
-    "For your own body: `conservative new > my_body.toml`, then `conservative recommend my_body.toml --error 1e-6`. "
-    "In Python, `cv.integrate(scene, error=1e-6)` chooses method and step."
+    "Install it by `pip install 'conservative-rotation[all]'`. For your own body: `conservative new > my_body.toml`, then "
+    "`conservative recommend my_body.toml --error 1e-6`. In Python, `cv.integrate(scene, error=1e-6)` chooses method and step."
 )
 
 _MORE = "`conservative report --bodies 3` adds random bodies in fields to this page."

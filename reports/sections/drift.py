@@ -18,7 +18,7 @@ from .tumbling import Result, drawn
 
 _WHY = (
     "Each step changes energy and momentum a little, and in most methods these changes add up. Smaller steps delay the drift "
-    "but do not end it. Methods that conserve stay on the middle line at any step."
+    "but do not end it. Methods that conserve stay on the middle line at any step that they can take."
 )
 
 

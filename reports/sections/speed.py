@@ -73,7 +73,7 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     return Figure(
         "time_against_error",
         "Computing time against attitude error, each family at its best settings",
-        " ".join(["Lower left is better. Ours are solid, engines dashed.", *same]),
+        " ".join(["Lower left is better. Ours are solid, ODE solvers dashed, physics engines dotted.", *same]),
         panels=panels,
         legend=legend,
         layout=Layout.PANELS,

@@ -97,12 +97,18 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
     if engines:
         worst = engines[0]
         energy = f"{100 * worst.energy:.2g} %" if worst.energy > LOST else f"{number(worst.energy, 1)} of it"
-        wrong = f"{worst.line} is wrong by {number(worst.error)} rad and changes the energy by {energy}"
-        parts.append(f"After {scene.t_end:.3g} s in steps of {1e3 * worst.dt:.3g} ms, {wrong}.")
+        wrong = (
+            f"is wrong by up to {number(worst.error)} rad ({math.degrees(worst.error):.2g}°) and changes the energy by {energy}"
+        )
+        parts.append(f"In {scene.t_end:.3g} s, {worst.line} in steps of {1e3 * worst.dt:.3g} ms {wrong}.")
+        family = [each for each in engines[1:] if each.method.partition(":")[0] == worst.method.partition(":")[0]]
+        if family:
+            parts.append(f"{family[-1].line} is wrong by {number(family[-1].error)} rad.")
     if ours:
         best = min(ours, key=lambda each: each.error)
         cost = "" if math.isnan(best.time) else f" and takes {number(1e6 * best.time)} µs per step"
-        parts.append(f"`{best.method}` of the Python package `conservative` is wrong by {number(best.error)} rad{cost}.")
+        steps = f"`{best.method}` of the Python package `conservative`, in steps of {1e3 * best.dt:.3g} ms,"
+        parts.append(f"{steps} is wrong by {number(best.error)} rad{cost}.")
     return " ".join(parts)
 
 
@@ -120,5 +126,8 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
         order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
         error = grade(each.error, limits=(RIGHT, USABLE))
         rows.append([each.name, numeric(each.dt), *drifts, error, order, numeric(1e6 * each.time)])
-    caption = f"Largest values over {scene.t_end:.3g} s. Engines without a default step have the scene's."
+    steps = f"Steps are the engines' defaults, or else {scene.dt:g} s: a shorter step is more accurate."
+    caption = f"Largest values over {scene.t_end:.3g} s. {steps}"
+    if still := [each.line for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]:
+        caption += f" Conservation is not accuracy: see {still[0]}."
     return Table(header, rows, caption, source={"study": "motion", "scene": scene.name})
