@@ -22,6 +22,8 @@ IMPORTED_AS = {
     "pytest-benchmark": "pytest_benchmark",
     "usd-core": "pxr",
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "myst-nb": "myst_nb",
+    "sphinx-click": "sphinx_click",
 }
 
 

@@ -29,7 +29,14 @@ READMES = ("README.md", *(f"{room}/README.md" for room in ROOMS[1:]))
 SETTINGS = {
     "project": "conservative",
     "version": VERSION,
-    "extensions": ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_click"],
+    "extensions": [
+        "myst_nb",
+        "sphinx.ext.autodoc",
+        "sphinx.ext.napoleon",
+        "sphinx_click",
+        "conservative.reports.documentation.site",
+    ],
+    "html_math_renderer": "mathml",
     "myst_heading_anchors": 4,
     "myst_fence_as_directive": ["math"],
     "nb_execution_mode": "force",
@@ -41,6 +48,7 @@ SETTINGS = {
     "autodoc_typehints": "signature",
     "html_theme": "furo",
     "html_title": f"conservative {VERSION}",
+    "html_show_copyright": False,
     "html_show_sourcelink": False,
     "html_use_index": False,
     "html_domain_indices": False,
@@ -117,6 +125,9 @@ def written(source: Path) -> None:
     whole = [ROOT / "CHANGELOG.md", *(page for room in ROOMS for page in (ROOT / room).rglob("*.md")), *HERE.glob("*.ipynb")]
     for path in sorted({page.relative_to(ROOT).as_posix() for page in whole} - {*READMES, CONTENTS}):
         pages[path] = {posixpath.splitext(path)[0].lstrip("."): (ROOT / path).read_text(encoding="utf-8")}
+    paper = pages["reports/documentation/paper.md"]  # its title is a field, above headings of the first level
+    for name, text in paper.items():
+        paper[name] = "# Paper\n\n" + re.sub("^#", "##", re.sub(r"\A---\n.*?^---$", "", text, flags=re.M | re.S), flags=re.M)
     del pages["README.md"]["read-on"]  # links, which the site has beside each page
     texts = {}
     for path, parts in pages.items():
@@ -153,9 +164,23 @@ def api(path: str, title: str) -> str:
 def as_restructured(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Turn the Markdown of a docstring into reStructuredText: indented code, and bars outside code."""
     text = re.sub(r"^(\S.*\n\n)(?=    \S)", r"\1::\n\n", "\n".join(lines), flags=re.MULTILINE)
-    lines[:] = re.sub(r"`[^`]*`|\|", lambda match: match[0].replace("|", "\\|") if match[0] == "|" else match[0], text).split(
-        "\n"
-    )
+    code = r"`[^`]*`|^::\n\n(?:(?:    .*)?\n)*"
+    lines[:] = re.sub(rf"({code})|\|", lambda match: match[1] or r"\|", text, flags=re.MULTILINE).split("\n")
+
+
+def show_block(translator: Any, node: Any) -> None:
+    """Write a formula as MathML, which browsers show without a script."""
+    from docutils import nodes
+    from docutils.utils.math.latex2mathml import tex2mathml
+
+    translator.body.append(f"<div class='math'>{tex2mathml(node.astext(), as_block=True)}</div>")
+    raise nodes.SkipNode
+
+
+def setup(app: Any) -> None:
+    """Extend Sphinx: our docstrings and formulas."""
+    app.connect("autodoc-process-docstring", as_restructured, priority=400)  # before napoleon
+    app.add_html_math_renderer("mathml", (show_block, None), (show_block, None))
 
 
 def listing(title: str, folder: str, names: Iterable[str]) -> str:
@@ -168,19 +193,26 @@ def main() -> None:
     """Build the site, and print the path of its first page."""
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.site", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("site"), help="[default: site]")
-    folder = parser.parse_args().folder
+    parser.add_argument("--report", type=Path, help="folder of a report to include: conservative report --out FOLDER")
+    folder, report = (given := parser.parse_args()).folder, given.report
+    if report and not (report / "index.html").is_file():
+        parser.error(f"--report: got {report}; expected a folder that conservative report wrote")
     require_extra("the documentation site", "docs")
     from sphinx.application import Sphinx
 
     with tempfile.TemporaryDirectory() as place:
         source, built = Path(place) / "source", Path(place) / "site"
         written(source)
+        if report:
+            with (source / "results.md").open("a", encoding="utf-8") as page:
+                page.write('\n## Report of this version\n\n<a href="report/index.html">All methods, tables and charts</a>\n')
         app = Sphinx(source, None, built, Path(place) / "doctrees", "html", SETTINGS, status=None, warningiserror=True)
-        app.connect("autodoc-process-docstring", as_restructured, priority=400)  # before napoleon
         app.build()
         if app.statuscode:
             raise SystemExit("The site has the warnings above and was not written. Correct them and build again.")
         shutil.copytree(built, folder, dirs_exist_ok=True)
+    if report:
+        shutil.copytree(report, folder / "report", dirs_exist_ok=True)
     print(folder / "index.html")
 
 

@@ -45,7 +45,10 @@ def reached(pages, folder):
 @pytest.mark.slow
 def test_the_site_is_built_without_warnings_complete_and_searchable(tmp_path):
     folder = tmp_path.resolve() / "site"
-    command = [sys.executable, "-m", "conservative.reports.documentation.site", str(folder)]
+    report = tmp_path / "report"
+    report.mkdir()
+    (report / "index.html").write_text("<p>a report</p>")
+    command = [sys.executable, "-m", "conservative.reports.documentation.site", str(folder), "--report", str(report)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == str(folder / "index.html")
@@ -55,6 +58,7 @@ def test_the_site_is_built_without_warnings_complete_and_searchable(tmp_path):
     index = json.loads((folder / "searchindex.js").read_text().removeprefix("Search.setIndex(").rstrip(")"))
     assert {"moserveselov", "quaternion", "wirbel"} - {*index["terms"], *index["titleterms"]} == {"wirbel"}
     check_names_and_options(pages)
+    assert pages["conservative/methods/DERIVATION.html"].count("<math") == 21
     loaded = {"".join(found) for page in pages.values() for found in LOADED.findall(page)}
     assert loaded
     assert not [address for address in loaded if re.match(r"https?:|//", address)]
