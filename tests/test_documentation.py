@@ -19,7 +19,7 @@ from conservative.reports.cli.main import main
 
 from .pages import ROOT, blocks, dead_links, pages, shell_lines
 
-NOTEBOOK = ROOT / "reports" / "documentation" / "from_body_to_verdict.ipynb"
+NOTEBOOKS = ROOT / "reports" / "documentation"
 
 
 def cases(language):
@@ -107,15 +107,19 @@ def test_unknown_commands_are_found(line):
 
 
 @pytest.mark.slow
-def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("from_body_to_verdict", ("moser_veselov", "mujoco")), ("satellite_with_loads", ("momentum balance", "Animation"))],
+)
+def test_a_notebook_runs_and_is_checked_in_without_outputs(name, expected, tmp_path):
+    notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
     nbformat.validate(notebook)
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert not [cell.id for cell in cells if cell.outputs or cell.execution_count]
     NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
-    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in cells if cell.outputs}
-    assert "moser_veselov" in shown["cheapest"]
-    assert "mujoco" in shown["runs"]
+    shown = "".join(str(cell.outputs[-1].get("data")) for cell in cells if cell.outputs)
+    for part in expected:
+        assert part in shown
 
 
 def test_every_column_of_a_row_is_explained():
