@@ -8,6 +8,9 @@ from typing import Any
 from ..document.cells import DASH
 from ..document.model import Block, Document, Facts, Table
 
+LARGE = 0.1
+"""Attitude error, rad, above which a run is followed by advice."""
+
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:
     """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
@@ -29,6 +32,8 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"{name} error", error.get("reason") or f"{error[name]:.1e} {unit}"
     if "truth" in error:
         yield "error against", f"{error['truth']}, largest of {error['samples']} samples"
+    if error.get("attitude", 0.0) > LARGE:
+        yield "more accurate", "a shorter --dt, -m taylor, or what `conservative recommend` finds"
     for name, value in summary["drift"].items():
         yield f"drift of {name}", f"{value:.2e} (relative)"
     yield "orthonormality", f"{summary['orthonormality']:.2e}"
