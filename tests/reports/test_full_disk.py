@@ -46,7 +46,7 @@ def folder(tmp_path):
     """A folder with files of every kind that a command replaces."""
     baseline.write(baseline.update_baseline(None, [found(1e-3)], "First"), tmp_path / "baseline.json")
     results.write(found(*[1e-3] * 40), tmp_path / "results.json")
-    (tmp_path / "run.csv").write_text("t,R_WB_11,before")
+    (tmp_path / "run.csv").write_text("t (s),R_WB_11,before")
     return tmp_path
 
 

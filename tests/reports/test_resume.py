@@ -219,7 +219,7 @@ def test_an_interrupt_stores_finished_studies_and_prints_the_command_that_contin
     assert code == 130
     assert out == ""
     assert "\nInterrupted; " in err
-    said = re.search(r"(\d) of 5 studies are finished \((.*)\) and stored", err)
+    said = re.search(r"(\d) of 6 studies are finished \((.*)\) and stored", err)
     names = said[2].split(", ")
     assert names == list(content["studies"])[: int(said[1])]  # a kill can come when a study is kept and not yet said to be
     assert "convergence" in names
