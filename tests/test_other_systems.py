@@ -13,6 +13,7 @@ import pytest
 
 from .environments import ROOT, run_python
 
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="it is another system already")
 SYSTEM = Path(__file__).parent / "other_system"
 PATHS = os.pathsep.join([str(SYSTEM), str(ROOT)])
 OF_ONE_SYSTEM = {"fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "posix", "msvcrt", "winreg"}
