@@ -148,8 +148,9 @@ PAIRS = [(method, kind) for method in ours() for kind in KINDS if supported(meth
 def test_symmetries_hold(method, kind, data):
     case = data.draw(cases(kind))
     plain = run(method, case.scene)
-    # The steps that a tolerance chooses depend on the direction and the start: measured 8e-12 in 150 cases of 1e-9.
-    bound = max(ROUND_OFF, 0.1 * (getattr(method, "tolerance", None) or 0.0))
+    # `Taylor` is not symmetric in time: back and forth leave twice its truncation error, measured 2e-11 at order 8. The steps that
+    # a tolerance chooses depend on the direction and the start: measured 8e-12 in 150 cases of 1e-9.
+    bound = 1e-10 if isinstance(method, cv.Taylor) else ROUND_OFF
     for symmetry in SYMMETRIES:
         if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
             continue  # equal moments have no axes of their own, and its error depends on the axes
