@@ -148,8 +148,8 @@ PAIRS = [(method, kind) for method in ours() for kind in KINDS if supported(meth
 def test_symmetries_hold(method, kind, data):
     case = data.draw(cases(kind))
     plain = run(method, case.scene)
-    # `Taylor` is not symmetric in time: back and forth leave twice its truncation error, measured 2e-11 at order 8. The steps that
-    # a tolerance chooses depend on the direction and the start: measured 8e-12 in 150 cases of 1e-9.
+    # `Taylor` is not symmetric in time: back and forth leave twice its truncation error, measured 2e-11 at order 8. The steps
+    # that a tolerance chooses depend on the direction and the start: measured 8e-12 in 150 cases of 1e-9.
     bound = 1e-10 if isinstance(method, cv.Taylor) else ROUND_OFF
     for symmetry in SYMMETRIES:
         if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
