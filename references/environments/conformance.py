@@ -26,7 +26,8 @@ from conservative.scene import Scene
 
 from ..engine import principal_axes
 from ..samples import States, to_body_axes
-from ..worker.client import EndlessAnswer, EngineTimeout, time_limit
+from ..worker.client import EndlessAnswer, EngineTimeout, Worker, time_limit
+from ..worker.program import WARM_UP
 from .environment import worker_of
 from .plain_numbers import describe, read_states
 from .programs import UnusableProgram, program_class
@@ -39,6 +40,8 @@ GRIDS = (Grid(0.005, 4), *(Grid(0.01 / part, 100 * part, 10 * part) for part in 
 CENTRAL = RigidBody(describe(principal_axes(HEAVY), GRIDS[0])["moments_com"])
 FLOOR, PACE = 1e-6, 0.2
 """Smallest errors that are compared, above those of single precision, and wall time of the calls in a measurement, s."""
+RESOLVED = {"f64": 1e-13, "f32": 1e-4}
+"""Smallest errors that show an order, above round-off in each precision."""
 PATIENCE = 30.0
 """Time in s that the program may take to start, and for each answer."""
 ANSWERS = "answer each request once, in one line that ends with a newline (or one binary message), and flush stdout"
@@ -66,7 +69,7 @@ READING: dict[str, dict[str, Any]] = {
     "Its inertia is about the centre of mass: `moments` are about the fixed point": {"body": CENTRAL},
 }
 SCALAR_LAST = "`q` is x, y, z, w: the scalar comes first"
-TRANSPOSED = "The attitudes are transposed: v_W = R v_F"
+TRANSPOSED = "The attitudes are transposed, or the quaternions conjugated: v_W = R v_F"
 Y_UP = "Vectors are x, z, -y, with the second axis up: answer in W and F, whose third axis is up"
 ATTITUDES = ("", SCALAR_LAST, TRANSPOSED, Y_UP)
 W_IN_W = "`w` has rates in W, or `w_W` has rates in F: `w` is in F, `w_W` is in W"
@@ -121,8 +124,9 @@ def check(program: Program) -> Iterator[tuple[bool, str]]:
     try:
         with time_limit(PATIENCE):
             method = program_class(program, PATIENCE)()
-            yield True, f"hello: {method.maker}"
             worker, run = worker_of(method.environment), 0
+            greeting = worker.greet()
+            yield True, f"hello: {greeting.get('program')}, version {greeting['version']}"
             for scene in (FREE, HEAVY):
                 part, answers = scene.name, dict[Grid, States]()
                 try:
@@ -135,6 +139,9 @@ def check(program: Program) -> Iterator[tuple[bool, str]]:
                     if scene is HEAVY:
                         break
                     return
+                if not np.array_equal(again.values, answers[grid].values, equal_nan=True):
+                    yield False, f"{scene.name}: a second run has other samples: start from `q0` and `w0`"
+                    return
                 errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
                 text = f"error {errors[1]:.1e} at dt = {GRIDS[1].dt} s, {errors[-1]:.1e} at {grid.dt} s"
                 mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
@@ -143,29 +150,38 @@ def check(program: Program) -> Iterator[tuple[bool, str]]:
                 yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
                 if mistakes:
                     return
-                yield True, f"{scene.name}: {text}"
-                same = np.array_equal(again.values, answers[grid].values)
-                yield (
-                    same,
-                    f"{scene.name}: a second run has {'the same' if same else 'other samples: start from `q0` and `w0`'}",
-                )
-            part, calls, wall, seconds = "time", 1, 0.0, 0.0
-            while (wall < PACE or seconds < 0.5 * wall < 5 * PACE) and calls < 1e6:  # a busy machine may delay an answer
-                calls, start = 4 * calls, perf_counter()
-                seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
-                wall = perf_counter() - start
-            rest = math.inf  # of a request, beside the call
-            for _ in range(20):
-                start = perf_counter()
-                inside = float(worker.ask("time", run=run, calls=1)["seconds"])
-                rest = min(rest, perf_counter() - start - inside)
+                yield True, f"{scene.name}: {text}; a second run has the same samples"
+                if scene is FREE and method.order is not None and errors[-1] > RESOLVED[method.precision]:
+                    order = math.log(errors[1] / errors[-1], GRIDS[1].dt / grid.dt)
+                    told = f'"engine": {{"order": {order:.0f}}} belongs in the answer to `hello`'
+                    right = abs(order - method.order) < 0.5
+                    yield right, f"order: {order:.2f}" + f", not {method.order}: {told}" * (not right)
+            part = "time"
+            yield _check_time(worker, run)
     except (UnusableProgram, IntegrationFailed) as failure:
         cause = getattr(failure, "cause", failure)
         remedy = ANSWERS if isinstance(cause, (EngineTimeout, EndlessAnswer)) else remedy
-        yield False, f"{part}: {getattr(failure, 'problem', getattr(failure, 'outcome', ''))}: {remedy}"
+        problem = getattr(cause, "reason", getattr(failure, "problem", getattr(failure, "outcome", "")))
+        yield False, f"{part}: {problem}: {remedy}"
         return
+
+
+def _check_time(worker: Worker, run: int) -> tuple[bool, str]:
+    """Return whether measured times of a run are honest, and a sentence with the time of a request beside its work."""
+    calls, wall, seconds = 1, 0.0, 0.0
+    while (wall < PACE or seconds < 0.5 * wall < 5 * PACE) and calls < 1e6:  # a busy machine may delay an answer
+        calls, start = 4 * calls, perf_counter()
+        seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
+        wall = perf_counter() - start
+    rest = math.inf  # of a request, beside the call
+    for _ in range(20):
+        start = perf_counter()
+        inside = float(worker.ask("time", run=run, calls=1)["seconds"])
+        rest = min(rest, perf_counter() - start - inside)
     problem = ": `seconds` is the wall time of all calls together" if seconds < 0.5 * wall else ""
     problem = ": `seconds` is in s, and only of the calls" if seconds > wall else problem
     problem = ": `time` has to make `calls` runs" if wall < PACE else problem
-    more = f"; a request takes {1e6 * rest:.0f} µs more, which no measured time contains"
-    yield not problem, f"time: {seconds:.2g} s for {calls} calls, within {wall:.2g} s{problem or more}"
+    more = f". A request takes {1e6 * rest:.0f} µs more, which no measured time contains"
+    more += ": call the run without measuring it only at the first `time` of a run" * (rest > 0.5 * WARM_UP)
+    size = f"{calls} runs of {GRIDS[-1].n_steps} steps, and {wall:.2g} s with the exchange"
+    return not problem, f"time: {seconds:.2g} s for {size}{problem or more}"

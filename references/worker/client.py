@@ -245,11 +245,13 @@ class Worker:
                 self._end(at_once=True)
                 raise EngineTimeout(limit) from None
             raise EngineCrashed(self._autopsy()) from None
-        except (program.Unreadable, ValueError, KeyError, TypeError, MemoryError):
+        except (program.Unreadable, ValueError, KeyError, TypeError, MemoryError) as error:
             self._end(at_once=True)
             reason = "an answer that cannot be read"
             if not self._binary:
                 reason += f" from {self._command[0]}, which should speak version {program.PROTOCOL} of the protocol"
+            if line := getattr(error, "doc", "").strip().partition("\n")[0]:  # the text of a JSONDecodeError
+                reason += f". It starts with {line[:60]!r}: stdout is for answers only"
             raise EngineCrashed(reason) from None
         except BaseException:  # such as KeyboardInterrupt
             self._end(at_once=True)

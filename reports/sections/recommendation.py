@@ -148,7 +148,7 @@ def notes(recommendation: Recommendation) -> list[str]:
     return [
         f"Fastest: {fastest}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
-        f"conserved: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
+        f"conserved: relative drifts below {NEGLIGIBLE:g}; grows: steadily; lost: an error of π rad or more.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
         f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
@@ -175,5 +175,5 @@ def _expected(probe: Probe) -> str:
 
 def drift_text(drifts: Sequence[ExpectedDrift]) -> str:
     """Return the relative drifts to expect; an arrow marks a steady drift, `conserved` stands for round-off."""
-    large = [f"{d.name} {d.expected:.0e}{' ↗' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
+    large = [f"{d.name} {d.expected:.0e}{' (grows)' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
     return ", ".join(large) or "conserved"

@@ -116,8 +116,11 @@ def sample(y, dt, *body):
 
 def integrate(given):
     y, dt, J, m = read(given)
+    if "goes on" in MISTAKES:
+        y = given.get("end", y)
     samples = []
     for n in range(given["n_steps"] + 1):
+        given["end"] = y
         if n in given["steps"]:
             samples.append(sample(y, dt, J, m))
         y = step(y, dt, J, m)
@@ -137,7 +140,8 @@ def integrate(given):
 
 def answer(request):
     if request["do"] == "hello":
-        return {"protocol": 1, "program": "planted", "version": "1", "framing": "lines"}
+        order = 4 if METHOD == "rk4" and "no order" not in MISTAKES else 1
+        return {"protocol": 1, "program": "planted", "version": "1", "framing": "lines", "engine": {"order": order}}
     if request["do"] == "prepare":
         if "only tops" in MISTAKES and request["free"]:
             return {"error": "unsupported", "message": "only tops"}
@@ -147,8 +151,12 @@ def answer(request):
         time.sleep(60)
     while "endless" in MISTAKES and request["do"] == "run":
         sys.stdout.write("[" * 100000)
+    if "debugged" in MISTAKES:
+        print("one step done")
     if request["do"] == "run":
         return integrate(runs[request["run"]])
+    if "warm-up each time" in MISTAKES:
+        time.sleep(0.02)
     start = time.perf_counter()
     for _ in range(1 if "one call" in MISTAKES else request["calls"]):
         integrate(runs[request["run"]])
