@@ -37,7 +37,8 @@ def progress() -> Iterator[Step]:
         def step(share: float, what: str) -> None:
             nonlocal said
             if (now := monotonic()) - said >= SILENCE:
-                left = f", about {(now - start) * (1 - share) / share:.0f} s left" if share > 0 else ""
+                # The first steps compile, so an estimate from them would be many times too long.
+                left = f", about {(now - start) * (1 - share) / share:.0f} s left" if share > 0.1 else ""
                 print(f"{share:.0%}{left}: {what}", file=sys.stderr, flush=True)
                 said = now
 
