@@ -48,7 +48,7 @@ ROUNDS, TIMING_BUDGET = 7, 0.25
 COARSER_START = 4
 """First step of our methods, in units of the automatically chosen step, so that an order can be observed."""
 LOOSEST = 1e-3
-"""Largest first tolerance of adaptive methods."""
+"""First tolerance of adaptive methods, looser than most errors asked for: on an easy motion it is enough."""
 SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8
 """Smallest factor from one step to the next, and the factor if a probe has no usable error."""
 LONGER = 8
@@ -228,8 +228,7 @@ def _refine_from_start(conditions: Conditions, method: Method, step: float) -> R
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     setting = tolerance_setting(method)
     if setting is not None:
-        loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))
-        return refine(conditions, selection.at_tolerance(method, setting, float(f"{loosest:.0e}")), conditions.spacing)
+        return refine(conditions, selection.at_tolerance(method, setting, LOOSEST), conditions.spacing)
     longest = conditions.round_step(conditions.short / STEPS)
     if method.role != Role.OURS:
         return refine(conditions, method, min(longest, conditions.round_step(step_ladder.RADIANS / conditions.rate)))
