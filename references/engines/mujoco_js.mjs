@@ -1,8 +1,12 @@
 /* MuJoCo's official build for JavaScript, in double precision, with the models of mujoco.py; its loop is in JavaScript. */
+import { readdirSync, readFileSync } from 'fs';
+import { dirname, join } from 'path';
+
 export const ENGINE = {
   "package": "@mujoco/mujoco", "precision": "f64",
   "settings": {"integrator": "RK4"}, "orders": {"Euler": 1, "RK4": 2, "implicit": 1, "implicitfast": 1},
-  "card": {"variants": ["Euler", "RK4", "implicit", "implicitfast"], "as_installed": ["Euler"]}
+  "card": {"variants": ["Euler", "RK4", "implicit", "implicitfast"], "as_installed": ["Euler"]},
+  "formats": ["urdf", "mjcf"]
 };
 export const start = (mujoco) => mujoco();
 
@@ -17,4 +21,26 @@ export function build({ mass, gravity, com, moments_com: [a, b, c], q_com, q0, w
   data.qpos.set(q0, model.nq - 4);
   data.qvel.set(w0, model.nv - 3);
   return { step: () => M.mj_step(model, data), read: () => [data.qpos.slice(-4), data.qvel.slice(-3)], rates: 'w' };
+}
+
+export function load(path, M) { // as in importers/loaders.py
+  const files = new M.MjVFS(), folder = dirname(path);
+  for (const { name } of readdirSync(folder, { withFileTypes: true }).filter((each) => each.isFile())) {
+    files.addBuffer(name, readFileSync(join(folder, name)));
+  }
+  const spec = M.parseXMLString(readFileSync(path, 'utf8'), files), { mjOBJ_BODY, mjOBJ_JOINT } = M.mjtObj;
+  if (!M.mjs_firstElement(spec, mjOBJ_JOINT)) {
+    const world = M.mjs_findBody(spec, 'world');
+    M.mjs_addFreeJoint(M.mjs_asBody(M.mjs_firstChild(world, mjOBJ_BODY, 0)));
+  }
+  spec.option.gravity.fill(0);
+  spec.option.disableflags = M.mjtDisableBit.mjDSBL_CONTACT.value;
+  const model = M.mj_compile(spec, files), data = new M.MjData(model);
+  data.qpos.set([0, 0, 0, 1, 0, 0, 0]);
+  return (velocity, force) => {
+    data.qvel.set(velocity);
+    data.qfrc_applied.set(force);
+    M.mj_forward(model, data);
+    return [...data.qacc];
+  };
 }

@@ -58,6 +58,8 @@ class EngineData(Distribution):
     free_only
         The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
         depends on that.
+    formats
+        Formats of model files that its program loads: "urdf", "mjcf", "sdf" or "usd" (see `load` in PROTOCOL.md).
     rate_limit
         Largest angular velocity, rad/s, as installed.
     title
@@ -76,6 +78,7 @@ class EngineData(Distribution):
     precision: str = "f64"
     fields: tuple[str, ...] = ()
     free_only: str | Mapping[str, str] = ""
+    formats: tuple[str, ...] = ()
     rate_limit: float = math.inf
     title: str = ""
     prefix: str = ""

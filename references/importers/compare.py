@@ -14,13 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from conservative import registry
 from conservative.attitude import Array, hat
 from conservative.check import choice
+from conservative.errors import BadInput
+from conservative.programs import list_programs
 
 from ..engine import version
 from ..environments.environment import find_environment, list_environments
 from ..worker.calls import python_worker
-from ..worker.client import EngineCrashed, EngineTimeout, time_limit
+from ..worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
 from . import loaders
 from .description import Link, Part, join_links, kind_of, make_pose, read_links, steiner
 from .loaders import LOADERS
@@ -29,6 +32,8 @@ LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
 """Engines that run in this interpreter if no version is named: package and name."""
 SINGLE = ("mjwarp", "newton", "sapien", "genesis")
 """Engines in single precision."""
+OTHERS = ("mujoco_js",)
+"""Engines of this package whose program loads files itself, as programs of users do."""
 LIMIT, MEMORY = 300.0, 2**33
 """Time in seconds and memory in bytes that a loader may take."""
 CASES = 24
@@ -232,8 +237,17 @@ class Program:
 
     def __init__(self, name: str) -> None:
         self.engine, _, wanted = name.partition("==")
-        choice("engines", self.engine, tuple(LOADERS))
-        if self.engine in LOCAL and not wanted:
+        choice("engines", self.engine, (*LOADERS, *OTHERS, *list_programs()))
+        self.formats, self.single = (), self.engine in SINGLE
+        if self.engine not in LOADERS:
+            method = registry.engine(self.engine).at_version(wanted)()
+            self.formats, self.single, environment = method.data.formats, method.precision == "f32", method.environment
+            if not self.formats:
+                got = f"{self.engine!r}, a program whose answer to `hello` names no `formats`"
+                raise BadInput("engines", got, "a program with the request `load`, which PROTOCOL.md describes")
+            self.label = f"{self.engine} {environment.version}"
+            self.worker, self._adapter = environment.start_worker(memory=MEMORY), str(method.adapter.__file__)
+        elif self.engine in LOCAL and not wanted:
             self.label = f"{self.engine} {version(*LOCAL[self.engine])}"
             self.worker, self._adapter = python_worker(memory=MEMORY), f"{__package__}.loaders"
         else:
@@ -248,8 +262,7 @@ class Program:
         cases, flaw, answer = make_cases(wanted), wanted.flaw, partial(Finding, self.label, path.name)
         try:
             with time_limit(LIMIT):
-                given = {"engine": self.engine, "path": str(path.resolve()), "kind": kind_of(path), "cases": cases}
-                result = self.worker.ask("call", adapter=self._adapter, function="probe", **given)
+                result = self._load(str(path.resolve()), kind_of(path), cases)
         except NotImplementedError as error:
             return answer("", str(error))
         except (EngineCrashed, EngineTimeout) as failure:
@@ -263,7 +276,7 @@ class Program:
         expected = accelerations(wanted, cases)
         worst = float(np.abs(measured - expected).max() / np.abs(expected).max())
         answer = partial(answer, seen={name: np.asarray(value).tolist() for name, value in vars(seen).items()}, error=worst)
-        tolerance = 1e-2 if self.engine in SINGLE else 1e-4
+        tolerance = 1e-2 if self.single else 1e-4
         if distance(wanted, seen) < tolerance and not flaw:
             return answer("right")
         said = re.search(
@@ -274,3 +287,23 @@ class Program:
             return answer("right", f"it repairs the inertia{prints}")
         accepts = f"it accepts that {flaw}" if not said else f"{flaw}, and it does not repair that"
         return answer("wrong", (accepts if flaw else explain(path, links, seen, tolerance)) + prints)
+
+    def _load(self, path: str, kind: str, cases: Array) -> dict[str, Any]:
+        """Return the answer of `loaders.probe`, or that of a program to `load` in the same form. Raise as `Worker.ask`."""
+        if not self.formats:
+            given = {"engine": self.engine, "path": path, "kind": kind, "cases": cases}
+            return self.worker.ask("call", adapter=self._adapter, function="probe", **given)
+        if kind not in self.formats:
+            raise NotImplementedError
+        given = {"adapter": self._adapter, "path": path, "kind": kind}
+        try:
+            result = self.worker.ask("load", **given, velocities=cases[:, 0], forces=cases[:, 1])
+        except EngineError as error:
+            return {"refused": error.reason}
+        try:
+            measured = np.asarray(result["accelerations"], float)
+        except (TypeError, ValueError):
+            measured = np.empty(0)
+        if measured.shape != (len(cases), 6):
+            raise EngineCrashed(f"its `accelerations` are not numbers ({len(cases)}, 6)")
+        return {"accelerations": measured, "output": str(result.get("output", ""))}

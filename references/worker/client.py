@@ -56,6 +56,10 @@ class EngineCrashed(IntegrationFailed):
         super().__init__(f"The engine {self.outcome}. Use another scene or setting")
 
 
+class EngineError(EngineCrashed):
+    """The engine answered a request with an error, and its process goes on."""
+
+
 class EndlessAnswer(EngineCrashed):
     """The engine sent more than `LARGEST_ANSWER` as one answer."""
 
@@ -135,7 +139,7 @@ class Worker:
         Raises
         ------
         EngineCrashed
-            The engine raised an exception, or the process ended or sent something that is not an answer.
+            The engine raised an exception (`EngineError`), or the process ended or sent something that is not an answer.
         EngineTimeout
             There was no answer within the limit (see `time_limit`).
         NotImplementedError
@@ -150,7 +154,7 @@ class Worker:
         if answer.get("error") == "unsupported":
             raise NotImplementedError(answer["message"])
         if "error" in answer:
-            raise EngineCrashed(f"{answer['error']}: {answer['message']}")
+            raise EngineError(f"{answer['error']}: {answer['message']}")
         return _Answer(answer)
 
     def greet(self, limit: float = START_LIMIT) -> dict[str, Any]:

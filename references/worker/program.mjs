@@ -3,6 +3,8 @@
  *
  *   ENGINE                      its data, see read_script in environments/adapter.py
  *   start(package, url)         returns the engine; by default the package
+ *   load(path, engine)          optional: loads a model file for `load`, and returns a function from a velocity and a force to an
+ *                               acceleration. `ENGINE` then has `formats`
  *   build(given, engine, own)   returns a world for one call of a run, with `step()`, and `read()` for an attitude and rates.
  *                               Rates are in world axes, or in F if `rates` is "w". The attitude is of axes that are turned by
  *                               `axes` relative to F. The engine destroys what is passed to `own`, the last one first
@@ -60,6 +62,13 @@ async function load(name) {
   return [loaded.default ?? loaded, url];
 }
 
+/** Return the module of an adapter, whose engine is started. */
+async function startEngine(adapter) {
+  const module = await import(pathToFileURL(adapter)), { ENGINE, start = (loaded) => loaded } = module;
+  engine ??= await start(...(await load(ENGINE.package)));
+  return module;
+}
+
 const runs = new Map();
 let engine, count = 0;
 const operations = {
@@ -72,10 +81,13 @@ const operations = {
     return { protocol: 1, program: 'node', version: process.versions.node, framing: 'lines' };
   },
   check: async ({ module }) => void (await load(module)),
+  load: async ({ adapter, path, velocities, forces }) => {
+    const accelerate = (await startEngine(adapter)).load(path, engine);
+    return { accelerations: velocities.map((velocity, i) => accelerate(velocity, forces[i])) };
+  },
   prepare: async ({ adapter, settings, ...given }) => {
     if (given.rows) return { error: 'unsupported', message: 'many bodies in one run' };
-    const { ENGINE, start = (module) => module, build } = await import(pathToFileURL(adapter));
-    engine ??= await start(...(await load(ENGINE.package)));
+    const { build } = await startEngine(adapter);
     const { q0, q_com, com } = given, [, ...opposite] = product(product(conjugate(q_com), [0, ...com]), q_com);
     Object.assign(given, settings, { q_P: product(q0, q_com), point_P: opposite.map((value) => -value) });
     runs.set(++count, { given, build, owned: [], spent: 0 });

@@ -1,6 +1,8 @@
 """The bodies of model files, the bodies that engines make of them, and the mistakes between the two."""
 
 import json
+import shlex
+import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -10,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from conservative import deferred_imports
 from conservative.errors import BadInput
 from conservative.references.importers import compare, loaders
 from conservative.references.importers.compare import (
@@ -22,6 +25,7 @@ from conservative.references.importers.compare import (
     make_cases,
 )
 from conservative.references.importers.description import Part, join_links, read_links, weigh
+from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
 GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
@@ -227,14 +231,94 @@ def test_unknown_files_and_engines_are_named():
     assert "conservative engines install" in run(GENERIC, "--engines", "mujoco==0.1").stderr
 
 
+# ------------------------------------------------------------------------------------------------------------ programs of users
+
+LOADER = [sys.executable, "-I", Path(__file__).parent / "programs" / "loader.py"]
+GREETING = {"protocol": 1, "program": "p", "version": "1", "framing": "lines"}
+
+
+@pytest.fixture
+def register(tmp_path, monkeypatch):
+    """Return a function that registers programs, from their names and command lines."""
+    monkeypatch.setenv("CONSERVATIVE_PROJECT", str(tmp_path))
+    deferred_imports.list_entries.cache_clear()
+    yield lambda **lines: (tmp_path / "conservative.toml").write_text(
+        "[engines]\n" + "".join(f"{name} = {json.dumps(shlex.join(map(str, words)))}\n" for name, words in lines.items())
+    )
+    deferred_imports.list_entries.cache_clear()
+    close_workers()
+
+
+def test_a_program_is_right_or_its_mistake_is_named(register, tmp_path):
+    """The largest relative error of its accelerations is 1e-15 with the right loader."""
+    register(careful=LOADER, unturned=[*LOADER, "unturned"])
+    turned, offset, fixed = (
+        CATALOGUE / f"{name}.urdf" for name in ("turned_inertial_frame", "offset_centre_of_mass", "fixed_child")
+    )
+    crash = tmp_path / "crash.urdf"
+    crash.write_text(offset.read_text())
+    sdf, mjcf = (CATALOGUE / f"fixed_child.{kind}" for kind in ("sdf", "xml"))
+    done = run(turned, offset, fixed, crash, sdf, mjcf, "--engines", "careful,unturned", "--json")
+    assert done.exit_code == 1, done.output
+    findings = {(each["engine"], each["file"]): each for each in json.loads(done.stdout)["findings"]}
+    answers = {key: (each["outcome"], each["words"]) for key, each in findings.items()}
+    assert (
+        answers["careful 2", turned.name]
+        == answers["careful 2", offset.name]
+        == answers["unturned 2", offset.name]
+        == ("right", "")
+    )
+    assert findings["careful 2", turned.name]["error"] < 1e-13
+    assert answers["unturned 2", turned.name] == ("wrong", "the rotation of the inertial frame is ignored")
+    assert answers["careful 2", fixed.name] == ("refused", "ValueError: 2 links")
+    assert answers["careful 2", crash.name] == ("crashed", "crashed (signal 6 (SIGABRT))")
+    assert answers["careful 2", sdf.name] == ("", "only URDF")
+    assert answers["careful 2", mjcf.name] == ("", "")  # not in its formats, so it is not asked
+
+
+@pytest.mark.parametrize(
+    ("formats", "accelerations", "words"),
+    [
+        ((), None, "expected a program with the request `load`, which PROTOCOL.md describes"),
+        (5, None, "its answer to `hello` cannot be used"),
+        (("urdf",), [[1, 2, 3]] * 24, "its `accelerations` are not numbers (24, 6)"),
+        (("urdf",), [[1], [1, 2]], "its `accelerations` are not numbers (24, 6)"),
+        (("urdf",), [["nan"] * 6] * 24, "accelerations that are not finite"),
+        (("urdf",), "none", "its `accelerations` are not numbers (24, 6)"),
+    ],
+)
+def test_a_program_without_usable_accelerations_is_described(formats, accelerations, words, register, tmp_path):
+    answers = [GREETING | {"engine": {"formats": formats}}, {"accelerations": accelerations}]
+    (tmp_path / "p.py").write_text("".join(f"input()\nprint({json.dumps(each)!r}, flush=True)\n" for each in answers))
+    register(p=[sys.executable, tmp_path / "p.py"])
+    done = run(GENERIC, "--engines", "p")
+    assert done.exit_code in (1, 2)
+    assert words in " ".join(done.output.split())
+    assert isinstance(done.exception, SystemExit)
+
+
+@pytest.mark.engine("mujoco_js")
+def test_mujoco_for_javascript_answers_like_mujoco_of_the_same_version():
+    """It has the same outcome for all files, and in 3.14.0 the same body to 1e-15."""
+    here = outcomes("mujoco_js", "")
+    there = outcomes(f"mujoco=={next(iter(here.values())).engine.split()[1]}", "")
+    assert {name: each.outcome for name, each in here.items()} == {name: each.outcome for name, each in there.items()}
+    for name, each in here.items():
+        if each.seen:
+            parts = [Part(**{key: np.array(value) for key, value in seen.items()}) for seen in (each.seen, there[name].seen)]
+            assert distance(*parts) < 1e-12, name
+    assert sum(each.outcome == "right" for each in here.values()) >= 40
+
+
 # ------------------------------------------------------------------------------------------------------- known bugs of engines
 
 
-def outcomes(name):
-    """The answers of an engine for the URDF files of the catalogue, by trap."""
+def outcomes(name, suffix=".urdf"):
+    """The answers of an engine for the files of the catalogue with a suffix, by default those in URDF, by trap."""
     program = compare.Program(name)
     try:
-        return {path.stem: program.check(path, read_links(path)) for path in TRAPS if path.suffix == ".urdf"}
+        paths = [path for path in TRAPS if path.suffix.endswith(suffix)]
+        return {path.stem if suffix else path.name: program.check(path, read_links(path)) for path in paths}
     finally:
         program.worker.close()
 
