@@ -179,12 +179,12 @@ class PotentialFailed(_Error, RuntimeError):
 
 
 class TorqueFailed(_Error, RuntimeError):
-    """A torque has no value at a time of the run. Attributes: `time` (s), `got` and `allowed`."""
+    """A torque, or the factor of a damping, has no value at a time of the run. Attributes: `time` (s), `got` and `allowed`."""
 
-    def __init__(self, time: float, got: str) -> None:
+    def __init__(self, time: float, got: str, name: str = "torque", value: str = "three finite numbers (3,), N m") -> None:
         self.time, self.got = time, got
-        self.allowed = "three finite numbers (3,), N m, at every time of the run, including its last step"
-        super().__init__(f"torque: got {got} at t = {time:g} s; expected {self.allowed}")
+        self.allowed = f"{value}, at every time of the run, including its last step"
+        super().__init__(f"{name}: got {got} at t = {time:g} s; expected {self.allowed}")
 
 
 class AccuracyNotReached(UserWarning):

@@ -32,11 +32,12 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
     """Return the motion of a scene at the samples of a grid, with `parts` steps between two samples.
 
     The field is one that kernels know. A step that is too long to converge gives a wrong result, or one that is not finite.
-    Steps also end where a torque is not smooth (`Torque.breaks`).
+    Steps also end where a torque is not smooth (`OfTime.breaks`).
     """
     c, b, A = _tableau()
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
-    bends = scene.torque.breaks if scene.torque is not None else ends[:0]
+    loads = scene.torque, scene.damping.factor if scene.damping else None
+    bends = np.concatenate([ends[:0], *(each.breaks for each in loads if each is not None)])
     stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
     y = np.concatenate([q / np.sqrt(q @ q), scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0])
@@ -75,7 +76,8 @@ def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
         T = np.zeros_like(y[4:]) if field is None else np.array(field.body_torque((a, b, c, d)))
         turn = -b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x
         if scene.damping is not None:
-            T = T - scene.damping.matrix @ np.array([x, y_, z])
+            factor = 1 if scene.damping.factor is None else np.array([scene.damping.factor.at(float(each)) for each in t])
+            T = T - factor * (scene.damping.matrix @ np.array([x, y_, z]))
         if scene.torque is not None:
             given = np.array([scene.torque.at(float(each)) for each in t], dtype=np.longdouble).T
             T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))

@@ -22,7 +22,7 @@ if COMPILED:
 
     from .traced import DOUBLE, INDEX, INTEGER, Symbol
 
-BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES = 0, 1, 2, 3, 4
+BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES, DAMPING = range(6)
 
 
 def evaluate(field, what, *state):
@@ -30,7 +30,8 @@ def evaluate(field, what, *state):
 
     The inputs are R_BP (9) and the state (18). BODY_TORQUE: q, and t if the field depends on time, to T. FINITE_TORQUE: q, a to
     T and its derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q
-    to V. TORQUES: t to the torques in body and world axes.
+    to V. TORQUES: t to the torques in body and world axes. DAMPING: t, with a matrix instead of R_BP, to the
+    rows of the matrix times the factor.
     """
     inputs = [x for row in field.rows for x in row] + [x for part in state for x in part]
     inputs += [0.0] * (N_INPUTS - len(inputs))
@@ -95,6 +96,18 @@ class Torques(NamedTuple):
         """Return the torques in body and in world axes, N m, at a time t, s."""
         v = evaluate(self, TORQUES, (t,))
         return tuple(v[:3]), tuple(v[3:6])
+
+
+class DampingInTime(NamedTuple):
+    """Address of the Python object that is called for the factor of a damping, and the rows of its matrix, principal axes."""
+
+    address: Any
+    rows: Any
+
+    def at(self, t):
+        """Return the rows of the matrix, N m s, at a time t, s."""
+        v = evaluate(self, DAMPING, (t,))
+        return tuple(v[:3]), tuple(v[3:6]), tuple(v[6:9])
 
 
 class FunctionInTime(NamedTuple):

@@ -35,7 +35,7 @@ class Callback:
         buffer[N_INPUTS : N_INPUTS + len(outputs)] = outputs
 
     def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
-        functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques)
+        functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping)
         with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
             return functions[what](self.potential, R_BP.copy(), state.copy())
 
@@ -48,6 +48,10 @@ def _torques(torque: Any, R_BP: Array, state: Array) -> Array:
     """Return the torque in body and in world axes, one of which is 0."""
     found = torque.at(float(state[0]))
     return np.concatenate([found @ R_BP, np.zeros(3)] if torque.frame == "body" else [np.zeros(3), found])
+
+
+def _damping(factor: Any, matrix: Array, state: Array) -> Array:
+    return factor.at(float(state[0])) * matrix.ravel()
 
 
 def _body_torque(potential: Any, R_BP: Array, state: Array) -> Array:

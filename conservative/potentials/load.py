@@ -1,4 +1,4 @@
-"""Torques that depend on time, and damping: energy and momentum obey balances with their work and impulse.
+"""Torques and damping, which may depend on time: energy and momentum obey balances with their work and impulse.
 
 The discrete work and impulse are those of the load term of the paper's (22) to (27) (DERIVATION.md, section 14).
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,6 @@ from .callback import Callback
 from .uniform_gravity import UniformField
 
 FRAMES = ("body", "world")
-_ALLOWED = "three numbers (3,), N m; a function of time, s, that returns them; or a table (times (n,), values (n, 3))"
 _TIMES = "two or more increasing times (n,), s"
 _SIZED = 33
 """Times at which the size of a torque is taken."""
@@ -32,8 +31,9 @@ _END = 1e-9
 class Loaded(NamedTuple):
     """A field with loads beside it, as kernels take it (`conservative.potentials.field`), in principal axes.
 
-    `call` is () for a constant torque, or the function of time; `body` and `world` are the torques at the time of the step or
-    stage, N m, in body and world axes; `damping` has the rows of the matrix, N m s; `over` is 2 / h, 1/s.
+    `call` and `factor` are () for a constant torque and damping, or functions of time; `body` and `world` are the torques at
+    the time of the step or stage, N m, in body and world axes; `damping` has the rows of the matrix then, N m s; `over` is
+    2 / h, 1/s.
     """
 
     field: Any
@@ -42,12 +42,14 @@ class Loaded(NamedTuple):
     world: Any
     damping: Any
     over: Any
+    factor: Any = ()
 
     def at_time(self, t: Any) -> Any:
-        """Return the field and the torque at a time t, s."""
+        """Return the field, the torque and the damping at a time t, s."""
         body, world = self.call.at(t) if self.call else (self.body, self.world)
+        damping = self.factor.at(t) if self.factor else self.damping
         field = self.field.at_time(t) if hasattr(self.field, "at_time") else self.field
-        return self._replace(field=field, body=body, world=world)
+        return self._replace(field=field, body=body, world=world, damping=damping)
 
     def at_step(self, t: Any, h: Any) -> Any:
         """Return the field for a step of length h from t, both s. The torque is that of the midpoint."""
@@ -92,10 +94,93 @@ def _in_world(q: Any, v: Any) -> Any:
 
 
 Value = Array | tuple[Array, Array] | Callable[[float], ArrayLike]
+Given = ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], ArrayLike]
+AnyOfTime = TypeVar("AnyOfTime", bound="OfTime")
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Torque:
+class OfTime:
+    """A constant, a function of time, or a table. Subclasses have the shape of its values and their allowed range."""
+
+    value: Value
+    breaks: Array
+    name: ClassVar[str]
+    shape: ClassVar[tuple[int, ...]]
+    one: ClassVar[str]
+    least: ClassVar[float] = -np.inf
+
+    def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
+        columns = "".join(f", {size}" for size in self.shape)
+        times = real_array(breaks)
+        if times is None or times.ndim != 1 or not np.isfinite(times).all():
+            raise BadInput("breaks", describe(breaks), "finite times (n,), s")
+        if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[1]) > 0:
+            times = real_array(value[0])
+            if times is None or times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
+                raise BadInput("times", describe(value[0]), _TIMES)
+            if (np.diff(times) <= 0).any():
+                i = int(np.argmax(np.diff(times) <= 0)) + 1
+                raise BadInput("times", f"{times[i]:.17g} after {times[i - 1]:.17g}, at index {i}", _TIMES)
+            allowed = f"an array ({len(times)}{columns}): {self.one} for each time"
+            value = read_only(times), finite_array("values", value[1], ((len(times), *self.shape),), allowed)
+            if (value[1] < self.least).any():
+                raise BadInput("values", f"{value[1].min():g}", allowed)
+        elif not callable(value):
+            allowed = f"{self.one}; a function of time, s, that returns it; or a table (times (n,), values (n{columns}))"
+            value = finite_array(name, cast(ArrayLike, value), (self.shape,), allowed)
+        set_fields(self, value=value, breaks=read_only(times))
+        if callable(value):
+            self.require(0.0)
+
+    def at(self, t: float) -> Array:
+        """Return the value at a time, s. Raise `TorqueFailed` if there is none."""
+        if isinstance(self.value, np.ndarray):
+            return self.value
+        if isinstance(self.value, tuple):
+            times, values = self.value
+            if not times[0] <= t <= times[-1] + _END * abs(times[-1]):
+                raise TorqueFailed(t, f"a table from {times[0]:g} to {times[-1]:g} s", self.name, self.one)
+            return np.reshape([np.interp(t, times, column) for column in values.reshape(len(times), -1).T], self.shape)
+        try:
+            found = self.value(t)
+        except Exception as error:
+            raise TorqueFailed(t, f"a function that raises {error!r}", self.name, self.one) from error
+        value = real_array(found)
+        if value is None or value.shape != self.shape or not np.isfinite(value).all() or (value < self.least).any():
+            raise TorqueFailed(t, f"a function that returns {describe(found)}", self.name, self.one)
+        return value
+
+    def require(self, t_end: float) -> float:
+        """Return the largest magnitude at a few times from 0 to t_end, s. Raise `BadInput` if there is no value."""
+        try:
+            return max(float(np.linalg.norm(self.at(t))) for t in np.linspace(0.0, t_end, _SIZED).tolist())
+        except TorqueFailed as failure:
+            raise BadInput(self.name, f"{failure.got} at t = {failure.time:g} s", failure.allowed) from failure.__cause__
+
+    def in_units(self: AnyOfTime, unit: float, time: float) -> AnyOfTime:
+        """Return the function in units of its values and with times in units of `time`, s, powers of two."""
+        value: Value
+        if isinstance(self.value, np.ndarray):
+            value = self.value / unit
+        elif isinstance(self.value, tuple):
+            value = self.value[0] / time, self.value[1] / unit
+        else:
+            value = _Scaled(self, unit, time)
+        return replace_unchecked(self, value=value, breaks=self.breaks / time)
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    function: OfTime
+    unit: float
+    time: float
+
+    def __call__(self, t: float) -> Array:
+        return self.function.at(t * self.time) / self.unit
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Torque(OfTime):
     """A torque that is constant or depends on time, beside the potential of a scene.
 
     Parameters
@@ -116,116 +201,78 @@ class Torque:
         During integration, the function raised an exception or did not return three finite numbers, or the table ended.
     """
 
-    value: Value
     frame: str
-    breaks: Array
+    name: ClassVar[str] = "torque"
+    shape: ClassVar[tuple[int, ...]] = (3,)
+    one: ClassVar[str] = "three finite numbers (3,), N m"
 
-    def __init__(
-        self,
-        value: ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], ArrayLike],
-        frame: str = "body",
-        breaks: ArrayLike = (),
-    ) -> None:
+    def __init__(self, value: Given, frame: str = "body", breaks: ArrayLike = ()) -> None:
         choice("frame", frame, FRAMES)
-        times = real_array(breaks)
-        if times is None or times.ndim != 1 or not np.isfinite(times).all():
-            raise BadInput("breaks", describe(breaks), "finite times (n,), s")
-        if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[1]) > 0:
-            times = real_array(value[0])
-            if times is None or times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
-                raise BadInput("times", describe(value[0]), _TIMES)
-            if (np.diff(times) <= 0).any():
-                i = int(np.argmax(np.diff(times) <= 0)) + 1
-                raise BadInput("times", f"{times[i]:.17g} after {times[i - 1]:.17g}, at index {i}", _TIMES)
-            allowed = f"finite torques ({len(times)}, 3), N m, one for each time"
-            value = read_only(times), finite_array("values", value[1], ((len(times), 3),), allowed)
-        elif not callable(value):
-            value = finite_array("value", cast(ArrayLike, value), ((3,),), _ALLOWED)
-        set_fields(self, value=value, frame=frame, breaks=read_only(times))
-        if callable(value):
-            self.require(0.0)
-
-    def at(self, t: float) -> Array:
-        """Return the torque (3,), N m, at a time, s. Raise `TorqueFailed` if there is none."""
-        if isinstance(self.value, np.ndarray):
-            return self.value
-        if isinstance(self.value, tuple):
-            times, values = self.value
-            if not times[0] <= t <= times[-1] + _END * abs(times[-1]):
-                raise TorqueFailed(t, f"a table from {times[0]:g} to {times[-1]:g} s")
-            return np.array([np.interp(t, times, column) for column in values.T])
-        try:
-            found = self.value(t)
-        except Exception as error:
-            raise TorqueFailed(t, f"a function that raises {error!r}") from error
-        torque = real_array(found)
-        if torque is None or torque.shape != (3,) or not np.isfinite(torque).all():
-            raise TorqueFailed(t, f"a function that returns {describe(found)}")
-        return torque
-
-    def require(self, t_end: float) -> float:
-        """Return the largest magnitude, N m, at a few times from 0 to t_end, s. Raise `BadInput` if it fails there."""
-        try:
-            return max(float(np.linalg.norm(self.at(t))) for t in np.linspace(0.0, t_end, _SIZED).tolist())
-        except TorqueFailed as failure:
-            raise BadInput("torque", f"{failure.got} at t = {failure.time:g} s", failure.allowed) from failure.__cause__
-
-    def in_units(self, energy: float, time: float) -> Torque:
-        """Return the torque in units of `energy`, J, with times in units of `time`, s, powers of two."""
-        value: Value
-        if isinstance(self.value, np.ndarray):
-            value = self.value / energy
-        elif isinstance(self.value, tuple):
-            value = self.value[0] / time, self.value[1] / energy
-        else:
-            value = _Scaled(self, energy, time)
-        return replace_unchecked(self, value=value, breaks=self.breaks / time)
+        super().__init__("value", value, breaks)
+        set_fields(self, frame=frame)
 
 
-@dataclass(frozen=True)
-class _Scaled:
-    torque: Torque
-    energy: float
-    time: float
+class Factor(OfTime):
+    """The factor of a damping."""
 
-    def __call__(self, t: float) -> Array:
-        return self.torque.at(t * self.time) / self.energy
+    name: ClassVar[str] = "factor"
+    shape: ClassVar[tuple[int, ...]] = ()
+    one: ClassVar[str] = "a finite number of 0 or more"
+    least: ClassVar[float] = 0.0
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Damping:
-    """A torque -D w, proportional to the angular velocity w in body axes.
+    """A torque -f D w, proportional to the angular velocity w in body axes.
 
     Parameters
     ----------
     matrix
         D (3, 3), N m s, body axes, with w'D w >= 0 for all w. It does not need to be symmetric.
+    factor
+        None for constant damping, f = 1. Otherwise f, 0 or more, such as density times airspeed: a function of time, s, or a
+        table, a tuple of times (n,) and values (n,), linear in between. Its times have to cover the run, as for `Torque`.
+    breaks
+        Times (n,), s, at which the factor is not smooth, as for `Torque`.
 
     Raises
     ------
     BadInput
-        The matrix is not finite, of another shape, or its symmetric part has a negative eigenvalue.
+        The matrix is not finite, of another shape, or its symmetric part has a negative eigenvalue. The factor is negative, not
+        finite or of another shape, or times do not increase.
+    TorqueFailed
+        During integration, the factor has no such value.
     """
 
     matrix: Array
+    factor: Factor | None
 
-    def __init__(self, matrix: ArrayLike) -> None:
+    def __init__(self, matrix: ArrayLike, factor: Given | None = None, breaks: ArrayLike = ()) -> None:
         allowed = "a matrix (3, 3), N m s, whose symmetric part (D + D')/2 has no negative eigenvalue"
         D = finite_array("matrix", matrix, ((3, 3),), allowed)
         smallest = float(np.linalg.eigvalsh((D + D.T) / 2)[0])
         if smallest < -1e-14 * np.abs(D).max():
             raise BadInput("matrix", f"{D.tolist()}, with the eigenvalue {smallest:.3g}", allowed)
-        set_fields(self, matrix=D)
+        set_fields(self, matrix=D, factor=None if factor is None else Factor("factor", factor, breaks))
+
+    def require(self, t_end: float) -> None:
+        """Raise `BadInput` if the factor has no value at one of a few times from 0 to t_end, s."""
+        if self.factor is not None:
+            self.factor.require(t_end)
 
     def in_units(self, energy: float, time: float) -> Damping:
         """Return the damping in units of `energy`, J, and `time`, s, powers of two."""
-        return replace_unchecked(self, matrix=self.matrix / energy / time)
+        factor = self.factor and self.factor.in_units(1.0, time)
+        return replace_unchecked(self, matrix=self.matrix / energy / time, factor=factor)
 
 
 def load_field(field: Any, torque: Torque | None, damping: Damping | None, R_BP: Array) -> Loaded:
     """Return a field, or None, with loads as kernels take them, in axes that R_BP (3, 3) takes to the body's."""
-    zero, call = (0.0, 0.0, 0.0), ()
+    zero, call, factor = (0.0, 0.0, 0.0), (), ()
     D = np.zeros((3, 3)) if damping is None else R_BP.T @ damping.matrix @ R_BP
+    matrix = tuple(triple(row) for row in D)
+    if damping is not None and damping.factor is not None:
+        factor = kernels("function_field").DampingInTime(_address(damping.factor), matrix)
     body = world = zero
     if torque is not None and isinstance(torque.value, np.ndarray):
         if torque.frame == "body":
@@ -233,8 +280,11 @@ def load_field(field: Any, torque: Torque | None, damping: Damping | None, R_BP:
         else:
             world = triple(torque.value)
     elif torque is not None:
-        # As for potentials: atomic, and the address is valid as long as the torque lives.
-        address = id(torque.__dict__.setdefault("_callback", Callback(torque)))
-        call = kernels("function_field").Torques(address, tuple(triple(row) for row in R_BP))
+        call = kernels("function_field").Torques(_address(torque), tuple(triple(row) for row in R_BP))
     beside = UniformField(0.0, 0.0, 0.0) if field is None else field
-    return Loaded(beside, call, body, world, tuple(triple(row) for row in D), 0.0)
+    return Loaded(beside, call, body, world, matrix, 0.0, factor)
+
+
+def _address(function: OfTime) -> int:
+    """Return the address that kernels call. As for potentials: atomic, and valid as long as the function lives."""
+    return id(function.__dict__.setdefault("_callback", Callback(function)))

@@ -173,12 +173,17 @@ def _torque_table(times: ArrayLike, values: ArrayLike, frame: str = "body") -> T
     return Torque((times, values), frame)
 
 
+def _damping_table(matrix: ArrayLike, times: ArrayLike, values: ArrayLike) -> Damping:
+    return Damping(matrix, (times, values))
+
+
 def _load(top: TomlTable, key: str) -> Any:
     """Return the torque or the damping under `key`, or None."""
     if key not in top:
         return None
     table = top.table(key, "value, N m, or times, s, and values" if key == "torque" else "matrix, N m s")
-    build: Callable[..., Any] = Damping if key == "damping" else _torque_table if "times" in table else Torque
+    kinds: dict[str, tuple[Callable[..., Any], ...]] = {"torque": (Torque, _torque_table), "damping": (Damping, _damping_table)}
+    build = kinds[key]["times" in table]
     table.only(keys_of(build))
     return table.call(build)
 

@@ -238,7 +238,8 @@ class Program:
     def __init__(self, name: str) -> None:
         self.engine, _, wanted = name.partition("==")
         choice("engines", self.engine, (*LOADERS, *OTHERS, *list_programs()))
-        self.formats, self.single = (), self.engine in SINGLE
+        self.formats: tuple[str, ...] = ()
+        self.single = self.engine in SINGLE
         if self.engine not in LOADERS:
             method = registry.engine(self.engine).at_version(wanted)()
             self.formats, self.single, environment = method.data.formats, method.precision == "f32", method.environment
