@@ -15,10 +15,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import conservative as cv
 from conservative import registry
-from conservative.attitude import angle_between, rotation_about, to_quaternion
+from conservative.attitude import angle_between, from_quaternion, rotation_about, to_quaternion
 from conservative.grid import Grid, grid_for
 from conservative.references.truth import reference
 from conservative.shapes import MassDistribution
@@ -76,6 +77,49 @@ RATE = 0.0011362601963379464  # rad/s
 OFF = rotation_about((0, 0, 1), np.radians(5)) @ rotation_about((0, 1, 0), np.radians(1))
 CYLINDER = np.diag((500.0, 12250.0, 12250.0))
 EARTH = 7.292115e-5  # rotation, rad/s
+BRICK = (0.00189422, 0.006211019, 0.007194665)  # slug ft^2
+
+
+@lru_cache(maxsize=1)
+def fall():
+    """Return the fall of check case 3 without drag: position and velocity, SI, in the equator's plane, as a function of time.
+
+    It starts at rest relative to the rotating Earth at 30,000 ft, in gravity with J2.
+    """
+    gravity, radius, flattening = 3.986004418e14, 6378137.0, 1.5 * 1.08262668355e-3
+
+    def slope(_, y):
+        r = np.hypot(*y[:2])
+        return [*y[2:], *(-gravity / r**3 * (1 + flattening * (radius / r) ** 2) * y[:2])]
+
+    start = [radius + 30000 * 0.3048, 0, 0, EARTH * (radius + 30000 * 0.3048)]
+    return solve_ivp(slope, (0, 30), start, method="DOP853", rtol=1e-13, atol=1e-9, dense_output=True).sol
+
+
+def air(t):
+    """Return density times airspeed, slug/(ft^2 s), with the density of the US standard atmosphere of 1976 below 11 km."""
+    x, y, u, v = fall()(t)
+    h = 6356766 / (1 + 6356766 / (np.hypot(x, y) - 6378137))  # geopotential altitude, m
+    temperature = 288.15 - 0.0065 * h
+    density = 101325 * (temperature / 288.15) ** (9.80665 / (287.05287 * 0.0065)) / (287.05287 * temperature)
+    return density * np.hypot(u + EARTH * y, v - EARTH * x) * 0.3048**2 / 14.593902937206364
+
+
+def damped_brick(t_end):
+    """Return the brick of check case 3: the moments have coefficients -1 times rate, length and half of 1/V, in ft and slug."""
+    area, lengths = 2 / 9, np.array((1, 2, 1)) / 3
+    damping = cv.Damping(area / 4 * np.diag(lengths**2), air)
+    return cv.Scene("published", cv.RigidBody(BRICK), START, np.radians((10, 20, 30)), t_end, damping=damping)
+
+
+def station(rates):
+    """Return the space station of RUN_9A and RUN_9B, whose attitude in the file takes inertial to body components."""
+    inertia = [[1.02e8, -6.96e6, -5.48e6], [-6.96e6, 0.91e8, 5.90e5], [-5.48e6, 5.90e5, 1.64e8]]
+    turn = from_quaternion((0.2368106365237557, 0.7173117043670278, -0.6140880728910785, 0.2286492509067215)).T
+    torque = cv.Torque(lambda t: (10.0 * (1000 <= t < 2000), 0, 0), breaks=(1000, 2000))
+    return cv.Scene("published", cv.RigidBody(inertia), turn, rates, 28800, torque=torque)
+
+
 # y' = (y2 y3, -y1 y3, -0.51 y1 y2) in units SCALE of the rates of a body with these moments.
 KROGH, SCALE = (2.0, 3.0, 1.0), np.sqrt((1.53, 0.51, 3.0))
 BOX = MassDistribution(10, (0, 0, 0), (0.80833333, 0.68333333, 0.14166667))
@@ -91,7 +135,11 @@ MOTIONS |= {
             lambda t: (0, 0, np.sin(t) ** 2 / 4 if 3 * np.pi <= t <= 4 * np.pi else 0), breaks=(3 * np.pi, 4 * np.pi)
         ),
     ),
-    "nesc-brick": free((0.00189422, 0.006211019, 0.007194665), np.radians((10, 20, 30)), 30),
+    "nesc-brick": free(BRICK, np.radians((10, 20, 30)), 30),
+    "nesc-damped": damped_brick(30),
+    "nesc-damped-5-s": damped_brick(5),
+    "jeod-station": station((0, 0, 0)),
+    "jeod-station-turning": station((0, -0.001134454274550824, 0)),
     "jeod-cylinder": cv.Scene(
         "published",
         cv.RigidBody(CYLINDER),
@@ -125,8 +173,13 @@ def solve(motion, method, grid):
     return trajectory
 
 
+@lru_cache(maxsize=2)
+def _every_step(motion, method, dt):
+    return solve(motion, method, grid_for(MOTIONS[motion], dt))
+
+
 def every_step(figure, method=None):
-    return solve(figure.motion, method or figure.method, grid_for(MOTIONS[figure.motion], float(figure.dt)))
+    return _every_step(figure.motion, method or figure.method, float(figure.dt))
 
 
 @lru_cache(maxsize=100)
@@ -153,6 +206,11 @@ def world_rates(trajectory):
 
 def quaternion(figure):
     q = to_quaternion(end(figure).R_WB[-1])
+    return q * np.sign(q[0])
+
+
+def quaternion_to_body(figure):  # of the transformation of components from world to body
+    q = to_quaternion(every_step(figure).R_WB[-1].T)
     return q * np.sign(q[0])
 
 
@@ -263,6 +321,14 @@ def flight_position_error(figure):  # of the centre of mass, m
     flight = trajectory.scene.flight
     c, _ = flight.centre(trajectory.R_WB, trajectory.w_WB_B, *trajectory.place)
     return np.linalg.norm(c - flight.fall(trajectory.scene, trajectory.t)[0], axis=1).max()
+
+
+def rates(figure):
+    return every_step(figure).w_WB_B[-1]
+
+
+def third_rate_in_degrees(figure):
+    return np.degrees(rates(figure)[2])
 
 
 def rates_in_degrees(figure):
