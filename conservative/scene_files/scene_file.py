@@ -93,7 +93,7 @@ def load(path: str | Path) -> Scene:
     if flight and "rotor" in top:
         raise top.bad("rotor", "a rotor in free flight", "no rotor, or no p_WB and v_WB, for the rotation alone")
     loads = {key: _load(top, key) for key in ("torque", "damping")}
-    with top.blame(p_WB0="start", v_WB0="start"):
+    with top.blame(p_WB0="start", v_WB0="start", factor="damping"):
         moving = mass if flight and mass else body
         return Scene(name, moving, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path), **loads, **flight)
 

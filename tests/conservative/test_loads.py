@@ -25,11 +25,15 @@ def loaded(torque=None, damping=DAMPING, potential=None, t_end=5.0, **others) ->
 
 SINE = cv.Torque(lambda t: (3 * np.sin(t), -1.0, 2.0), "world")
 TABLE = cv.Torque(([0.0, 1.3, 4.5, 6.0], [[0, 0, 1], [1, 0, 1], [1, 2, 3], [0, 0, 0]]))
+GROWING = cv.Damping(DAMPING.matrix, lambda t: 1 + np.sin(t))
+STEPPED = cv.Damping(DAMPING.matrix, ([0.0, 1.3, 4.5, 6.0], [0, 2, 1, 1]))
 SCENES = {
     "constant, body": loaded(cv.Torque((3.0, -1.0, 2.0))),
     "damping alone, gravity": loaded(None, potential=GRAVITY),
     "function, world, gravity": loaded(SINE, potential=GRAVITY),
     "table": loaded(TABLE, damping=None),
+    "damping with a factor": loaded(None, GROWING),
+    "torque, damping with a table, gravity": loaded(SINE, STEPPED, GRAVITY),
 }
 
 
@@ -46,9 +50,10 @@ def test_reduced_keeps_the_balances_to_round_off(scene, order):
         assert sizes(without).max() > 0.01 * balance.scale  # the quantity itself is not conserved
 
 
+@pytest.mark.parametrize("damping", [DAMPING, GROWING], ids=["constant", "factor"])
 @pytest.mark.parametrize("potential", [GRAVITY, SPRING, ORBIT], ids=["gravity", "spring", "orbit"])
-def test_projected_keeps_the_balances_also_between_its_steps(potential):
-    scene = loaded(SINE, potential=potential)
+def test_projected_keeps_the_balances_also_between_its_steps(potential, damping):
+    scene = loaded(SINE, damping, potential)
     trajectory = cv.integrate(scene, 0.05, "projected")
     between = cv.integrate(scene, 0.05, "projected", t_eval=[0.0, 0.333, 4.9, 5.0])
     for balance in scene.invariants:
@@ -77,14 +82,29 @@ def test_a_constant_torque_about_a_principal_axis():
     assert angle_between(found.R_WB, turned).max() < 1e-5  # measured: 1.4e-6
 
 
+def test_a_damping_that_grows_with_time_about_a_principal_axis():
+    damping = cv.Damping(np.diag([0, 0, 1.0]), lambda t: t)
+    scene = cv.Scene("spin down", cv.RigidBody((1.0, 2.0, 4.0)), R_WB0, (0, 0, 0.5), 3.0, damping=damping)
+    found = cv.integrate(scene, 0.001)
+    assert np.abs(found.w_WB_B[:, 2] - 0.5 * np.exp(-(found.t**2) / 8)).max() < 1e-8  # measured: 4.3e-9
+
+
+def test_a_factor_of_one_changes_no_bit():
+    one = cv.Damping(DAMPING.matrix, lambda t: 1.0)
+    for method, potential in (("reduced", None), ("reduced", GRAVITY), ("projected", SPRING), ("scipy", GRAVITY)):
+        found, constant = (cv.integrate(loaded(SINE, each, potential), 0.05, method) for each in (one, DAMPING))
+        assert np.array_equal(found.w_WB_B, constant.w_WB_B)
+        assert np.array_equal(found.R_WB, constant.R_WB)
+
+
 def test_very_small_scenes_are_integrated_in_their_own_units():
     small, unit = 2.0**-60, 2.0**20  # kg m^2, s
     torque = cv.Torque(lambda t: np.array((3 * np.sin(t / unit), -1.0, 2.0)) * small / unit**2, "world")
     scene = cv.Scene(
         "small", cv.RigidBody(BODY.inertia * small), R_WB0, np.array((0.1, 1.5, 2.0)) / unit, 5.0 * unit,
-        torque=torque, damping=cv.Damping(DAMPING.matrix * small / unit),
+        torque=torque, damping=cv.Damping(DAMPING.matrix * small / unit, lambda t: 1 + np.sin(t / unit)),
     )  # fmt: skip
-    found, same = cv.integrate(scene, 0.05 * unit), cv.integrate(loaded(SINE), 0.05)
+    found, same = cv.integrate(scene, 0.05 * unit), cv.integrate(loaded(SINE, GROWING), 0.05)
     assert np.abs(found.w_WB_B * unit - same.w_WB_B).max() < 1e-12
     assert np.abs(found.supplied[:, 0] / (small / unit**2) - same.supplied[:, 0]).max() < 1e-12 * np.abs(same.supplied).max()
 
@@ -106,6 +126,15 @@ def test_very_small_scenes_are_integrated_in_their_own_units():
         (lambda: loaded(damping=0.1), "damping", "0.1"),
         (lambda: cv.Damping([1, 2, 3]), "matrix", "shape (3,)"),
         (lambda: cv.Damping(np.diag([1, -0.5, 1])), "matrix", "eigenvalue -0.5"),
+        (lambda: cv.Damping(np.eye(3), (1, 2)), "factor", "shape (2,)"),
+        (lambda: cv.Damping(np.eye(3), lambda t: (1, 2)), "factor", "returns (1, 2)"),
+        (lambda: cv.Damping(np.eye(3), lambda t: np.nan), "factor", "nan"),
+        (lambda: cv.Damping(np.eye(3), ([0, 1], [1, -2])), "values", "-2"),
+        (lambda: cv.Damping(np.eye(3), ([0, 1], [1, 2, 3])), "values", "shape (3,)"),
+        (lambda: cv.Damping(np.eye(3), ([1, 1], [1, 2])), "times", "1 after 1"),
+        (lambda: cv.Damping(np.eye(3), lambda t: 1.0, breaks=[np.inf]), "breaks", "inf"),
+        (lambda: loaded(damping=cv.Damping(np.eye(3), ([0, 1], [1, 2]))), "factor", "a table from 0 to 1 s"),
+        (lambda: loaded(damping=cv.Damping(np.eye(3), lambda t: 2 - t)), "factor", "returns -0.03125 at t = 2.03"),
         (lambda: cv.integrate_many(SCENES["table"], np.zeros((2, 3))), "scene", "torque or damping"),
     ],
 )
@@ -128,6 +157,10 @@ def test_a_torque_that_fails_during_the_run_ends_it_with_its_time():
     assert isinstance(failure.value.__cause__, ValueError)
     with pytest.raises(TorqueFailed, match=r"a table from 0 to 6 s at t = 6\.05"):
         cv.integrate(loaded(TABLE, t_end=6.0), 1.1)
+    with pytest.raises(
+        TorqueFailed, match=r"factor: got a function that returns -1\.0 at t = 4\.905 s; expected a finite number"
+    ):
+        cv.integrate(loaded(damping=cv.Damping(np.eye(3), lambda t: -1.0 if 4.9 < t < 4.99 else 1.0)), 0.01)
 
 
 @pytest.mark.parametrize(

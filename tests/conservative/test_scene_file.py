@@ -318,3 +318,18 @@ def test_torque_and_damping_of_a_file(tmp_path):
         path.write_text(scene_file.template() + LOADS.replace(good, bad))
         with pytest.raises(BadFile, match=said):
             scene_file.load(path)
+
+
+def test_the_factor_of_a_damping_in_a_file(tmp_path):
+    path, table = tmp_path / "damped.toml", "times = [0.0, 1.0, 3.0]\nvalues = [0, 2, 1]\n"
+    path.write_text(scene_file.template() + LOADS + table)
+    assert scene_file.load(path).damping.factor.at(2.0) == 1.5
+    for good, bad, said in (
+        ("2, 1]", "-2, 1]", r"damping\.values: got -2; expected an array \(3\): a finite number of 0 or more for each time"),
+        ("2, 1]", "2]", r"damping\.values: got shape \(2,\)"),
+        ("1.0, 3.0", "1.0, 1.5", r"damping: got a table from 0 to 1\.5 s at t = 1\.56"),
+        (table, "times = [0.0, 1.0]\n", r"damping\.values: got nothing"),
+    ):
+        path.write_text(scene_file.template() + LOADS + table.replace(good, bad))
+        with pytest.raises(BadFile, match=said):
+            scene_file.load(path)

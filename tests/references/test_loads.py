@@ -56,7 +56,17 @@ def newton_euler():
     hy = pytest.importorskip("heyoka")
     R = [hy.make_vars(*(f"R{i}{j}" for j in range(3))) for i in range(3)]
     w, sizes_of, number = hy.make_vars("w0", "w1", "w2"), {"J": 9, "K": 9, "D": 9, "b": 3, "anchor": 3, "weight": 3}, count()
-    sizes_of |= {"stiffness": 1, "rest": 1, "body": 3, "body_sine": 3, "world": 3, "world_sine": 3, "rate": 1, "phase": 1}
+    sizes_of |= {
+        "D_sine": 1,
+        "stiffness": 1,
+        "rest": 1,
+        "body": 3,
+        "body_sine": 3,
+        "world": 3,
+        "world_sine": 3,
+        "rate": 1,
+        "phase": 1,
+    }
     p = {name: [hy.par[next(number)] for _ in range(size)] for name, size in sizes_of.items()}
 
     def cross(a, b):
@@ -74,7 +84,7 @@ def newton_euler():
     of_spring = cross(arm, [pull * x for x in reach])
     of_weight = cross(product(flat, p["weight"]), [0.0, 0.0, -1.0])
     torque_W = [a + b + c + d * sine for a, b, c, d in zip(of_spring, of_weight, p["world"], p["world_sine"], strict=True)]
-    damped = product(p["D"], w)
+    damped = [(1.0 + p["D_sine"][0] * sine) * each for each in product(p["D"], w)]
     torque = [
         a + b + c + d * sine - e
         for a, b, c, d, e in zip(
@@ -110,6 +120,7 @@ def random_case(seed):
     if seed % 3:
         skew = rng.normal(size=3)
         values["D"] = 0.1 * half @ half.T + 0.3 * np.cross(np.eye(3), skew)
+        values["D_sine"] = 0.8 * (seed % 4 < 2)
         damping = cv.Damping(values["D"])
     if seed % 5 < 2:
         values["weight"] = 2 * rng.normal(size=3)
@@ -119,6 +130,8 @@ def random_case(seed):
         potential = cv.LinearSpring(1.5, values["b"], values["anchor"], 0.4)
     constant, sine, rate, phase = values[frame], values[f"{frame}_sine"], values["rate"], values["phase"]
     torque = cv.Torque(lambda t: constant + sine * np.sin(rate * t + phase), frame)
+    if values.get("D_sine"):
+        damping = cv.Damping(values["D"], lambda t: 1 + values["D_sine"] * np.sin(rate * t + phase))
     start = Rotation.random(random_state=rng).as_matrix()
     return cv.Scene(
         "random", cv.RigidBody(J), start, rng.normal(size=3), 4.0, potential, torque=torque, damping=damping
