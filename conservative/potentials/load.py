@@ -107,7 +107,7 @@ class OfTime:
     name: ClassVar[str]
     shape: ClassVar[tuple[int, ...]]
     one: ClassVar[str]
-    least: ClassVar[float] = -np.inf
+    signed: ClassVar[bool] = True
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
@@ -123,7 +123,7 @@ class OfTime:
                 raise BadInput("times", f"{times[i]:.17g} after {times[i - 1]:.17g}, at index {i}", _TIMES)
             allowed = f"an array ({len(times)}{columns}): {self.one} for each time"
             value = read_only(times), finite_array("values", value[1], ((len(times), *self.shape),), allowed)
-            if (value[1] < self.least).any():
+            if not self.signed and (value[1] < 0).any():
                 raise BadInput("values", f"{value[1].min():g}", allowed)
         elif not callable(value):
             allowed = f"{self.one}; a function of time, s, that returns it; or a table (times (n,), values (n{columns}))"
@@ -140,13 +140,13 @@ class OfTime:
             times, values = self.value
             if not times[0] <= t <= times[-1] + _END * abs(times[-1]):
                 raise TorqueFailed(t, f"a table from {times[0]:g} to {times[-1]:g} s", self.name, self.one)
-            return np.reshape([np.interp(t, times, column) for column in values.reshape(len(times), -1).T], self.shape)
+            return np.array([np.interp(t, times, column) for column in values.T] if self.shape else np.interp(t, times, values))
         try:
             found = self.value(t)
         except Exception as error:
             raise TorqueFailed(t, f"a function that raises {error!r}", self.name, self.one) from error
         value = real_array(found)
-        if value is None or value.shape != self.shape or not np.isfinite(value).all() or (value < self.least).any():
+        if value is None or value.shape != self.shape or not np.isfinite(value).all() or (not self.signed and value.min() < 0):
             raise TorqueFailed(t, f"a function that returns {describe(found)}", self.name, self.one)
         return value
 
@@ -218,7 +218,7 @@ class Factor(OfTime):
     name: ClassVar[str] = "factor"
     shape: ClassVar[tuple[int, ...]] = ()
     one: ClassVar[str] = "a finite number of 0 or more"
-    least: ClassVar[float] = 0.0
+    signed: ClassVar[bool] = False
 
 
 @dataclass(frozen=True, eq=False, init=False)
