@@ -126,7 +126,7 @@ class Scene:
             raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        [load.require(end) for load in (torque, damping) if load is not None]  # for its exception
+        [load.require(end) for load in (torque, damping.factor if damping else None) if load]  # for its exception
         try:
             given: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, TypeVar, cast
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,7 +95,6 @@ def _in_world(q: Any, v: Any) -> Any:
 
 Value = Array | tuple[Array, Array] | Callable[[float], ArrayLike]
 Given = ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], ArrayLike]
-AnyOfTime = TypeVar("AnyOfTime", bound="OfTime")
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -157,7 +156,7 @@ class OfTime:
         except TorqueFailed as failure:
             raise BadInput(self.name, f"{failure.got} at t = {failure.time:g} s", failure.allowed) from failure.__cause__
 
-    def in_units(self: AnyOfTime, unit: float, time: float) -> AnyOfTime:
+    def in_units(self, unit: float, time: float) -> Self:
         """Return the function in units of its values and with times in units of `time`, s, powers of two."""
         value: Value
         if isinstance(self.value, np.ndarray):
@@ -254,11 +253,6 @@ class Damping:
         if smallest < -1e-14 * np.abs(D).max():
             raise BadInput("matrix", f"{D.tolist()}, with the eigenvalue {smallest:.3g}", allowed)
         set_fields(self, matrix=D, factor=None if factor is None else Factor("factor", factor, breaks))
-
-    def require(self, t_end: float) -> None:
-        """Raise `BadInput` if the factor has no value at one of a few times from 0 to t_end, s."""
-        if self.factor is not None:
-            self.factor.require(t_end)
 
     def in_units(self, energy: float, time: float) -> Damping:
         """Return the damping in units of `energy`, J, and `time`, s, powers of two."""

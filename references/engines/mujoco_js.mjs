@@ -24,19 +24,20 @@ export function build({ mass, gravity, com, moments_com: [a, b, c], q_com, q0, w
 }
 
 export function load(path, M) { // as in importers/loaders.py
-  const files = new M.MjVFS(), folder = dirname(path);
-  for (const { name } of readdirSync(folder, { withFileTypes: true }).filter((each) => each.isFile())) {
+  const text = readFileSync(path, 'utf8'), folder = dirname(path), files = new M.MjVFS();
+  for (const name of readdirSync(folder).filter((each) => text.includes(`"${each}"`))) { // meshes
     files.addBuffer(name, readFileSync(join(folder, name)));
   }
-  const spec = M.parseXMLString(readFileSync(path, 'utf8'), files), { mjOBJ_BODY, mjOBJ_JOINT } = M.mjtObj;
+  const spec = M.parseXMLString(text, files), { mjOBJ_BODY, mjOBJ_JOINT } = M.mjtObj;
   if (!M.mjs_firstElement(spec, mjOBJ_JOINT)) {
-    const world = M.mjs_findBody(spec, 'world');
-    M.mjs_addFreeJoint(M.mjs_asBody(M.mjs_firstChild(world, mjOBJ_BODY, 0)));
+    M.mjs_addFreeJoint(M.mjs_asBody(M.mjs_firstChild(M.mjs_findBody(spec, 'world'), mjOBJ_BODY, 0)));
   }
   spec.option.gravity.fill(0);
   spec.option.disableflags = M.mjtDisableBit.mjDSBL_CONTACT.value;
   const model = M.mj_compile(spec, files), data = new M.MjData(model);
   data.qpos.set([0, 0, 0, 1, 0, 0, 0]);
+  spec.delete();
+  files.delete();
   return (velocity, force) => {
     data.qvel.set(velocity);
     data.qfrc_applied.set(force);
