@@ -23,21 +23,20 @@ export function build({ mass, gravity, com, moments_com: [a, b, c], q_com, q0, w
   return { step: () => M.mj_step(model, data), read: () => [data.qpos.slice(-4), data.qvel.slice(-3)], rates: 'w' };
 }
 
-export function load(path, M) { // as in importers/loaders.py
-  const text = readFileSync(path, 'utf8'), folder = dirname(path), files = new M.MjVFS();
+export function load(path, M, own) { // as in importers/loaders.py
+  const take = (object) => (own(() => object.delete()), object);
+  const text = readFileSync(path, 'utf8'), folder = dirname(path), files = take(new M.MjVFS());
   for (const name of readdirSync(folder).filter((each) => text.includes(`"${each}"`))) { // meshes
     files.addBuffer(name, readFileSync(join(folder, name)));
   }
-  const spec = M.parseXMLString(text, files), { mjOBJ_BODY, mjOBJ_JOINT } = M.mjtObj;
+  const spec = take(M.parseXMLString(text, files)), { mjOBJ_BODY, mjOBJ_JOINT } = M.mjtObj;
   if (!M.mjs_firstElement(spec, mjOBJ_JOINT)) {
     M.mjs_addFreeJoint(M.mjs_asBody(M.mjs_firstChild(M.mjs_findBody(spec, 'world'), mjOBJ_BODY, 0)));
   }
   spec.option.gravity.fill(0);
   spec.option.disableflags = M.mjtDisableBit.mjDSBL_CONTACT.value;
-  const model = M.mj_compile(spec, files), data = new M.MjData(model);
+  const model = take(M.mj_compile(spec, files)), data = take(new M.MjData(model));
   data.qpos.set([0, 0, 0, 1, 0, 0, 0]);
-  spec.delete();
-  files.delete();
   return (velocity, force) => {
     data.qvel.set(velocity);
     data.qfrc_applied.set(force);

@@ -3,8 +3,8 @@
  *
  *   ENGINE                      its data, see read_script in environments/adapter.py
  *   start(package, url)         returns the engine; by default the package
- *   load(path, engine)          optional: loads a model file for `load`, and returns a function from a velocity and a force to an
- *                               acceleration. `ENGINE` then has `formats`
+ *   load(path, engine, own)     optional: loads a model file for `load`, and returns a function from a velocity and a force to an
+ *                               acceleration. `ENGINE` then has `formats`, and `own` is as in build
  *   build(given, engine, own)   returns a world for one call of a run, with `step()`, and `read()` for an attitude and rates.
  *                               Rates are in world axes, or in F if `rates` is "w". The attitude is of axes that are turned by
  *                               `axes` relative to F. The engine destroys what is passed to `own`, the last one first
@@ -82,8 +82,13 @@ const operations = {
   },
   check: async ({ module }) => void (await load(module)),
   load: async ({ adapter, path, velocities, forces }) => {
-    const accelerate = (await startEngine(adapter)).load(path, engine);
-    return { accelerations: velocities.map((velocity, i) => accelerate(velocity, forces[i])) };
+    const module = await startEngine(adapter), owned = [];
+    try {
+      const accelerate = module.load(path, engine, (object) => (owned.push(object), object));
+      return { accelerations: velocities.map((velocity, i) => accelerate(velocity, forces[i])) };
+    } finally {
+      free({ owned });
+    }
   },
   prepare: async ({ adapter, settings, ...given }) => {
     if (given.rows) return { error: 'unsupported', message: 'many bodies in one run' };

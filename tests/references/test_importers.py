@@ -299,7 +299,7 @@ def test_a_program_without_usable_accelerations_is_described(formats, accelerati
 
 @pytest.mark.engine("mujoco_js")
 def test_mujoco_for_javascript_answers_like_mujoco_of_the_same_version():
-    """It has the same outcome for all files, and in 3.14.0 the same body to 1e-15."""
+    """The same outcome for all files, and in 3.14.0 the same body to 1e-15. That version of `mujoco` is installed, too."""
     here = outcomes("mujoco_js", "")
     there = outcomes(f"mujoco=={next(iter(here.values())).engine.split()[1]}", "")
     assert {name: each.outcome for name, each in here.items()} == {name: each.outcome for name, each in there.items()}
