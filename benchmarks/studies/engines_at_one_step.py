@@ -23,7 +23,7 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .selection import Missing
-from .speed import MEASURES, TimedRun, time_steps
+from .speed import MEASURES, time_steps
 from .step_ladder import SAMPLES
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -43,17 +43,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     for scene in study.scenes:
         grid = grid_for(scene, scene.dt)
         truth = study.truth(scene, grid).trajectory
-        ready: list[TimedRun] = []
+        ready: dict[Case, Success] = {}
         for method in study.competitors:
             tell(f"{scene.name}: {method.name}")
-            ready += yield from measure(study, Case(study.name, scene, method, grid), truth)
+            ready |= yield from measure(study, Case(study.name, scene, method, grid), truth)
         tell(f"{scene.name}: timing {len(ready)} engines")
         with time_limit(study.hang_limit):
             yield from time_steps(study, ready)
 
 
-def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, list[TimedRun]]:
-    """Yield the rows of one engine except its times; return the run to be timed in a list, which may be empty."""
+def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, dict[Case, Success]]:
+    """Yield the rows of one engine except its times; return the run to be timed by its case, or nothing."""
     done = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
     method = case.method
     if not isinstance(method, Missing):
@@ -70,8 +70,8 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
         done = study.attempt_here(case)
     if isinstance(done, Outcome):
         yield from case.rows(blanks(*MEASURES), done)
-        return []
-    return [TimedRun(case, done, done)]
+        return {}
+    return {case: done}
 
 
 def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> list[Measurement]:

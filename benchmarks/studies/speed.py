@@ -7,8 +7,8 @@ then the conversion of the scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -50,25 +50,16 @@ def keep_end(grid: Grid, times: int = 1) -> Grid:
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
-@dataclass(frozen=True, eq=False)
-class TimedRun:
-    """A case to be timed, its result, and the result of the first call."""
-
-    case: Case
-    done: Success
-    first: Success
-
-
-def make_timed(study: Study, case: Case) -> TimedRun | Outcome:
-    """Return a case that is ready to be timed, or the outcome of its failure.
+def make_timed(study: Study, case: Case) -> tuple[Case, Success] | Outcome:
+    """Return a case to be timed and its result, with the cost of the first run, or the outcome of its failure.
 
     It has so many steps that a call takes about `CALL` s, or the most steps that do not fail. Their number is determined in
     several rounds, because a short call is mostly overhead.
     """
-    first = study.attempt_here(case)
-    if isinstance(first, Outcome):
-        return first
-    longest, done, times = case, first, 1
+    done = study.attempt_here(case)
+    if isinstance(done, Outcome):
+        return done
+    longest, cost, times = case, done.cost, 1
     while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
         longer = replace(case, grid=keep_end(case.grid, times))
@@ -76,7 +67,7 @@ def make_timed(study: Study, case: Case) -> TimedRun | Outcome:
         if isinstance(again, Outcome):
             break
         longest, done = longer, again
-    return TimedRun(longest, done, first)
+    return longest, replace(done, cost=cost)
 
 
 def _shortest(run: Run) -> float:
@@ -103,7 +94,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield wall times at the scene's step size, final state only: each method in its own loop, all interleaved."""
     tell = study.count(progress, len(study.competitors) + 1)
     for scene in study.scenes:
-        ready: list[TimedRun] = []
+        ready: dict[Case, Success] = {}
         for method in study.competitors:
             tell(f"{scene.name}: preparing {method.name}")
             scene.forget()  # so that the scene is converted again; compiled code stays warm
@@ -112,33 +103,33 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             if isinstance(timed, Outcome):
                 yield from case.rows(blanks(*MEASURES), timed)
             else:
-                ready.append(timed)
+                ready.update([timed])
         tell(f"{scene.name}: timing {len(ready)} methods")
         yield from time_steps(study, ready)
 
 
-def time_steps(study: Study, ready: Sequence[TimedRun]) -> Iterator[Measurement]:
+def time_steps(study: Study, ready: Mapping[Case, Success]) -> Iterator[Measurement]:
     """Yield the `MEASURES` of runs, all in interleaved rounds."""
-    timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
-    for timed, timing in timings.items():
-        yield from times(timed, timing)
+    timings = time_interleaved({case: done.run for case, done in ready.items()}, study.rounds, budget=study.timing_budget)
+    for case, timing in timings.items():
+        yield from times(case, ready[case], timing)
 
 
-def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
+def times(case: Case, done: Success, timing: Timing) -> Iterator[Measurement]:
     """Yield the rows of one method."""
-    steps, simulated = timed.done.trajectory.counters.steps or math.nan, timed.case.grid.dt * timed.case.grid.n_steps
+    steps, simulated = done.trajectory.counters.steps or math.nan, case.grid.dt * case.grid.n_steps
     values = (
         timing.minimum / steps,
         timing.median / steps,
         timing.minimum / simulated,
         timing.median / simulated,
-        timed.first.cost.prepare,
-        timed.first.cost.first_call,
+        done.cost.prepare,
+        done.cost.first_call,
     )
     detail = f"{timing} of {simulated:.4g} s, {steps} steps"
     for measure, value in zip(MEASURES, values, strict=True):
         outcome = OK if not math.isnan(value) else UNCOUNTED if timing.outcome.ok else timing.outcome
-        yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")
+        yield case.row(Value(measure, value), outcome, detail if outcome.ok else "")
 
 
 def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
@@ -149,7 +140,8 @@ def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Ite
         if isinstance(timed, Outcome):
             yield case.row(Value(Measure.TIME, math.nan), timed)
         else:
-            ready[case, Measure.TIME] = timed.case, timed.done.run
+            longest, done = timed
+            ready[case, Measure.TIME] = longest, done.run
     yield from time_runs(study, ready, processes)
 
 

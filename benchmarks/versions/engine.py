@@ -27,7 +27,7 @@ from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success
 from ..studies.line import measure_line
-from ..studies.speed import TimedRun, keep_end, make_timed, shorten
+from ..studies.speed import keep_end, make_timed, shorten
 from ..studies.study import Study
 from .comparison import TIMING, Comparison, Line, Tell, compare
 from .version import Version
@@ -280,7 +280,7 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     timed = {
         version: make_timed(study, shorten(study, Case(study.name, scene, method, grid))) for version, method in methods.items()
     }
-    ready = {version: run for version, run in timed.items() if isinstance(run, TimedRun)}
+    ready = {version: run[1] for version, run in timed.items() if not isinstance(run, Outcome)}
     times = _repeat(study, ready, range(REPEATS))
     if any(differ(was, now) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))
@@ -288,8 +288,8 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     return times
 
 
-def _repeat(study: Study, ready: Mapping[str, TimedRun], seeds: range) -> dict[str, StepTimes]:
-    runs = {version: timed.done.run for version, timed in ready.items()}
+def _repeat(study: Study, ready: Mapping[str, Success], seeds: range) -> dict[str, StepTimes]:
+    runs = {version: done.run for version, done in ready.items()}
     repeats = [time_interleaved(runs, ROUNDS, budget=study.timing_budget, seed=seed) for seed in seeds]
-    steps = {version: timed.done.trajectory.counters.steps or math.nan for version, timed in ready.items()}
+    steps = {version: done.trajectory.counters.steps or math.nan for version, done in ready.items()}
     return {version: tuple(each[version].minimum / steps[version] for each in repeats) for version in ready}

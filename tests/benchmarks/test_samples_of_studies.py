@@ -103,7 +103,7 @@ def test_the_papers_figures_are_those_of_its_scenes():
 def test_speed_has_the_minimum_and_the_median():
     case = Case("speed", BRICK, cv.Reduced(), Grid(0.01, 10, 10))
     done = attempt(case)
-    result = {row.measure: row.value for row in speed.times(speed.TimedRun(case, done, done), Timing(1.0, 3.0, 5, 2))}
+    result = {row.measure: row.value for row in speed.times(case, done, Timing(1.0, 3.0, 5, 2))}
     assert result == {
         Measure.TIME_PER_STEP: pytest.approx(0.1),
         Measure.TIME_PER_STEP_MEDIAN: pytest.approx(0.3),
