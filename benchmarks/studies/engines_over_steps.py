@@ -16,12 +16,12 @@ from conservative.scene import Scene
 from ..measures.convergence_order import grows_with_shorter_steps, observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import time_interleaved
+from ..measures.processes import Processes
 from . import step_ladder
 from .case import Case, Success, drop_step
 from .convergence import find_no_order, order_rows
 from .line import LinePoint, measure_line
-from .speed import ROUNDS
+from .speed import time_runs
 from .study import Progress, Study
 from .work_precision import list_cases
 
@@ -35,8 +35,6 @@ SKIPPED = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, 
 """Outcome of skipped step sizes."""
 TIMED = 1.0
 """Largest attitude error, rad, of a timed run. A run with a larger error is another motion."""
-CALL = 0.002
-"""Shortest sample of timed calls, s."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -97,9 +95,7 @@ def time_rows(study: Study, runs: dict[Case, Success]) -> Iterator[Measurement]:
     """Yield the times of all runs of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
     quick = {case: done.run for case, done in runs.items() if done.cost.first_call <= study.longest_run}
     with time_limit(study.hang_limit):
-        timings = time_interleaved(quick, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
-    for case, timing in timings.items():
-        yield case.time_row(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps), timing)
+        yield from time_runs(study, {(case, Measure.TIME): (case, run) for case, run in quick.items()}, Processes())
     for case, done in runs.items():
         if case not in quick:
             value = Value(Measure.TIME, done.cost.first_call / (case.grid.dt * case.grid.n_steps))

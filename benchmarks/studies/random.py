@@ -22,10 +22,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
@@ -43,10 +41,10 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..measures.timing import wall_time
-from .case import NOT_DRAWN, Case, Drawn, Success, outcome_of_error
+from .case import NOT_DRAWN, Case, Drawn, outcome_of_error
 from .line import list_settings
 from .selection import Missing, tolerance_setting
-from .speed import keep_end, prepare_loop
+from .speed import Runs, keep_end, time_runs
 from .study import Progress, Study, remember_truths
 
 DECADES = tuple(10.0**-k for k in range(2, 13))
@@ -123,7 +121,6 @@ class TimedSetting:
     """A setting whose run succeeded: its error, rad, and its estimated time, s per simulated second."""
 
     case: Case
-    done: Success
     error: float
     spent: float
 
@@ -182,7 +179,7 @@ def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Genera
         spent = min(wall_time(done.run) for _ in range(2))  # the first may compile
         if spent <= SLOW:
             spent = min(spent, *(wall_time(done.run) for _ in range(3)))
-        line.append(TimedSetting(case, done, error, spent / case.scene.t_end))
+        line.append(TimedSetting(case, error, spent / case.scene.t_end))
         yield case.row(Value(Measure.ATTITUDE_MAX, error))
     return line
 
@@ -197,37 +194,28 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     for line in filter(None, lines):
         method = line[0].case.method
         sides.setdefault(Role.OURS if method.role == Role.OURS else method.family, []).append(line)
-    chosen: dict[int, TimedSetting] = {}
+    chosen: dict[TimedSetting, None] = {}
     for side, error in itertools.product(sides.values(), DECADES):
         costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in side]
         least = min((each for each in costs if not math.isnan(each)), default=math.nan)
         for line, each in zip(side, costs, strict=True):
             if each <= MARGIN * least:
-                chosen.update((id(line[i]), line[i]) for i in list_deciding([p.error for p in line], error))
-    return list(chosen.values())
+                chosen.update((line[i], None) for i in list_deciding([p.error for p in line], error))
+    return list(chosen)
 
 
 def time_rows(study: Study, points: list[TimedSetting], processes: Processes) -> Iterator[Measurement]:
     """Yield the times of the points of a body, s per simulated second, final state only, a row for each process."""
-    runs: dict[Case, Callable[[], Any]] = {}
+    ready: Runs = {}
     with time_limit(study.hang_limit):
         for case in (replace(point.case, grid=keep_end(point.case.grid)) for point in points):
             run = prepare_unchecked(case)
             if isinstance(run, Outcome):
                 yield case.row(TIME, run)
             else:
-                runs[case] = getattr(run, "own_loop", run)
-        timings = processes.time(
-            runs,
-            {case: partial(prepare_loop, case) for case in runs},
-            limit=study.hang_limit * (1 + len(runs)),
-            rounds=QUICK_ROUNDS if study.quick else ROUNDS,
-            min_time=CALL,
-            budget=BUDGET,
-            shared=[point.case.scene for point in points[:1]],
-        )
-    for case, each in timings.items():
-        yield from case.time_rows(Measure.TIME, each, case.scene.t_end)
+                ready[case, Measure.TIME] = case, getattr(run, "own_loop", run)
+        rounds = QUICK_ROUNDS if study.quick else ROUNDS
+        yield from time_runs(study, ready, processes, rounds, CALL, BUDGET, own_loop=(Measure.TIME,))
 
 
 def prepare_unchecked(case: Case) -> Run | Outcome:

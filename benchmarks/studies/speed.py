@@ -145,15 +145,27 @@ def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Ite
     yield from time_runs(study, ready, processes)
 
 
-def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measurement]:
-    """Yield the times of runs, s per simulated second, all in interleaved rounds, a row for each process."""
+def time_runs(
+    study: Study,
+    ready: Runs,
+    processes: Processes,
+    rounds: int = 0,
+    min_time: float = CALL / 2,
+    budget: float = 0.0,
+    own_loop: tuple[Measure, ...] = (Measure.TIME_OWN_LOOP,),
+) -> Iterator[Measurement]:
+    """Yield the times of runs, s per simulated second, all in interleaved rounds, a row for each process.
+
+    For rounds, min_time and budget see `time_interleaved`; 0 stands for those of the study. `own_loop` are the measures of runs
+    without the conversion of samples.
+    """
     timings = processes.time(
         {key: run for key, (_, run) in ready.items()},
-        {key: partial(prepare_loop, case, key[1] == Measure.TIME_OWN_LOOP) for key, (case, _) in ready.items()},
+        {key: partial(prepare_loop, case, key[1] in own_loop) for key, (case, _) in ready.items()},
         limit=study.hang_limit * (1 + len(ready)),
-        rounds=min(study.rounds, ROUNDS),
-        min_time=CALL / 2,
-        budget=study.timing_budget / 2,
+        rounds=rounds or min(study.rounds, ROUNDS),
+        min_time=min_time,
+        budget=budget or study.timing_budget / 2,
         shared=list({case.scene: None for case, _ in ready}),
     )
     for key, each in timings.items():
@@ -161,7 +173,7 @@ def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measu
         yield from key[0].time_rows(key[1], each, case.grid.dt * case.grid.n_steps)
 
 
-def prepare_loop(case: Case, own: bool = True) -> Callable[[], Any]:
+def prepare_loop(case: Case, own: bool) -> Callable[[], Any]:
     """Return the run of a case; if `own`, without the conversion of its samples, if it can be run without one."""
     run = case.method.prepare(case.scene, case.grid)
     run()  # so that engines find their limits outside of the loop
