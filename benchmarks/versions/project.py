@@ -36,7 +36,7 @@ from ..studies.study import FindTruth, remember_truths
 from ..suite import points
 from . import inside
 from .comparison import Comparison, Line, Tell, compare
-from .times import PROCESSES, SLOWER, Timed, TimeRow, compare_times
+from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Version
 
 TIME = "time of a step"
@@ -45,14 +45,6 @@ _ADAPTER = str(Path(inside.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]
-
-
-class FailedThere(IntegrationFailed):
-    """A run of a version failed. Attribute: `outcome`, as that version reports it."""
-
-    def __init__(self, outcome: Outcome) -> None:
-        self.outcome = outcome
-        super().__init__(f"The run of this version ended: {outcome}. Use a run that the version completes")
 
 
 class ProjectSide:
@@ -111,41 +103,15 @@ class ProjectSide:
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
-    def solver(self, read: Callable[[Answer], Trajectory], **values: Any) -> WorkerRun[Trajectory]:
-        """Return a run whose result is a trajectory."""
-        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, read)
+    def run(self, task: str, read: Callable[[Answer], Any], **values: Any) -> WorkerRun[Any]:
+        """Return the run of a task of `inside`; `read` converts its answers."""
+        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": task}, **values}, read)
 
-    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> VersionRun:
-        """Return a prepared run of n_steps steps dt, s, to be timed."""
-        values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
-        read = read_states(registry.scene(scene), method)
-        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, read)
+    def timed(self, scene: str, method: str, n_steps: int) -> Any:
+        """Return a prepared run of n_steps steps of a scene, to be timed; its answers are not converted."""
+        run = self.run("time", lambda answer: answer, scene=scene, method=method, dt=registry.scene(scene).dt, n_steps=n_steps)
         run.prepare()
-        return run
-
-
-class VersionRun(WorkerRun[Trajectory]):
-    """A run that is only timed; the time does not include a conversion to a trajectory."""
-
-    def __call__(self) -> Any:
-        return self.wall_time(1)
-
-    def wall_time(self, calls: int) -> float:
-        return float(self._ask("time", calls=calls)["seconds"])
-
-
-def read_states(scene: Scene, label: str) -> Callable[[Answer], Trajectory]:
-    """Return a function that makes trajectories of a scene from the states of a version."""
-
-    def read(answer: Answer) -> Trajectory:
-        if isinstance(answer, IntegrationFailed):
-            return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
-        counts = Counters(**{name: answer["counts"].get(name) for name in _COUNTS})
-        failure = answer["failure"]
-        ended = FailedThere(Outcome(OutcomeKind(failure[0]), *failure[1:])) if failure else None
-        return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], label, counts, ended)
-
-    return read
+        return run.own_loop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +131,18 @@ class Remote(StandIn):
     def prepare(self, scene: Scene, grid: Grid) -> WorkerRun[Trajectory]:
         """Return the run. It is prepared at its first call, so that a failure to prepare is a failure of the run."""
         values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
-        return self.side.solver(read_states(scene, self.label), scene=self.scene_name, method=self.name, **values)
+        return self.side.run("solve", partial(self.read, scene), scene=self.scene_name, method=self.name, **values)
+
+    def read(self, scene: Scene, answer: Answer) -> Trajectory:
+        """Return the trajectory of a scene from the states of the version."""
+        if isinstance(answer, IntegrationFailed):
+            return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), answer)
+        counts, failure = Counters(**{name: answer["counts"].get(name) for name in _COUNTS}), None
+        if answer["failure"]:
+            kind, *details = answer["failure"]
+            failure = IntegrationFailed("The run of this version ended")
+            failure.outcome = Outcome(OutcomeKind(kind), *details)
+        return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, failure)
 
 
 def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:
@@ -212,16 +189,14 @@ def compare_projects(
         if not made.lines:
             raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
 
-        def setting_of(line: ProjectLine) -> Timed:
-            return Timed(line.scene, line.setting, registry.scene(line.scene).dt)
-
         good = [
-            line
+            (line.scene, line.setting)
             for line in made.lines
             if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
         ]
-        times = compare_times(*sides, list(map(setting_of, good)), processes, tell)
-        return replace(made, lines=tuple(replace(line, times=times.get(setting_of(line))) for line in made.lines))
+        times = compare_times(*sides, good, processes, tell)
+        lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
+        return replace(made, lines=tuple(lines))
 
 
 def judge(comparison: ProjectComparison) -> Verdict:

@@ -23,7 +23,6 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 
-from ..measures.timing import wall_time
 from .comparison import TIMING, Tell
 
 SLOWER = 0.05
@@ -46,20 +45,11 @@ RESAMPLES = 4999
 
 
 class Process(Protocol):
-    """The process of a version: starts again after `close`, and prepares runs of n_steps steps dt, s, to be timed."""
+    """The process of a version: starts again after `close`, and prepares runs of n_steps steps of a scene, to be timed."""
 
     def close(self) -> None: ...
 
-    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> Any: ...
-
-
-@dataclass(frozen=True)
-class Timed:
-    """A timed setting: scene and method by their registered names, and the step dt, s."""
-
-    scene: str
-    method: str
-    dt: float
+    def timed(self, scene: str, method: str, n_steps: int) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -98,6 +88,8 @@ class TimeRow:
         return bool(self.reason) or (self.first.slower and self.again is not None and self.again.slower)
 
 
+Timed = tuple[str, str]
+"""A timed setting: registered names of the scene and of the method."""
 Times = dict[Timed, list[tuple[float, float]]]
 """Shortest times of a step, s, in both versions, for each pair of processes."""
 
@@ -150,7 +142,7 @@ class Clock:
                 side.close()
             for number, row in enumerate(rows):
                 share = (turn + number / len(rows)) / processes
-                self._tell(TIMING + (1 - TIMING) * share, f"times of {row.method}, process {turn + 1} of {processes}")
+                self._tell(TIMING + (1 - TIMING) * share, f"times of {row[1]}, process {turn + 1} of {processes}")
                 if row in self.failures:
                     continue
                 try:
@@ -164,15 +156,15 @@ class Clock:
         if row not in self._work:
             n, spent = 16, 0.0
             while True:  # to the number of steps that take as long as a sample, to several percent
-                run = self._sides[0].timed(row.scene, row.method, row.dt, n)
-                run()
-                spent = max(min(wall_time(run) for _ in range(5)), 1e-9)
+                run = self._sides[0].timed(*row, n)
+                run.wall_time(1)
+                spent = max(min(run.wall_time(1) for _ in range(5)), 1e-9)
                 if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
                     break
                 n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / spent)))
             self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / spent / 2)))
         steps, calls = self._work[row]
-        runs = [[side.timed(row.scene, row.method, row.dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
+        runs = [[side.timed(*row, steps) for _ in range(LAYOUTS)] for side in self._sides]
         was, now = _sample(runs, calls, turn)
         return was / steps, now / steps
 

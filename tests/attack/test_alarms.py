@@ -6,9 +6,8 @@ this attack is about, so it may fail on a machine that is never quiet.
 
 import pytest
 
-from conservative import registry
 from conservative.benchmarks.versions.project import ProjectSide
-from conservative.benchmarks.versions.times import Timed, compare_times
+from conservative.benchmarks.versions.times import compare_times
 from conservative.benchmarks.versions.version import Version
 from conservative.references.environments.environment import Environment
 
@@ -23,21 +22,20 @@ FACTORS = ("1.0", "1.2")
 class Slowed(ProjectSide):
     """A side that takes as many times more steps as the name of a method ends with."""
 
-    def timed(self, scene, method, dt, n_steps):
+    def timed(self, scene, method, n_steps):
         name, _, factor = method.partition(" x")
-        return super().timed(scene, name, dt, round(n_steps * float(factor)))
+        return super().timed(scene, name, round(n_steps * float(factor)))
 
 
 class Usual(Slowed):
-    def timed(self, scene, method, dt, n_steps):
-        return super().timed(scene, f"{method.partition(' x')[0]} x1", dt, n_steps)
+    def timed(self, scene, method, n_steps):
+        return super().timed(scene, f"{method.partition(' x')[0]} x1", n_steps)
 
 
 def test_only_slower_rows_raise_an_alarm(wheel, tmp_path):
     environments.Environment.create(tmp_path / "version", wheel)
     version = Version("wheel", "", Environment("wheel", "0", tmp_path / "version", "", ()))
-    dt = registry.scene("brick_flip").dt
-    rows = [Timed("brick_flip", f"{method} x{factor}", dt) for method in METHODS for factor in FACTORS]
+    rows = [("brick_flip", f"{method} x{factor}") for method in METHODS for factor in FACTORS]
     alarms = []
     for _ in range(count(1)):
         sides = Usual(version), Slowed(version)

@@ -5,13 +5,12 @@ from pathlib import Path
 
 from conservative.benchmarks.gate.results import Row, Status
 from conservative.benchmarks.versions.comparison import Comparison, Line
-from conservative.benchmarks.versions.times import Ratio, Timed, TimeRow
+from conservative.benchmarks.versions.times import Ratio, TimeRow
 from conservative.benchmarks.versions.version import Version
 from conservative.references.environments.environment import Environment
 from conservative.references.worker.client import EngineCrashed
-from conservative.registry import scene
 
-TIMED = Timed("brick_flip", "reduced", scene("brick_flip").dt)
+TIMED = ("brick_flip", "reduced")
 STEP = 1e-6
 """Time of a step, s."""
 
@@ -63,7 +62,7 @@ class Side:
     def close(self):
         self.processes += 1
 
-    def timed(self, scene, method, dt, n_steps):
+    def timed(self, scene, method, n_steps):
         if self.processes == self.crash:
             raise EngineCrashed("signal 11")
         return Run(self, n_steps)
@@ -75,9 +74,6 @@ class Side:
 class Run:
     def __init__(self, side, steps):
         self.side, self.steps = side, steps
-
-    def __call__(self):
-        return None
 
     def wall_time(self, calls):
         return calls * self.side.seconds(self.steps)

@@ -10,7 +10,6 @@ from conservative.benchmarks.versions.times import (
     MOST_TURNS,
     PROCESSES,
     Clock,
-    Timed,
     compare_times,
     ratio_of,
     settle,
@@ -74,12 +73,12 @@ def test_an_open_ratio_is_measured_in_more_processes():
 
 
 def test_a_crashing_version_fails_only_its_row():
-    other = Timed("brick_flip", "gauss", 0.01)
+    other = ("brick_flip", "gauss")
 
     class Fragile(Side):
-        def timed(self, scene, method, dt, n_steps):
+        def timed(self, scene, method, n_steps):
             self.crash = 3 if method == "gauss" else None
-            return super().timed(scene, method, dt, n_steps)
+            return super().timed(scene, method, n_steps)
 
     timed_rows = compare_times(Side(), Fragile(), [TIMED, other])
     assert timed_rows[other].failed
