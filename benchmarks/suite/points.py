@@ -42,14 +42,6 @@ LARGEST = {Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measur
 
 
 @dataclass(frozen=True)
-class GatedValue:
-    """A value that should not change, and how much round-off alone changes it."""
-
-    value: float
-    spread: float
-
-
-@dataclass(frozen=True)
 class Point:
     """A scene, a method, and the scene's own step; `truths` has the exact motions, for all points that share it."""
 
@@ -137,8 +129,11 @@ def points() -> Iterator[Point]:
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 
-def measure(point: Point) -> dict[str, GatedValue]:
-    """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
+def measure(point: Point) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the values that should not change, of a run that reaches its end, and how much round-off alone changes each.
+
+    They are errors, drifts, work and, in the paper's scenes, the observed order.
+    """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
     last_digit = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
@@ -147,14 +142,13 @@ def measure(point: Point) -> dict[str, GatedValue]:
         counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
         found = errors.measure_errors(trajectory, exact)
         measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
-    values = {}
-    for name, value in measured[0].items():
-        nudged = [each[name] for each in measured]
-        values[name] = GatedValue(value, float(max(nudged) - min(nudged)))
-    return values | (fit_order(point) if point.scene.name in PAPER else {})
+    nudged = {name: [each[name] for each in measured] for name in measured[0]}
+    spreads = {name: max(values) - min(values) for name, values in nudged.items()}
+    order = fit_order(point) if point.scene.name in PAPER else {}
+    return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
 
 
-def fit_order(point: Point) -> dict[str, GatedValue]:
+def fit_order(point: Point) -> dict[str, float]:
     """Return the observed order of the attitude; empty if the method has no order or the errors show none."""
     scene, method = point.scene, point.method
     if method.order is None:
@@ -166,7 +160,7 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
         [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in attempts]
     )
     order = observed_order([grid.dt for grid in grids], np.where(sizes > ROUNDED, sizes, np.nan))
-    return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
+    return {} if order.reason else {Measure.ORDER.text: order.slope}
 
 
 def _digits(values: object) -> list[float]:

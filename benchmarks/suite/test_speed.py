@@ -27,12 +27,11 @@ def test_speed(benchmark: Any, point: Point) -> None:
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
-    values = points.measure(point)
-    runaway = find_runaway({name: each.value for name, each in values.items()})
+    values, spreads = points.measure(point)
+    runaway = find_runaway(values)
     if method.role == Role.ENGINE and runaway:
         pytest.xfail(f"{method.label}: {runaway}")
     assert not runaway
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
-    benchmark.extra_info.update({name: each.value for name, each in values.items()})
-    benchmark.extra_info["spreads"] = {name: each.spread for name, each in values.items()}
+    benchmark.extra_info.update(values, spreads=spreads)
     benchmark(run)

@@ -99,7 +99,7 @@ class ProjectSide:
             first = method.solve(point.scene, point.grid)
             if not first.ok:
                 return replace(row, status=Status.FAILED, reason=str(first.outcome))
-            return judge_values(row, points.measure(point))
+            return judge_values(row, *points.measure(point))
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
@@ -152,13 +152,12 @@ def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.
     return points.define([name, *answer["invariants"]], numbers)
 
 
-def judge_values(row: Row, values: Mapping[str, points.GatedValue]) -> Row:
+def judge_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
-    plain = {name: each.value for name, each in values.items()}
-    nonsense = [f"{name} is {value}" for name, value in plain.items() if not math.isfinite(value)]
-    if reason := "; ".join(filter(None, [find_runaway(plain), *nonsense])):
+    nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
+    if reason := "; ".join(filter(None, [find_runaway(values), *nonsense])):
         return replace(row, status=Status.FAILED, reason=reason)
-    return replace(row, values=plain, spreads={name: each.spread for name, each in values.items()})
+    return replace(row, values=values, spreads=spreads)
 
 
 def compare_projects(
