@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from time import monotonic
+from collections.abc import Iterable
 
 from rich.console import Console, RenderableType
 from rich.constrain import Constrain
@@ -17,7 +16,7 @@ ECHO = len("^C") + 1
 class Bar(Progress):
     """A bar on stderr with share, elapsed time, remaining time and current work. It is removed when it stops."""
 
-    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(self) -> None:
         # On a narrow terminal, numbers keep their width, and bar and text share the remaining columns.
         columns = (
             BarColumn(None, table_column=Column(ratio=1)),
@@ -28,7 +27,7 @@ class Bar(Progress):
             TextColumn("{task.description}", table_column=Column(ratio=2, no_wrap=True, overflow="ellipsis")),
         )
         self._terminal = Console(stderr=True)
-        super().__init__(*columns, console=self._terminal, transient=True, expand=True, get_time=clock)
+        super().__init__(*columns, console=self._terminal, transient=True, expand=True)
 
     def get_renderables(self) -> Iterable[RenderableType]:
         """Yield the table of the bar, a little narrower than the terminal."""

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from threading import Event, Thread
+from threading import Timer
 from time import monotonic
 
 Step = Callable[[float, str], None]
@@ -52,27 +52,21 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[None]:
+def show_waiting(what: str) -> Iterator[None]:
     """Show a bar if a piece of work takes longer than `DELAY`."""
     if not has_terminal() or find_spec("rich") is None:
         yield
         return
     from .bars import Bar
 
-    bar, done, start = Bar(clock), Event(), clock()
-    task = bar.add_task(what, total=None)
-
-    def tick() -> None:
-        while not done.wait(0.1):
-            if clock() - start > DELAY:
-                bar.start()
-            bar.update(task, completed=clock() - start)
-
-    ticking = Thread(target=tick, daemon=True)
-    ticking.start()
+    bar = Bar()
+    bar.add_task(what, total=None)
+    timer = Timer(DELAY, bar.start)
+    timer.daemon = True
+    timer.start()
     try:
         yield
     finally:
-        done.set()
-        ticking.join()
+        timer.cancel()
+        timer.join()
         bar.stop()
