@@ -26,7 +26,7 @@ from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success
-from ..studies.line import measure_line
+from ..studies.line import LinePoint, measure_line
 from ..studies.speed import keep_end, make_timed, shorten
 from ..studies.study import Study
 from .comparison import TIMING, Comparison, Line, Tell, compare
@@ -42,6 +42,8 @@ ROUNDS = 3
 """Rounds of a repeat; the fastest call counts."""
 TIME_FACTOR = 1.25
 """Smallest ratio of times that differ."""
+ERRORS = (Measure.ATTITUDE_MAX, Measure.RATES_MAX)
+"""Errors to which orders are fitted."""
 NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
 NO_STEP = "its accuracy does not depend on dt"
 NO_ORDER = Order()
@@ -76,19 +78,6 @@ NOTHING = Spread(math.nan, math.nan, math.nan)
 """The spread of a value that could not be measured."""
 
 
-@dataclass(frozen=True)
-class StepError:
-    """Largest errors at a step dt, s, of attitude, rad, and of rates, relative; NaN if the run did not reach its end.
-
-    `reached` is False if there was no time for the run.
-    """
-
-    dt: float
-    attitude: float
-    rates: float
-    reached: bool = True
-
-
 @dataclass(frozen=True, kw_only=True)
 class Observation:
     """Measurements of one version of an engine, with one setting, on one scene at the step dt, s.
@@ -111,7 +100,7 @@ class Observation:
     label: str
     dt: float
     outcome: Outcome = OK
-    points: tuple[StepError, ...] = ()
+    points: tuple[LinePoint, ...] = ()
     attitude_order: Order = NO_ORDER
     rates_order: Order = NO_ORDER
     error: Spread = NOTHING
@@ -148,15 +137,14 @@ def _largest_change(run: Trajectory, invariant: Invariant) -> float:
     return float(change[place]) if change.ndim == 1 else float(sizes(change)[place])
 
 
-def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
-    """Yield the errors at shorter and shorter steps."""
+def _points(study: Study, scene: Scene, method: Method) -> Iterator[LinePoint]:
+    """Yield the errors at shorter and shorter steps, without the runs, which the engine's process would keep."""
     if method.order is None:
         return
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
-    for point in measure_line(study, cases, truth, (Measure.ATTITUDE_MAX, Measure.RATES_MAX)):
-        attitude, rates = point.errors[Measure.ATTITUDE_MAX], point.errors[Measure.RATES_MAX]
-        yield StepError(point.case.grid.dt, attitude, rates, reached=point.outcome.kind not in NO_TIME)
+    for point in measure_line(study, cases, truth, ERRORS):
+        yield replace(point, done=point.outcome)
 
 
 def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
@@ -165,16 +153,16 @@ def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
     An order depends a little on the steps that it is fitted to. A version with too few steps for a fit does not limit the steps
     of the others.
     """
-    reached = [{point.dt for point in each.points if point.reached} for each in observations]
+    reached = [{p.case.grid.dt for p in each.points if p.outcome.kind not in NO_TIME} for each in observations]
     enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
     steps = set.intersection(*enough) if enough else set()
     fitted = []
     for seen in observations:
-        points = [point for point in seen.points if point.dt in steps]
+        points = [point for point in seen.points if point.case.grid.dt in steps]
         orders = [Order(reason=NO_STEP)] * 2
         if seen.points:
-            errors = [point.attitude for point in points], [point.rates for point in points]
-            orders = [observed_order([point.dt for point in points], each) for each in errors]
+            dts = [point.case.grid.dt for point in points]
+            orders = [observed_order(dts, [point.errors[measure] for point in points]) for measure in ERRORS]
         fitted.append(replace(seen, attitude_order=orders[0], rates_order=orders[1]) if seen.outcome.ok else seen)
     return tuple(fitted)
 

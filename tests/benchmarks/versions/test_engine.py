@@ -7,11 +7,13 @@ import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures.convergence_order import Order
+from conservative.benchmarks.studies.case import Case
+from conservative.benchmarks.studies.line import LinePoint
 from conservative.benchmarks.versions.changes import Aspect, find_changes, list_transitions
 from conservative.benchmarks.versions.engine import (
+    ERRORS,
     NO_STEP,
     Spread,
-    StepError,
     differ,
     fit_orders,
     plan_versions,
@@ -125,12 +127,17 @@ def test_a_ratio_is_that_of_the_shortest_times():
 
 
 def points(order, steps, reached):
-    result = [StepError(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
-    return tuple(point if k < reached else StepError(point.dt, np.nan, np.nan, False) for k, point in enumerate(result))
+    done, skipped = Outcome(OutcomeKind.OK), Outcome(OutcomeKind.SKIPPED)
+    cases = [Case("track", cv.scenes.brick_flip(), cv.Reduced(), cv.Grid(0.1 / 2**k, 1)) for k in range(steps)]
+    sizes = [1 / 2 ** (k * order) if k < reached else np.nan for k in range(steps)]
+    return tuple(
+        LinePoint(case, done if size > 0 else skipped, dict(zip(ERRORS, (0.1 * size, 0.2 * size), strict=True)))
+        for case, size in zip(cases, sizes, strict=True)
+    )
 
 
 def test_orders_are_fitted_to_the_steps_that_all_versions_have():
-    bent = tuple(replace(point, attitude=max(point.attitude, 1e-3)) for point in points(2, 8, 8))
+    bent = tuple(replace(point, errors={key: max(e, 1e-3) for key, e in point.errors.items()}) for point in points(2, 8, 8))
     slow, fast = replace(GOOD, points=points(2, 8, 4)), replace(GOOD, points=bent)
     result = fit_orders([slow, fast])
     assert [each.attitude_order.slope for each in result] == pytest.approx([2, 2])
