@@ -37,10 +37,9 @@ Origin = dict[str, str]
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The results of a study: its rows, the lines of its charts, and the process that measured it."""
+    """The findings of a study, and the process that measured it."""
 
-    rows: tuple[Measurement, ...]
-    samples: tuple[Samples, ...]
+    findings: tuple[Finding, ...]
     by: Origin
 
 
@@ -59,15 +58,12 @@ class Checkpoint:
 
     def store(self, name: str, findings: Iterable[Finding]) -> None:
         """Store the findings of a study, also in the file. Raise `NotWritten` if that fails."""
-        every = list(findings)
-        rows = tuple(finding for finding in every if isinstance(finding, Measurement))
-        lines = tuple(finding for finding in every if isinstance(finding, Samples))
-        result = StudyResult(rows, lines, self.process)
+        result = StudyResult(tuple(findings), self.process)
         studies = {
             name: {
                 "by": each.by,
-                "rows": list(map(measurement.flat, each.rows)),
-                "samples": list(map(measurement.flat_samples, each.samples)),
+                "rows": [measurement.flat(row) for row in each.findings if isinstance(row, Measurement)],
+                "samples": [measurement.flat_samples(line) for line in each.findings if isinstance(line, Samples)],
             }
             for name, each in {**self.results, name: result}.items()
         }
@@ -165,8 +161,7 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
             raise ValueError(f"format {content['format']}")
         results = {
             name: StudyResult(
-                tuple(map(measurement.from_flat, record["rows"])),
-                tuple(map(measurement.samples_from_flat, record["samples"])),
+                (*map(measurement.from_flat, record["rows"]), *map(measurement.samples_from_flat, record["samples"])),
                 {name: record["by"][name] for name in ("command", "start", "commit")},
             )
             for name, record in content["studies"].items()

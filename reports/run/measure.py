@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import pandas as pd
 
 from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import studies
-from conservative.benchmarks.studies.study import Progress
+from conservative.benchmarks.studies.study import Finding, Progress
 
 from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
@@ -21,6 +23,15 @@ class Measurements:
 
     table: pd.DataFrame
     samples: pd.DataFrame
+
+    @classmethod
+    def of(cls, findings: Iterable[Finding]) -> Measurements:
+        """Return the tables of findings."""
+        every = list(findings)
+        return cls(
+            measurement.frame(each for each in every if isinstance(each, Measurement)),
+            measurement.samples_frame(each for each in every if isinstance(each, Samples)),
+        )
 
 
 def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
@@ -35,11 +46,7 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
         announce(title)
         progress = _progress(step, title, i, len(plan.studies))
         checkpoint.store(study.name, studies.findings(study, progress))
-    results = [checkpoint.results[name] for name in plan.names]
-    return Measurements(
-        measurement.frame(row for result in results for row in result.rows),
-        measurement.samples_frame(line for result in results for line in result.samples),
-    )
+    return Measurements.of(finding for name in plan.names for finding in checkpoint.results[name].findings)
 
 
 def _progress(step: Step, title: str, i: int, n: int) -> Progress:

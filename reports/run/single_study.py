@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from operator import methodcaller
 
-from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.processes import PROCESSES, QUICK_PROCESSES
 from conservative.benchmarks.studies import (
     engine_selection,
@@ -19,7 +18,7 @@ from conservative.benchmarks.studies import (
     studies,
     throughput,
 )
-from conservative.benchmarks.studies.study import Finding, Progress, Study
+from conservative.benchmarks.studies.study import Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
 from conservative.integration.cluster import open_client
@@ -126,13 +125,7 @@ def measure_study(study: Study, progress: Progress, scheduler: str | None = None
         Dask, of the extra `cluster`, is not installed.
     """
     if scheduler is None:
-        findings: Iterable[Finding] = studies.findings(study, progress)
-    else:
-        on_cluster.require_untimed(study.name)
-        with open_client(scheduler) as client:
-            findings = list(on_cluster.find_on_cluster(client, study, progress))
-    every = list(findings)
-    return Measurements(
-        measurement.frame(each for each in every if isinstance(each, measurement.Measurement)),
-        measurement.samples_frame(each for each in every if isinstance(each, measurement.Samples)),
-    )
+        return Measurements.of(studies.findings(study, progress))
+    on_cluster.require_untimed(study.name)
+    with open_client(scheduler) as client:
+        return Measurements.of(on_cluster.find_on_cluster(client, study, progress))

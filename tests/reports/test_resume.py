@@ -54,11 +54,12 @@ def unfinished(tmp_path, monkeypatch):
 
 def test_floats_come_back_as_they_are(unfinished):
     *_, found = checkpoint.read(unfinished / "report.partial.json")
-    assert found["paper"].rows[0].dt == 0.1
-    assert found["paper"].rows[0].value != found["paper"].rows[0].value
-    assert found["paper"].rows[0].outcome == OUTCOME
-    assert found["paper"].samples[0].t[0] == 0.1 + 0.2
-    assert np.isnan(found["paper"].samples[0].value[0])
+    row, *_, line = found["paper"].findings
+    assert row.dt == 0.1
+    assert row.value != row.value
+    assert row.outcome == OUTCOME
+    assert line.t[0] == 0.1 + 0.2
+    assert np.isnan(line.value[0])
 
 
 @pytest.mark.parametrize(
