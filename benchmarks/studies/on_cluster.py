@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import Any
 
 from conservative.errors import BadInput
-from conservative.integration.cluster import start_executor
+from conservative.integration.cluster import open_client, start_executor
 from conservative.references.truth import reference
 
 from . import studies
@@ -22,26 +21,24 @@ UNTIMED = ("paper", "convergence", "long_runs", "motion", "paper_figures", "stab
 """Studies without times."""
 
 
-def require_untimed(name: str) -> None:
-    """Raise `BadInput` if a study measures times."""
-    if name not in UNTIMED:
-        allowed = f"no scheduler for a study of times, which need an idle machine, or one of {', '.join(UNTIMED)}"
-        raise BadInput("scheduler", f"one for the study {name!r}", allowed)
-
-
-def find_on_cluster(client: Any, study: Study, progress: Progress) -> Iterator[Finding]:
-    """Yield the findings of a study from the workers of a `dask.distributed.Client`; see `studies.findings`.
+def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterator[Finding]:
+    """Yield the findings of a study from the workers of the Dask cluster with this scheduler; see `studies.findings`.
 
     Raises
     ------
     BadInput
-        The study measures times, or the cluster has no workers, has workers with another version of this package, or was lost.
+        The study measures times, or no scheduler answers, or the cluster has no workers, has workers with another version of
+        this package, or was lost.
     MissingEngine
         An engine is not installed there, and `skip_missing` is False.
+    MissingExtra
+        Dask, of the extra `cluster`, is not installed.
     """
-    require_untimed(study.name)
+    if study.name not in UNTIMED:
+        allowed = f"no scheduler for a study of times, which need an idle machine, or one of {', '.join(UNTIMED)}"
+        raise BadInput("scheduler", f"one for the study {study.name!r}", allowed)
     parts = [replace(study, scenes=(scene,), truth=reference) for scene in study.scenes]
-    with start_executor(client) as executor:
+    with open_client(scheduler) as client, start_executor(client) as executor:
         futures: list[Future[list[Finding]]] = [executor.submit(_find_all, part) for part in parts]
         try:
             for done, future in enumerate(futures):

@@ -21,7 +21,6 @@ from conservative.benchmarks.studies import (
 from conservative.benchmarks.studies.study import Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
-from conservative.integration.cluster import open_client
 
 from .measure import Measurements
 
@@ -115,17 +114,7 @@ def read_count(argument: str, text: str) -> int:
 
 
 def measure_study(study: Study, progress: Progress, scheduler: str | None = None) -> Measurements:
-    """Return the findings of a study, measured here or on the Dask cluster with this scheduler.
-
-    Raises
-    ------
-    BadInput
-        The study measures times, no scheduler answers, or its workers cannot be used.
-    MissingExtra
-        Dask, of the extra `cluster`, is not installed.
-    """
+    """Return the findings of a study, measured here or on the Dask cluster with this scheduler (see `find_on_cluster`)."""
     if scheduler is None:
         return Measurements.of(studies.findings(study, progress))
-    on_cluster.require_untimed(study.name)
-    with open_client(scheduler) as client:
-        return Measurements.of(on_cluster.find_on_cluster(client, study, progress))
+    return Measurements.of(on_cluster.find_on_cluster(scheduler, study, progress))

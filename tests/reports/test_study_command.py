@@ -149,8 +149,9 @@ def numbers(finding):
 def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
     study = plan_study(name, ("brick_flip", "symmetric_body"), ("gauss",))
     here, told = Here(), []
+    monkeypatch.setattr(on_cluster, "open_client", nullcontext)
     monkeypatch.setattr(on_cluster, "start_executor", lambda client: nullcontext(here))
-    found = list(on_cluster.find_on_cluster(None, study, lambda *each: told.append(each)))
+    found = list(on_cluster.find_on_cluster("", study, lambda *each: told.append(each)))
     assert list(map(numbers, found)) == list(map(numbers, studies.findings(study)))
     assert here.tasks == 2
     assert told == [(0, 2, "brick_flip"), (1, 2, "symmetric_body")]
