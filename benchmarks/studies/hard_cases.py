@@ -20,7 +20,7 @@ from .case import Case
 from .paper import measure_accuracy
 from .selection import Missing
 from .study import HANG_FACTOR, Progress, Study
-from .time_limit import attempt_apart
+from .time_limit import attempt_within
 
 TURN = 60.0
 """Length of the runs, rad at the initial rate. Limited, because multi-precision reference solutions take seconds."""
@@ -61,4 +61,5 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for method in study.competitors:
             tell(f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
-            yield from measure_accuracy(case, attempt_apart(limit, case, study.skip_missing), truth)
+            done = attempt_within(limit, case, study.skip_missing, apart=True)
+            yield from measure_accuracy(case, done, truth)

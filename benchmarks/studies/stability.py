@@ -34,7 +34,7 @@ from ..measures.measurement import Measurement
 from .case import Case, drop_step
 from .selection import Missing
 from .study import Progress, Study
-from .time_limit import attempt_apart
+from .time_limit import attempt_within
 
 SCENES = (
     "brick_flip",
@@ -88,7 +88,7 @@ def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: 
     works, fails, limit, outcome = math.nan, math.nan, max(FIRST_LIMIT, study.longest_run), OK
     for size in STEP_SIZES:
         case = Case(study.name, scene, method, Grid(UNIT * size / rate, STEPS))
-        done = attempt_apart(limit, case, study.skip_missing)
+        done = attempt_within(limit, case, study.skip_missing, apart=True)
         if isinstance(done, Outcome):
             outcome = done
         else:

@@ -24,19 +24,13 @@ _timeouts: WeakKeyDictionary[Scene, dict[Method, tuple[float, Grid]]] = WeakKeyD
 """Limit, s, and grid of the last run that was stopped, by scene and method, so that it is not tried again."""
 
 
-def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
-    """Return the result of a case. A method that is not known to end has `limit` s of wall time; see `attempt_apart`."""
-    if is_known_to_end(case.method) and not isinstance(case.method, EngineMethod):
-        return attempt(case, skip_missing)
-    return attempt_apart(limit, case, skip_missing)
-
-
-def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
+def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: bool = False) -> Success | Outcome:
     """Return the result of a case that has `limit` s of wall time; see `attempt`.
 
-    A method of other people may never end, or may end its process. It runs in a worker process, which is ended after the limit.
-    The trajectory is the same bit for bit. The `run` of a success is prepared in this process when it is first called. A method
-    that cannot be pickled, for example because it holds an open file, runs in this process, without a limit.
+    A method of other people may never end, or may end its process. It runs in a worker process, which is ended after the limit,
+    and so does any method that is not bounded if `apart`. The trajectory is the same bit for bit. The `run` of a success is
+    prepared in this process when it is first called. A method that cannot be pickled, for example because it holds an open
+    file, runs in this process, without a limit.
 
     Raises
     ------
@@ -46,7 +40,7 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
     if isinstance(case.method, EngineMethod):  # it is in another process already
         with time_limit(limit):
             return attempt(case, skip_missing)
-    if is_bounded(case.method):
+    if is_bounded(case.method) or (is_known_to_end(case.method) and not apart):
         return attempt(case, skip_missing)
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
     longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
@@ -69,12 +63,11 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
 def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
     """Return the result of a case whose run is to be timed in this process.
 
-    A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
+    A method that is not known to end is tried in another process first; see `attempt_within`.
     """
-    if isinstance(case.method, EngineMethod):  # its process times its runs
-        return attempt_apart(limit, case, skip_missing)
-    tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
-    return tried if isinstance(tried, Outcome) else attempt(case, skip_missing)
+    tried = attempt_within(limit, case, skip_missing)
+    here = is_known_to_end(case.method) or isinstance(case.method, EngineMethod)  # whose process times its runs
+    return tried if here or isinstance(tried, Outcome) else attempt(case, skip_missing)
 
 
 def is_known_to_end(method: Method) -> bool:

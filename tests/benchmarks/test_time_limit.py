@@ -15,7 +15,7 @@ from conservative.benchmarks.studies import line, studies, study
 from conservative.benchmarks.studies.case import Case, Success, attempt
 from conservative.benchmarks.studies.line import FEWEST_POINTS, LINE_LIMIT, attempt_each
 from conservative.benchmarks.studies.study import Study
-from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
+from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
 from conservative.benchmarks.studies.work_precision import list_cases
 from conservative.grid import Grid, grid_for
 from conservative.outcome import Outcome, OutcomeKind
@@ -45,7 +45,7 @@ def copy_of(scene):
 @pytest.mark.parametrize("name", ["scipy", "mujoco:RK4", "heyoka", "pinocchio"])
 def test_a_run_in_a_worker_is_the_same_bit_for_bit(scene, name):
     case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
-    here, there = attempt(case), attempt_apart(60.0, case)
+    here, there = attempt(case), attempt_within(60.0, case, apart=True)
     if isinstance(here, Outcome):
         assert here == there
         return

@@ -18,7 +18,7 @@ from conservative.benchmarks.measures.timing import time_interleaved
 from conservative.benchmarks.studies import engines_at_one_step, studies, study
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.study import Study
-from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
+from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
 from conservative.errors import MissingEngine, Unsupported
 from conservative.grid import grid_for
 from conservative.outcome import Outcome, OutcomeKind
@@ -276,7 +276,7 @@ def test_a_run_that_crashes_while_it_is_timed_is_marked():
 
 
 @pytest.mark.usefixtures("trial_registered")
-@pytest.mark.parametrize("within", [attempt_apart, attempt_here, attempt_within])
+@pytest.mark.parametrize("within", [attempt_here, attempt_within])
 def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
     outcome = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
     assert isinstance(outcome, Outcome)
