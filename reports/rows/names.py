@@ -19,9 +19,9 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 from conservative.errors import BadInput, MissingEngine, NotLoadable
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.scene import Scene
 from conservative.scenes.random_body import random_body
 
+_in_a_field = lru_cache(maxsize=1)(random_body)
 _PADDED = re.compile(r"(?<=\de)-0(?=\d)")
 
 
@@ -78,7 +78,7 @@ def class_of(role: str, method: str) -> MethodClass:
     """
     loaded = _load(method)
     if role == Role.OURS:
-        return MethodClass.SOLUTION if loaded and loaded.unsupported(_body()) else MethodClass.GENERAL
+        return MethodClass.SOLUTION if loaded and loaded.unsupported(_in_a_field()) else MethodClass.GENERAL
     if role == Role.BASELINE:
         return MethodClass.BASELINE
     return MethodClass.SOLVER if loaded and tolerance_setting(loaded) else MethodClass.ENGINE
@@ -95,11 +95,6 @@ def _load(method: str) -> Method | None:
         return registry.method(method)
     except (BadInput, MissingEngine, NotLoadable):
         return None
-
-
-@lru_cache(maxsize=1)
-def _body() -> Scene:
-    return random_body()
 
 
 def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.DataFrame:

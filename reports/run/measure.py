@@ -10,7 +10,7 @@ import pandas as pd
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import studies
-from conservative.benchmarks.studies.study import Finding, Progress
+from conservative.benchmarks.studies.study import Finding
 
 from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
@@ -44,10 +44,9 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
             continue
         title = f"study {i + 1} of {len(plan.studies)}, {study.name.replace('_', ' ')}"
         announce(title)
-        progress = _progress(step, title, i, len(plan.studies))
-        checkpoint.store(study.name, studies.findings(study, progress))
+
+        def tell(done: int, total: int, what: str, i: int = i, title: str = title) -> None:
+            step((i + done / total) / len(plan.studies), f"{title}: {what}")
+
+        checkpoint.store(study.name, studies.findings(study, tell))
     return Measurements.of(finding for name in plan.names for finding in checkpoint.results[name].findings)
-
-
-def _progress(step: Step, title: str, i: int, n: int) -> Progress:
-    return lambda done, total, what: step((i + done / total) / n, f"{title}: {what}")
