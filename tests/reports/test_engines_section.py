@@ -12,9 +12,9 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.document.model import Grade
 from conservative.reports.rows.names import OF_ENGINES, of_classes
 from conservative.reports.rows.points import all_points, points
+from conservative.reports.run.checkpoint import differences, terms
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.run.terms import differences, terms
 from conservative.reports.sections.engines import OVER_STEPS, engine_rows, every_setting, figure, picture_points, side_by_side
 
 from .made_up import SCENE, STEPS, at_step, over_steps

@@ -14,11 +14,11 @@ from conservative.reports.charts import figures
 from conservative.reports.document.cells import tolerance
 from conservative.reports.document.model import Section, Table, walk
 from conservative.reports.report import render
+from conservative.reports.run.checkpoint import terms
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import BODIES, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.single_study import plan_study
-from conservative.reports.run.terms import terms
 from conservative.reports.sections import random_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
 from conservative.reports.sections.report import build
