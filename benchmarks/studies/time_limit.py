@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 from weakref import WeakKeyDictionary
 
-from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.integration.pickling import NotTransferable
 from conservative.method import Method, Role
@@ -17,6 +15,7 @@ from conservative.references.worker.client import EngineCrashed, EngineTimeout, 
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..measures.timing import Preparation
 from .case import Case, Success, attempt
 from .selection import Missing
 
@@ -54,10 +53,10 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: 
         return failure.outcome
     except NotTransferable:
         return attempt(case, skip_missing)
-    if isinstance(done, Success):
-        prepare = cache(lambda: case.method.prepare(case.scene, case.grid))
-        return replace(done, run=lambda: prepare()())
-    return attempt(case, skip_missing) if done.kind is OutcomeKind.MISSING else done
+    if isinstance(done, Outcome):
+        return attempt(case, skip_missing) if done.kind is OutcomeKind.MISSING else done
+    prepare = cache(lambda: case.method.prepare(case.scene, case.grid))
+    return Success(lambda: prepare()(), *done)
 
 
 def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
@@ -84,11 +83,7 @@ def _is_ours(method: Method) -> bool:
     return type(method).__module__.startswith("conservative.")
 
 
-def _attempt(case: Case) -> Success | Outcome:
-    """Return the result of a case without its run, which stays in the worker."""
+def _attempt(case: Case) -> tuple[Trajectory, Preparation] | Outcome:
+    """Return the trajectory of a case and its cost; the run stays in the worker."""
     done = attempt(case, skip_missing=True)
-    return replace(done, run=_refuse) if isinstance(done, Success) else done
-
-
-def _refuse() -> Trajectory:
-    raise BadInput("run", "a run of another process", "a run that was prepared here")
+    return (done.trajectory, done.cost) if isinstance(done, Success) else done
