@@ -90,14 +90,11 @@ def methods(
         try:
             method = registry.method(name)
             selected.update(dict.fromkeys((method,) if ":" in name else settings(method)))
-        except MissingEngine as error:
+        except (MissingEngine, NotLoadable) as error:  # the second is a broken entry point of another package
             if not skip_missing:
                 raise
-            selected[Missing(name, error=error)] = None
-        except NotLoadable as error:  # a broken entry point of another package
-            if not skip_missing:
-                raise
-            selected[Missing(name, error=MissingEngine(name, error.place))] = None
+            missing = error if isinstance(error, MissingEngine) else MissingEngine(name, error.place)
+            selected[Missing(name, error=missing)] = None
     return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 
