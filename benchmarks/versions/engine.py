@@ -200,10 +200,8 @@ class EngineSide:
             yield method.setting(), observe(self.study, value, method, self.version.name)
 
 
-def plan_versions(
-    versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str], time_limit: float | None = None
-) -> tuple[EngineSide, ...]:
-    """Return the sides of a comparison of two or more versions of an engine, in their order; for `time_limit` see `Study`.
+def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str]) -> tuple[EngineSide, ...]:
+    """Return the sides of a comparison of two or more versions of an engine, in their order.
 
     Settings are as in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as
     installed. Default scenes are those of a report that a setting supports.
@@ -211,8 +209,7 @@ def plan_versions(
     Raises
     ------
     BadInput
-        There are fewer than two versions, one is there twice, a setting or a scene is unknown, no setting supports a scene, or
-        the time limit is not a finite duration above 0.
+        There are fewer than two versions, one is there twice, a setting or a scene is unknown, or no setting supports a scene.
     """
     settings, scene_names = tuple(settings), tuple(scene_names)
     require_several([version.name for version in versions])
@@ -225,7 +222,7 @@ def plan_versions(
     every = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
     taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in every))
-    study = Study("track", scenes if scene_names else taken, every, quick=True, time_limit=time_limit)
+    study = Study("track", scenes if scene_names else taken, every, quick=True)
     return tuple(EngineSide(version, row, study) for version, row in zip(versions, methods, strict=True))
 
 

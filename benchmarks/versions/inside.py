@@ -19,10 +19,10 @@ import numpy as np
 
 from conservative import Grid, registry
 from conservative.method import Method, Role
-from conservative.scene import Scene
 
 Answer = dict[str, Any]
 Array = np.ndarray[Any, Any]
+_scene = lru_cache(maxsize=64)(registry.scene)
 
 
 def prepare(given: SimpleNamespace) -> Callable[[], Any]:
@@ -113,8 +113,3 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
 def keep_running(given: SimpleNamespace) -> Callable[[], Any]:
     """Return the run of a `scene` by a `method` over `n_steps` steps `dt`, final state only, for the worker to time."""
     return registry.method(given.method).prepare(_scene(given.scene), Grid(given.dt, given.n_steps, given.n_steps))
-
-
-@lru_cache(maxsize=64)
-def _scene(name: str) -> Scene:
-    return registry.scene(name)

@@ -79,13 +79,12 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
 
 def _wheel_of_commit(commit_hash: str, project: Path, source: Source) -> Path:
     """Return the wheel of a commit: a stored one, or a new one built from the files of the commit."""
-    inside, top = git(project, "rev-parse", "--show-prefix"), git(project, "rev-parse", "--show-toplevel")
+    inside = git(project, "rev-parse", "--show-prefix")
 
     def make_wheel(folder: Path) -> Path:
-        sources = folder / "sources"
-        _take_out(commit_hash, top, sources)
+        sources = _take_out(commit_hash, project, folder / "sources")
         # setuptools-scm, and tools built on it, would look for a version in a repository
-        return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{commit_hash[:12]}")(folder)
+        return build_project(sources, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{commit_hash[:12]}")(folder)
 
     return keep_wheel(f"{commit_hash}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
 
@@ -97,8 +96,9 @@ def _find_commit(name: str, project: Path) -> str:
     return commit_hash
 
 
-def _take_out(commit_hash: str, top: str, sources: Path) -> None:
-    archive = ["git", "-C", top, "archive", "--format=tar", commit_hash]
+def _take_out(commit_hash: str, project: Path, folder: Path) -> Path:
+    """Put the files of a commit into a folder, and return that of the project, which need not be at the top."""
+    archive = ["git", "-C", git(project, "rev-parse", "--show-toplevel"), "archive", "--format=tar", commit_hash]
     try:
         done = subprocess.run(archive, capture_output=True, check=True, timeout=600)
     except (OSError, subprocess.SubprocessError) as error:
@@ -106,7 +106,8 @@ def _take_out(commit_hash: str, top: str, sources: Path) -> None:
     with tarfile.open(fileobj=io.BytesIO(done.stdout)) as files:
         if hasattr(tarfile, "data_filter"):  # not before 3.11.4
             files.extraction_filter = tarfile.data_filter
-        files.extractall(sources)
+        files.extractall(folder)
+    return folder / git(project, "rev-parse", "--show-prefix")
 
 
 class Checkout(Environment):
@@ -126,9 +127,8 @@ def build_version(name: str, command: str, folder: Path) -> Version:
     """
     project, place, key = project_file().parent, Path(name).resolve(), ""
     if not place.is_dir():
-        sources, key = Path(tempfile.mkdtemp(dir=folder)), _find_commit(name, project)
-        _take_out(key, git(project, "rev-parse", "--show-toplevel"), sources)
-        place = sources / git(project, "rev-parse", "--show-prefix")
+        key = _find_commit(name, project)
+        place = _take_out(key, project, Path(tempfile.mkdtemp(dir=folder)))
     done = subprocess.run(command, shell=True, cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode:
         last = (done.stdout.split("\n")[-2:] or [""])[0]
