@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from click.shell_completion import CompletionItem
 
 SPREADS = ("attitude", "rate", "inertia")
 """Quantities that can be spread for every scene."""
-Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
 def methods(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
