@@ -118,10 +118,10 @@ def sweep(
         if out is not None:
             click.echo(f"Writing {planned.size} to {out}: {starts:,} bodies, {planned.samples} samples each", err=True)
         with progress() as step:
-            result = work.run_sweep(planned, step)
+            ensemble, times = work.run_sweep(planned, step)
             step(1.0, "summary and picture")
             if drawing is not None:
-                drawing.write(svg_text(apply_style(result.ensemble.plot())))
-            summary = work.summarize(planned, result)
+                drawing.write(svg_text(apply_style(ensemble.plot())))
+            summary = work.summarize(planned, ensemble, times)
     summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
     show(build(summary), as_json)

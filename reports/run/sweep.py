@@ -126,17 +126,8 @@ def plan(
     return Sweep(scene, starts, given, varied, seed, samples, steps)
 
 
-@dataclass(frozen=True, eq=False)
-class SweepResult:
-    """The ensemble of a sweep, the wall time of the run, s, and its last progress, None if there was nothing to do."""
-
-    ensemble: Ensemble
-    wall: float
-    last: ProgressOfMany | None
-
-
-def run_sweep(sweep: Sweep, step: Step) -> SweepResult:
-    """Return the result of a sweep. `step` is called with the finished share and the rate in words.
+def run_sweep(sweep: Sweep, step: Step) -> tuple[Ensemble, Summary]:
+    """Return the ensemble of a sweep, and its times. `step` is called with the finished share and the rate in words.
 
     Raises
     ------
@@ -165,7 +156,14 @@ def run_sweep(sweep: Sweep, step: Step) -> SweepResult:
         raise
     except BadInput as error:
         raise _in_options(error) from None
-    return SweepResult(ensemble, perf_counter() - begin, last)
+    wall = perf_counter() - begin
+    rate = (last.done - last.found) / (last.elapsed or wall) if last else 0.0
+    return ensemble, {
+        "wall_time": wall,
+        "found_before": last.found if last else len(ensemble),
+        "bodies_per_second": rate,
+        "body_steps_per_second": rate * ensemble.grid.n_steps,
+    }
 
 
 def _in_options(error: BadInput) -> BadInput:
@@ -176,16 +174,14 @@ def _in_options(error: BadInput) -> BadInput:
         allowed = allowed.replace(
             "more steps between samples, or a path", "fewer samples or starts, or a folder for them, --out"
         )
-        return BadInput(argument, error.got, allowed)
     if isinstance(error, NotWritten):
         return NotWritten(argument, error.path, error.cause, allowed)
     return BadInput(argument, error.got, allowed)
 
 
-def summarize(sweep: Sweep, result: SweepResult) -> Summary:
-    """Return outcomes, drifts, spread of attitudes, and rates."""
-    ensemble, last, choice = result.ensemble, result.last, result.ensemble.choice
-    rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
+def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:
+    """Return outcomes, drifts, spread of attitudes, and times of the ensemble of a sweep."""
+    choice = ensemble.choice
     failed = sorted(ensemble.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
     drifts: dict[str, Any] = {}
@@ -219,10 +215,7 @@ def summarize(sweep: Sweep, result: SweepResult) -> Summary:
         "angle_from_mean": [
             {"t": float(ensemble.t[i]), **dict(zip(names, row, strict=True))} for i, row in zip(samples, quantiles, strict=True)
         ],
-        "wall_time": result.wall,
-        "found_before": last.found if last else len(ensemble),
-        "bodies_per_second": rate,
-        "body_steps_per_second": rate * ensemble.grid.n_steps,
+        **times,
     }
 
 
