@@ -73,16 +73,9 @@ TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
 
 
-@dataclass(frozen=True)
-class RandomStudy(Study):
-    """The study of random bodies; `drawn` are the field, seed and index of each scene."""
-
-    drawn: tuple[Drawn, ...] = ()
-
-
 def random_study(
     methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False, processes: int = 1
-) -> RandomStudy:
+) -> Study:
     """Return the study of `bodies` random bodies in each field. The first bodies do not depend on the number.
 
     Raises
@@ -95,7 +88,7 @@ def random_study(
     scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
     drawn = tuple(Drawn(*place) for place in places)
     find = remember_truths(confirm)
-    return RandomStudy("random", scenes, methods, quick, skip_missing, find, processes=processes, drawn=drawn)
+    return Study("random", scenes, methods, quick, skip_missing, find, processes=processes, drawn=drawn)
 
 
 def settings(method: Method) -> tuple[Method, ...]:
@@ -131,7 +124,7 @@ Line = list[TimedSetting]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    every = study.drawn if isinstance(study, RandomStudy) else (NOT_DRAWN,) * len(study.scenes)
+    every = study.drawn or (NOT_DRAWN,) * len(study.scenes)
     tell = study.count(progress, len(study.lines) + 2)
     with Processes(study.processes) as processes:
         for scene, drawn in zip(study.scenes, every, strict=True):

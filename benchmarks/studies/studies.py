@@ -73,9 +73,9 @@ def cross_studies(
 
     Those in `IN_TURN` measure times in a number of `processes`.
     """
-    truths, more = remember_truths(), {"time_limit": time_limit}
+    truths = remember_truths()
     return tuple(
-        Study(name, scenes, methods, quick, skip_missing, truths, processes=processes if name in IN_TURN else 1, **more)
+        Study(name, scenes, methods, quick, skip_missing, truths, time_limit, processes if name in IN_TURN else 1)
         for name in names
     )
 

@@ -16,7 +16,7 @@ from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 
 from ..measures.measurement import Measurement, Samples
-from .case import Case, Success
+from .case import Case, Drawn, Success
 from .selection import series
 from .time_limit import attempt_here, attempt_within
 
@@ -59,6 +59,8 @@ class Study:
         Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
     processes
         Number of processes that time the same runs in turn, for an interval of each ratio; see `measures.processes`.
+    drawn
+        The random body that each scene is; empty for other scenes.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class Study:
     truth: FindTruth = field(default_factory=remember_truths)
     time_limit: float | None = None
     processes: int = 1
+    drawn: tuple[Drawn, ...] = ()
 
     @property
     def rounds(self) -> int:
