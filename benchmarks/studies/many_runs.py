@@ -17,7 +17,7 @@ from conservative.methods.many import Block, RunMany
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.worker.client import time_limit
 
-from ..measures.timing import wall_time
+from ..measures.timing import Preparation, wall_time
 from .case import outcome_of_error
 from .selection import takes_exact_steps
 
@@ -103,18 +103,12 @@ class _Loop:
         return sum(wall_time(run, calls) for run in own) if own else wall_time(self.__call__, calls)
 
 
-@dataclass(frozen=True, eq=False)
-class ManyDone:
-    """A run of many bodies that can be called again: its result, and the cost of its preparation and of a call, s."""
-
-    run: RunBlocks
-    block: Block
-    prepare: float
-    spent: float
+ManyDone = tuple[RunBlocks, Block, Preparation]
+"""A run of many bodies that can be called again, its result, and the cost of its preparation and of its second call."""
 
 
 def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
-    """Return the run of bodies after two calls, the second one timed, or the outcome of its failure (`outcome_of_error`)."""
+    """Return the run of bodies after two calls, or the outcome of its failure (`outcome_of_error`)."""
     if reason := way.method.unsupported(bodies.take(0)):
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     try:
@@ -124,7 +118,7 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
                 run = RunBlocks(way, bodies, grid)
                 if (spent := perf_counter() - start) <= COMPILED:
                     break
-            return ManyDone(run, run(), spent, wall_time(run))
+            return run, run(), Preparation(spent, wall_time(run))
     except Exception as error:
         return outcome_of_error(way.method, error, skip_missing)
 

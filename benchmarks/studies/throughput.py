@@ -208,11 +208,12 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
             if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
                 break  # at any tolerance
             continue
+        _, block, cost = done
         with np.errstate(all="ignore"):  # too long a step can overflow
-            off = angle_between(kind.truth, done.block.R_WB).max(axis=1)
-        off = np.where(done.block.finished & np.isfinite(off), off, math.pi)
+            off = angle_between(kind.truth, block.R_WB).max(axis=1)
+        off = np.where(block.finished & np.isfinite(off), off, math.pi)
         errors = {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
-        line.append(BatchSetting(chosen, case, errors, done.spent / n, done.prepare / n))
+        line.append(BatchSetting(chosen, case, errors, cost.first_call / n, cost.prepare / n))
         values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
         yield from case.rows(values, detail=EXACT if exact else "")
     return line
@@ -245,7 +246,7 @@ def time_rows(
             ready[point] = done
             prepares[point] = partial(prepare_drawn, point.way, point.case.drawn, size, keep_end(point.case.grid))
     timings = processes.time(
-        {point: done.run for point, done in ready.items()},
+        {point: run for point, (run, *_) in ready.items()},
         prepares,
         limit=study.hang_limit * (1 + len(ready)),
         rounds=QUICK_ROUNDS if study.quick else ROUNDS,
@@ -254,7 +255,7 @@ def time_rows(
     )
     timed = []
     for point, each in timings.items():
-        case, timing, prepare = point.case, each[0], ready[point].prepare / size
+        case, timing, prepare = point.case, each[0], ready[point][2].prepare / size
         yield from case.time_rows(Measure.TIME, each, size * DURATION)
         if timing.outcome.ok and tolerance_setting(case.method):
             yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
