@@ -37,7 +37,10 @@ def list_methods(names: list[str], project: str = "") -> Answer:
     listed.
     """
     families: dict[str, Any] = dict(registry.list_families())
-    registered = {each.name for each in entry_points(group="conservative.methods") if _is_of(each.dist, project)}
+    registered = set()
+    for each in entry_points(group="conservative.methods"):
+        if each.dist and re.sub(r"[-_.]+", "-", each.dist.name).lower() == project:
+            registered.add(each.name)
     with suppress(ImportError):  # a version without programs
         from conservative.programs import list_programs
 
@@ -55,10 +58,6 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
     return {"methods": [describe(method) for method in methods]}
-
-
-def _is_of(distribution: Any, project: str) -> bool:
-    return re.sub(r"[-_.]+", "-", distribution.name if distribution else "").lower() == project
 
 
 def _suite_settings(family: Any) -> tuple[Method, ...]:

@@ -200,8 +200,7 @@ def compare_projects(
 
 def judge(comparison: ProjectComparison) -> Verdict:
     """Return the verdict on the last step of a comparison: the gate's on values, and rows that are slower."""
-    base, head = comparison.versions[-2:]
-    steps = [(line, line.results[-2], line.results[-1]) for line in comparison.lines]
+    (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
     verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
