@@ -6,8 +6,7 @@ import gc
 import math
 import random
 import statistics
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Any, TypeVar
@@ -87,7 +86,14 @@ def time_interleaved(
     """
     positive_integer("rounds", rounds)
     positive_number("min_time", min_time, "a finite duration above 0, s")
-    timed = {name: _TimedRun(run, min_time, budget) for name, run in runs.items()}
+    calls: dict[Key, int] = dict.fromkeys(runs, 1)
+    taken: dict[Key, list[float]] = {name: [] for name in runs}
+    failed: dict[Key, Outcome] = {}
+    for name, run in runs.items():
+        try:
+            calls[name] = count_calls(run, min_time)
+        except IntegrationFailed as failure:
+            failed[name] = failure.outcome
     shuffled = random.Random(seed)
     collects = gc.isenabled()
     gc.collect()
@@ -95,42 +101,21 @@ def time_interleaved(
     try:
         for _ in range(rounds):
             for name in shuffled.sample(list(runs), len(runs)):
-                timed[name].take_sample()
+                times = taken[name]
+                affordable = len(times) < MIN_ROUNDS or sum(times) * (1 + 1 / len(times)) * calls[name] <= budget
+                if affordable and name not in failed:
+                    try:
+                        times.append(wall_time(runs[name], calls[name]) / calls[name])
+                    except IntegrationFailed as failure:
+                        failed[name] = failure.outcome
     finally:
         if collects:
             gc.enable()
-    return {name: each.timing() for name, each in timed.items()}
-
-
-class _TimedRun:
-    """Takes samples of a run within its budget, until it fails."""
-
-    def __init__(self, run: Callable[[], Any], min_time: float, budget: float) -> None:
-        self._run, self._budget = run, budget
-        self._taken: list[float] = []
-        self._calls, self._outcome = 1, OK
-        with self._noting_failure():
-            self._calls = count_calls(run, min_time)
-
-    def take_sample(self) -> None:
-        """Take one more sample."""
-        taken = self._taken
-        affordable = len(taken) < MIN_ROUNDS or sum(taken) * (1 + 1 / len(taken)) * self._calls <= self._budget
-        if affordable and self._outcome.ok:
-            with self._noting_failure():
-                taken.append(wall_time(self._run, self._calls) / self._calls)
-
-    def timing(self) -> Timing:
-        """Return the result."""
-        values = self._taken if self._outcome.ok else [math.nan]
-        return Timing(min(values), statistics.median(values), len(self._taken), self._calls, self._outcome)
-
-    @contextmanager
-    def _noting_failure(self) -> Iterator[None]:
-        try:
-            yield
-        except IntegrationFailed as failure:
-            self._outcome = failure.outcome
+    known = {name: [math.nan] if name in failed else times for name, times in taken.items()}
+    return {
+        name: Timing(min(times), statistics.median(times), len(taken[name]), calls[name], failed.get(name, OK))
+        for name, times in known.items()
+    }
 
 
 @dataclass(frozen=True)
