@@ -34,11 +34,9 @@ from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, names_of
 from ..studies.selection import tolerance_setting
-from ..studies.study import HANG_LIMIT
+from ..studies.study import HANG_LIMIT, Progress
 from ..studies.time_limit import attempt_here
 from .probe import RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
-
-Progress = Callable[[float, str], None]
 
 COST_LIMIT = 1.0
 """Wall time per simulated second, s/s, that a setting may cost: real time."""

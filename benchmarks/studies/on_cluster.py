@@ -42,7 +42,7 @@ def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterato
         futures: list[Future[list[Finding]]] = [executor.submit(_find_all, part) for part in parts]
         try:
             for done, future in enumerate(futures):
-                progress(done, len(parts), parts[done].scenes[0].name)
+                progress(done / len(parts), parts[done].scenes[0].name)
                 yield from future.result()
         finally:
             for future in futures:

@@ -46,7 +46,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     figures = {BRICK: yield_brick, TOP: yield_top}
     names = [scene.name for scene in study.scenes if scene.name in figures]
     for k, name in enumerate(names):
-        progress(k, len(names), f"{name}: the paper's figure")
+        progress(k / len(names), f"{name}: the paper's figure")
         yield from figures[name](study.name)
 
 

@@ -91,7 +91,7 @@ def list_hard_studies(
     )
 
 
-def findings(study: Study, progress: Progress = lambda done, total, what: None) -> Iterator[Finding]:
+def findings(study: Study, progress: Progress = lambda share, what: None) -> Iterator[Finding]:
     """Yield rows and samples of a study as they are measured.
 
     Raises

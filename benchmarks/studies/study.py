@@ -20,8 +20,8 @@ from .case import Case, Drawn, Success
 from .selection import series
 from .time_limit import attempt_here, attempt_within
 
-Progress = Callable[[int, int, str], None]
-"""Called before each piece of work with the number of finished pieces, of all pieces, and a description of the next."""
+Progress = Callable[[float, str], None]
+"""Called before each piece of work with the finished share of all work, 0 to 1, and a description of the next piece."""
 MOST_TRUTHS = 32
 """Number of cached reference solutions: about six for each scene of a report."""
 HANG_LIMIT = 60.0
@@ -127,8 +127,8 @@ class Study:
 
     def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
         """Return a function to be called with what comes next, before each of `per_scene` pieces of work for each scene."""
-        done = itertools.count()
-        return lambda what: progress(next(done), len(self.scenes) * per_scene, what)
+        done, total = itertools.count(), len(self.scenes) * per_scene
+        return lambda what: progress(next(done) / total, what)
 
     def __post_init__(self) -> None:
         for argument in ("scenes", "methods"):

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
+from ..studies.study import Progress
 from .version import Version
 
 Result = TypeVar("Result")
 Measured = TypeVar("Measured", covariant=True)
 Times = TypeVar("Times")
-Tell = Callable[[float, str], None]
-"""Called with the share of the work that is done, and the name of the next step."""
 TIMING = 0.5
 """Share of the work that is done when the timing begins."""
 
@@ -53,7 +52,7 @@ class Comparison(Generic[Result, Times]):
 
 
 def compare(
-    sides: Sequence[Side[Result]], scenes: Sequence[str], tell: Tell = lambda share, what: None
+    sides: Sequence[Side[Result]], scenes: Sequence[str], tell: Progress = lambda share, what: None
 ) -> Comparison[Result, Times]:
     """Return the comparison of two or more versions, in their order, on registered scenes; without times."""
     lines: list[Line[Result, Times]] = []

@@ -28,8 +28,8 @@ from ..studies import selection, step_ladder
 from ..studies.case import Case, Success
 from ..studies.line import LinePoint, measure_line
 from ..studies.speed import keep_end, make_timed, shorten
-from ..studies.study import Study
-from .comparison import TIMING, Comparison, Line, Tell, compare
+from ..studies.study import Progress, Study
+from .comparison import TIMING, Comparison, Line, compare
 from .version import Version
 
 MORE_STEPS = (0, 1, 2)
@@ -237,7 +237,7 @@ def require_several(versions: list[str]) -> None:
         )
 
 
-def compare_engine(sides: Sequence[EngineSide], tell: Tell) -> EngineComparison:
+def compare_engine(sides: Sequence[EngineSide], tell: Progress) -> EngineComparison:
     """Return the comparison of versions of an engine: all settings on all scenes in all versions."""
     study = sides[0].study
     scenes = {scene.name: scene for scene in study.scenes}

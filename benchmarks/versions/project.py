@@ -32,10 +32,10 @@ from ..gate.baseline import update_baseline
 from ..gate.compare import Verdict, Violation
 from ..gate.results import Results, Row, Status, find_runaway
 from ..studies.selection import StandIn
-from ..studies.study import FindTruth, remember_truths
+from ..studies.study import FindTruth, Progress, remember_truths
 from ..suite import points
 from . import inside
-from .comparison import Comparison, Line, Tell, compare
+from .comparison import Comparison, Line, compare
 from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Version
 
@@ -166,7 +166,7 @@ def compare_projects(
     scenes: Sequence[str] = points.SCENES,
     methods: Sequence[str] = (),
     processes: int = PROCESSES,
-    tell: Tell = lambda share, what: None,
+    tell: Progress = lambda share, what: None,
 ) -> ProjectComparison:
     """Return the comparison of an earlier and a later version of a project, with a number of processes of each for times.
 

@@ -23,7 +23,8 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 
-from .comparison import TIMING, Tell
+from ..studies.study import Progress
+from .comparison import TIMING
 
 SLOWER = 0.05
 """Fraction by which a row may become slower."""
@@ -99,7 +100,7 @@ def compare_times(
     head: Process,
     rows: Sequence[Timed],
     processes: int = PROCESSES,
-    tell: Tell = lambda share, what: None,
+    tell: Progress = lambda share, what: None,
 ) -> dict[Timed, TimeRow]:
     """Return the times of two versions; rows that are slower are measured again."""
     clock = Clock(base, head, tell)
@@ -129,7 +130,7 @@ def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
 class Clock:
     """Measures rows in new processes each time. `failures` has the reasons of rows without times."""
 
-    def __init__(self, base: Process, head: Process, tell: Tell = lambda share, what: None) -> None:
+    def __init__(self, base: Process, head: Process, tell: Progress = lambda share, what: None) -> None:
         self._sides, self._tell = (base, head), tell
         self._work: dict[Timed, tuple[int, int]] = {}
         self.failures: dict[Timed, str] = {}

@@ -100,7 +100,7 @@ def study(
         made = provenance().facts
         announce(f"study {name.replace('_', ' ')}")
         with progress() as step:
-            measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
+            measured = measure_study(planned, step, scheduler)
         document = build(name, measured, made)
         write(document, csv=lambda: measured.table.to_csv(index=False, lineterminator="\n"))
     show(document, as_json)

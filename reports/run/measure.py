@@ -45,8 +45,8 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
         title = f"study {i + 1} of {len(plan.studies)}, {study.name.replace('_', ' ')}"
         announce(title)
 
-        def tell(done: int, total: int, what: str, i: int = i, title: str = title) -> None:
-            step((i + done / total) / len(plan.studies), f"{title}: {what}")
+        def tell(share: float, what: str, i: int = i, title: str = title) -> None:
+            step((i + share) / len(plan.studies), f"{title}: {what}")
 
         checkpoint.store(study.name, studies.findings(study, tell))
     return Measurements.of(finding for name in plan.names for finding in checkpoint.results[name].findings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -25,6 +25,8 @@ from conservative.integration.store import find_ensemble
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
+from ..terminal.progress import Step
+
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
 _SPREAD = "what varies, and how, such as attitude=5deg, rate=2%, inertia=1% or potential.weight=2%"
@@ -34,7 +36,6 @@ MOST_TIMES = 6
 """Largest number of times in the summary of the spread of attitudes."""
 MOST_FAILURES = 10
 """Largest number of failures in a summary."""
-Step = Callable[[float, str], None]
 Summary = dict[str, Any]
 _OPTIONS = {"path": "out", "sample_every": "samples", "client": "scheduler", "n": "starts"}
 """Arguments of `integrate_many` and `spread`, and their options."""

@@ -154,7 +154,7 @@ def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
     found = list(on_cluster.find_on_cluster("", study, lambda *each: told.append(each)))
     assert list(map(numbers, found)) == list(map(numbers, studies.findings(study)))
     assert here.tasks == 2
-    assert told == [(0, 2, "brick_flip"), (1, 2, "symmetric_body")]
+    assert told == [(0.0, "brick_flip"), (0.5, "symmetric_body")]
 
 
 def test_every_study_is_timed_or_is_not():
