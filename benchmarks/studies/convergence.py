@@ -12,7 +12,7 @@ from ..measures.convergence_order import Order, observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from . import step_ladder
-from .case import Case, Success, drop_step
+from .case import Case, drop_step, outcome_of_error
 from .line import LinePoint, measure_line
 from .selection import Missing
 from .study import Progress, Study
@@ -42,8 +42,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 def find_no_order(study: Study, case: Case) -> Outcome | None:
     """Return the outcome of a method that has no order on a scene, otherwise None."""
     if isinstance(case.method, Missing):
-        missing = study.attempt(case)
-        return None if isinstance(missing, Success) else missing
+        return outcome_of_error(case.method, case.method.error, study.skip_missing)
     reason = case.method.unsupported(case.scene) or ("its accuracy does not depend on dt" if case.method.order is None else "")
     return Outcome(OutcomeKind.UNSUPPORTED, reason) if reason else None
 

@@ -26,7 +26,6 @@ from conservative.attitude import angle_between
 from conservative.errors import MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engines.heyoka import Heyoka
 from conservative.scene import Scene
 from conservative.scenes.random_body import FIELDS, random_body
@@ -34,7 +33,7 @@ from conservative.scenes.random_body import FIELDS, random_body
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from . import price_program
-from .case import Case
+from .case import Case, outcome_of_error
 from .selection import Missing
 from .study import Progress, Study
 
@@ -68,10 +67,8 @@ def measure_side(study: Study, scene: Scene, other: Scene, side: str, way: str, 
         method: Method = Heyoka(price_program.TOL, "base_vectors")
         truth = study.truth(scene, grid).trajectory
     except MissingEngine as error:
-        if not study.skip_missing:
-            raise
         case = Case(study.name, scene, Missing("heyoka", error=error), grid)
-        yield case.row(Value(Measure.PRICE_ONCE, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
+        yield case.row(Value(Measure.PRICE_ONCE, math.nan), outcome_of_error(case.method, error, study.skip_missing))
         return
     variables, limit = {**os.environ, "NUMBA_CACHE_DIR": cache}, 5 * study.hang_limit
     done = subprocess.run(command, env=variables, timeout=limit, check=True, capture_output=True, text=True)

@@ -38,7 +38,7 @@ from ..contest import list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
-from .case import Case, Drawn
+from .case import Case, Drawn, outcome_of_error
 from .ensembles import DURATION, KINDS, draw
 from .line import list_settings
 from .many_runs import ManyDone, RunBlocks, Way, attempt_many, list_ways
@@ -150,10 +150,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             try:
                 kind = yield from find_truth(study, scene)
             except MissingEngine as error:
-                if not study.skip_missing:
-                    raise
                 case = _case(study, scene, Missing("heyoka", error=error), SAMPLES)
-                yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
+                yield case.row(Value(Measure.AGREEMENT, math.nan), outcome_of_error(case.method, error, study.skip_missing))
                 continue
             points: list[BatchSetting] = []
             for way in ways:
