@@ -20,7 +20,7 @@ def launch() -> None:
         require_extra("conservative", "report", "click")
         from .main import main
 
-        main()
+        main(prog_name="conservative")
     except MissingExtra as missing:
         print(f"Error: {missing}", file=sys.stderr)
         sys.exit(2)

@@ -56,10 +56,6 @@ class Commands(click.Group):
                 raise _Stopped(error) from None
             raise _as_click(error) from None
 
-    def main(self, *args: Any, **kwargs: Any) -> Any:
-        kwargs.setdefault("prog_name", "conservative")
-        return super().main(*args, **kwargs)
-
 
 def _as_click(error: Exception) -> Exception:
     """Return the click exception for an error that a user can act on; other errors are bugs and show their traceback."""
