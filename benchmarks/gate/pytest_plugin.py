@@ -15,8 +15,6 @@ ROOM = Path(__file__).parents[1]
 """The package `conservative.benchmarks`; in a checkout a link to `REAL`, the folder `benchmarks` at its top."""
 REAL = ROOM.resolve()
 SUITE = ROOM / "suite"
-TIMER = "benchmark"
-"""Name under which pytest knows the plugin pytest-benchmark."""
 MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
 """The suite has many points, so each is timed for 0.1 s or two calls unless the option of pytest-benchmark is given."""
 MEASURED = pytest.StashKey[list[dict[str, Any]]]()
@@ -47,11 +45,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-def benchmarks_requested(config: pytest.Config) -> bool:
-    """Return whether benchmarks were asked for."""
-    return bool(config.getoption("conservative_benchmark"))
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """With the option and no path, run the suite; take paths of the suite by the name that it is imported under.
 
@@ -61,11 +54,11 @@ def pytest_configure(config: pytest.Config) -> None:
         pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
     """
     config.args = [_linked(text, config.invocation_params.dir) for text in config.args]
-    if not benchmarks_requested(config):
+    if not config.getoption("conservative_benchmark"):
         if config.getoption("conservative_gate"):
             raise pytest.UsageError("--gate can only be used together with --benchmark")
         return
-    if not config.pluginmanager.hasplugin(TIMER):
+    if not config.pluginmanager.hasplugin("benchmark"):  # pytest-benchmark
         advice = "Run: pip install 'conservative-rotation[gate]', and do not use -p no:benchmark"
         raise pytest.UsageError(f"--benchmark: pytest-benchmark is not loaded. {advice}")
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
@@ -83,7 +76,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     """Run benchmarks without workers, which disturb each other's times, unless the command line has a number of them."""
-    return 0 if benchmarks_requested(config) else None
+    return 0 if config.getoption("conservative_benchmark") else None
 
 
 def _linked(text: str, folder: Path) -> str:
@@ -104,7 +97,7 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Skip the suite unless benchmarks were asked for."""
-    if benchmarks_requested(config):
+    if config.getoption("conservative_benchmark"):
         return
     for item in items:
         if SUITE.resolve() in item.path.resolve().parents:
@@ -121,7 +114,7 @@ def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[st
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Show accuracy next to the times, after the table of pytest-benchmark, or the reason why nothing was timed."""
     config = terminalreporter.config
-    if not benchmarks_requested(config):
+    if not config.getoption("conservative_benchmark"):
         return
     if getattr(config.option, "dist", "no") != "no":
         terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -28,7 +28,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
-from ..gate.baseline import update_baseline
+from ..gate.baseline import COUNTS, update_baseline
 from ..gate.compare import Verdict, Violation
 from ..gate.results import Results, Row, Status, find_runaway
 from ..studies.selection import StandIn
@@ -40,7 +40,6 @@ from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Version
 
 TIME = "time of a step"
-_COUNTS = tuple(each.name for each in fields(Counters))
 _ADAPTER = str(Path(inside.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
@@ -137,7 +136,7 @@ class Remote(StandIn):
         """Return the trajectory of a scene from the states of the version."""
         if isinstance(answer, IntegrationFailed):
             return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), answer)
-        counts, failure = Counters(**{name: answer["counts"].get(name) for name in _COUNTS}), None
+        counts, failure = Counters(**{name: answer["counts"].get(name) for name in COUNTS}), None
         if answer["failure"]:
             kind, *details = answer["failure"]
             failure = IntegrationFailed("The run of this version ended")

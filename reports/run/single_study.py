@@ -91,17 +91,16 @@ def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:
     """Raise `BadInput` if an argument is given that a study does not have."""
     drawn = (studies.RANDOM, studies.THROUGHPUT)
     draws = f"nothing: only the studies {drawn[0]!r} and {drawn[1]!r} draw bodies"
-    if name in drawn:
-        refused = {"scenes": "none: the study draws its bodies; their number and seed are options"}
-    else:
-        refused = {"bodies": draws, "seed": draws}
-    if name != studies.THROUGHPUT:
-        refused["sizes"] = f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
-    if name in studies.ENGINES:
-        refused["methods"] = "none: the study is of --engines"
-    for argument, allowed in refused.items():
+    refused = (
+        ("scenes", name in drawn, "none: the study draws its bodies; their number and seed are options"),
+        ("bodies", name not in drawn, draws),
+        ("seed", name not in drawn, draws),
+        ("sizes", name != studies.THROUGHPUT, f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"),
+        ("methods", name in studies.ENGINES, "none: the study is of --engines"),
+    )
+    for argument, applies, allowed in refused:
         value = given[argument]
-        if value not in (None, (), []):
+        if applies and value not in (None, (), []):
             raise BadInput(argument, str(value) if isinstance(value, int) else ", ".join(value or ()), allowed)
 
 
