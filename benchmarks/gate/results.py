@@ -11,7 +11,7 @@ from pathlib import Path
 from conservative.errors import BadInput
 from conservative.files import make_folder, write_text
 
-from ..measures.measure import Measure, key
+from ..measures.measure import Measure, Value
 
 FOLDER = Path(".benchmarks") / "gate"
 """Path of the results of a gated run, relative to the root of the project."""
@@ -19,7 +19,7 @@ FILE = "results.json"
 HISTORY = "bencher.json"
 RUNAWAY = 1.0
 """Relative energy drift above which a run has failed, even if it ended without an error."""
-ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
+ENERGY_DRIFT = Value(Measure.DRIFT_MAX, RUNAWAY, "energy").key
 
 
 class Status(StrEnum):

@@ -83,12 +83,7 @@ class Value:
     @property
     def key(self) -> str:
         """Name in tables and in a baseline, such as `energy drift max`."""
-        return key(self.measure, self.quantity)
-
-
-def key(measure: Measure, quantity: str = "") -> str:
-    """Return the name of a measure, with the quantity of a drift: `energy drift max`."""
-    return f"{quantity} {measure.text}".lstrip()
+        return f"{self.quantity} {self.measure.text}".lstrip()
 
 
 def blanks(*measures: Measure) -> list[Value]:

@@ -12,7 +12,7 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import errors
-from conservative.benchmarks.measures.measure import Measure, key
+from conservative.benchmarks.measures.measure import Measure, Value
 from conservative.benchmarks.studies import hard_cases, selection, stability, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
@@ -119,7 +119,7 @@ METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
 def table():
     scenes = (cv.scenes.brick_flip(), cv.scenes.simo_wong_top())
     study = Study("hard_cases", scenes, METHODS, truth=truth)
-    return {(row.scene, row.method, key(row.measure, row.quantity)): row for row in studies.rows(study)}
+    return {(row.scene, row.method, Value(row.measure, row.value, row.quantity).key): row for row in studies.rows(study)}
 
 
 def test_every_measure_and_outcome_of_every_pair():

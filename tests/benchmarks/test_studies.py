@@ -5,7 +5,7 @@ import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import errors
-from conservative.benchmarks.measures.measure import Measure, key
+from conservative.benchmarks.measures.measure import Measure, Value
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
@@ -46,7 +46,7 @@ def table(name):
     """Rows of a study of three orders, by (method, dt, measure)."""
     measured = rows(name, cv.Reduced(), cv.Convected(tol=1e-12), method("scipy:rtol=1e-9"))
     assert all(row.study == name and row.scene == "generic" for row in measured)
-    return {(row.method, row.dt, key(row.measure, row.quantity)): row for row in measured}
+    return {(row.method, row.dt, Value(row.measure, row.value, row.quantity).key): row for row in measured}
 
 
 def test_paper_measures_every_method_at_three_steps():
