@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -133,12 +132,12 @@ def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool, wh
     rest = iter(values)
     while True:
         with show_waiting(what):
-            found = list(islice(rest, 1))
-        if not found:
+            value = next(rest, None)
+        if value is None:
             break
-        shown += found
+        shown.append(value)
         if not as_json:
-            click.echo(line(found[0]))
+            click.echo(line(value))
     if as_json:
         click.echo(json.render(shown))
     return shown
