@@ -233,19 +233,17 @@ def time_rows(
 
     They are time, s per simulated second, steps per second and preparation, s, each per body.
     """
-    study, ready, prepares = kind.study, dict[BatchSetting, ManyDone](), {}
+    study, ready = kind.study, dict[BatchSetting, ManyDone]()
     for point in (replace(each, case=replace(each.case, bodies=size)) for each in points):
-        done: ManyDone | Outcome | None = refuse_long(point, size, study.longest_run)
-        if done is None:
-            done = attempt_many(point.way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
+        grid, refused = keep_end(point.case.grid), refuse_long(point, size, study.longest_run)
+        done = refused or attempt_many(point.way, kind.bodies[:size], grid, study.hang_limit)
         if isinstance(done, Outcome):
             yield point.case.row(Value(Measure.TIME, math.nan), done)
         else:
             ready[point] = done
-            prepares[point] = partial(prepare_drawn, point.way, point.case.drawn, size, keep_end(point.case.grid))
     timings = processes.time(
         {point: run for point, (run, *_) in ready.items()},
-        prepares,
+        {point: partial(prepare_drawn, point.way, point.case.drawn, size, keep_end(point.case.grid)) for point in ready},
         limit=study.hang_limit * (1 + len(ready)),
         rounds=QUICK_ROUNDS if study.quick else ROUNDS,
         min_time=CALL,
