@@ -70,17 +70,17 @@ def legend(families: Families, marks: bool) -> tuple[LegendEntry, ...]:
     )
 
 
-def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
+def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420) -> list[Spec]:
     """Return a picture as the page embeds it: one specification for each of its panels.
 
-    Tooltips contain `shown`: keys of `SHOWN`, or fields with kind and title. The lines `hidden` are not drawn at first.
+    Tooltips contain `shown`: keys of `SHOWN`, or fields with kind and title.
     """
     tooltip = [SHOWN[each] if isinstance(each, str) else each for each in shown]
     whole: Spec = specification(chart)
     if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
             unit.pop("title", None)  # the caption of the figure says it
-    parameters = [{"name": HIDDEN, "value": list(hidden)}, *whole.get("params", ())]
+    parameters = [{"name": HIDDEN, "value": []}, *whole.get("params", ())]
     return [_panel(panel, whole, tooltip, height) | {"params": parameters} for panel in _panels(whole, {})]
 
 

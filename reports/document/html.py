@@ -20,7 +20,7 @@ from markupsafe import Markup, escape
 
 from .. import animation
 from . import contrast
-from .model import Cell, Document, Motion, Section, Style, Table, walk
+from .model import AT_FIRST, Cell, Document, Motion, Section, Style, Table, walk
 
 MOST_ROWS = 600_000
 """Largest length of the packed measurements in a page; longer ones are only in measurements.csv, next to the page."""
@@ -47,13 +47,14 @@ def render(document: Document) -> str:
     if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
         scripts["datatables"] = _datatables()
     rows = document.data.get("rows", ()) if isinstance(document.data, Mapping) else ()
-    if rows and any(isinstance(block, Table) and block.source for block in blocks):
+    if rows and any(isinstance(block, Table) for block in blocks):
         packed = pack(json.dumps([list(rows[0]), *(list(row.values()) for row in rows)], separators=(",", ":")))
         if len(packed) <= MOST_ROWS:
             scripts["rows"] = packed
     player = Markup(animation.script()) if any(isinstance(block, Motion) for block in blocks) else ""
     template = environment.get_template("page.html.j2")
-    return re.sub(r"\n{2,}", "\n", template.render(document=document, linked=linked, scripts=scripts, player=player)) + "\n"
+    shown = {"document": document, "linked": linked, "scripts": scripts, "player": player}
+    return re.sub(r"\n{2,}", "\n", template.render(shown, has_rows=bool(rows), at_first=AT_FIRST)) + "\n"
 
 
 def pack(text: str) -> str:

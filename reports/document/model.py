@@ -69,7 +69,7 @@ class Style(StrEnum):
     """Form of a table on the page."""
 
     SORTED = "sorted"
-    FILTERED = "filtered"  # sorted, with a search field
+    FILTERED = "filtered"  # sorted, in small print, and with a search field, which any table of more than ten rows has
     GRID = "grid"  # a matrix of small cells in two halves, whose text appears below the table
 
 
@@ -81,8 +81,6 @@ class Table:
     rows: Sequence[Row]
     caption: str = ""
     style: Style = Style.SORTED
-    source: Mapping[str, str] = field(default_factory=dict)
-    """Columns and values that select its rows in `measurements.csv`, to which the page links; empty for no link."""
 
 
 class Emphasis(StrEnum):
@@ -131,13 +129,16 @@ class Facts:
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A button of a legend: the line, its colour, its mark as an SVG outline or its dash, and whether it is drawn at first."""
+    """A button of a legend: the line, its colour, and its mark as an SVG outline or its dash."""
 
     name: str
     colour: str
     path: str
     dash: str
-    shown: bool = True
+
+
+AT_FIRST = 8
+"""Largest number of lines that a figure on the page shows until a reader adds others."""
 
 
 class Layout(StrEnum):
@@ -164,7 +165,7 @@ class Figure:
     panels
         The Vega-Lite specifications that the page draws; None for a figure of Markdown alone.
     legend, layout
-        Buttons below the panels, and the arrangement of these.
+        Buttons below the panels, the first `AT_FIRST` of which are on at first, and the arrangement of the panels.
     """
 
     name: str
@@ -195,6 +196,8 @@ class Section:
     menu: str = ""
     folded: bool = False
     """True if the page shows only the title until a reader opens it."""
+    source: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
+    """Columns and values that select the rows of its tables in `measurements.csv`, within those of the section around it."""
 
 
 Block = Paragraph | Items | Facts | Table | Figure | Motion | Section

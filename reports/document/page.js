@@ -99,10 +99,10 @@
       event.preventDefault();
       const [columns, ...rows] = JSON.parse(await unpack("rows")), wanted = Object.entries(JSON.parse(link.dataset.rows));
       const text = (value) => (/[",\n]/.test(value ?? "") ? `"${value.replaceAll('"', '""')}"` : value ?? "");
-      const found = rows.filter((row) => wanted.every(([name, value]) => row[columns.indexOf(name)] === value));
+      const found = rows.filter((row) => wanted.every(([name, value]) => [value].flat().includes(row[columns.indexOf(name)])));
       const file = new Blob([[columns, ...found].map((row) => row.map(text).join(",")).join("\n"), "\n"], { type: "text/csv" });
       link.href = URL.createObjectURL(file);
-      link.download = `${wanted.map(([, value]) => value).join("_")}.csv`;
+      link.download = `${wanted.flatMap(([, value]) => value).join("_") || "measurements"}.csv`;
       link.click();
     });
   }
@@ -110,6 +110,7 @@
   for (const figure of figures) {
     const entries = [...figure.querySelectorAll(".entry")];
     const show = () => set(figure, "hidden", entries.filter((e) => e.ariaPressed === "false").map((e) => e.dataset.series));
+    show();
     const press = (some, on) => { some.forEach((e) => { e.ariaPressed = String(on); }); show(); };
     entries.forEach((entry) => entry.addEventListener("click", () => press([entry], entry.ariaPressed === "false")));
     figure.querySelector(".all")?.addEventListener("click", () => press(entries, true));

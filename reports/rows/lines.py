@@ -19,6 +19,8 @@ from conservative.trajectory import Trajectory
 from .names import of_measure, of_study, with_outcome
 
 ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
+SURE = 0.5
+"""Largest standard error of an order in a short table. Above it, the fit does not tell the order from the next one."""
 ANALYTICAL = "analytical"
 """Name of the exact motion in the paper's figure 2."""
 
@@ -116,6 +118,12 @@ def fits(errors: pd.DataFrame) -> pd.DataFrame:
         rows.append((*key, order.slope, order.stderr, order.floor, len(used), text, order.reason, *ends))
     columns = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")
     return pd.DataFrame(rows, columns=[*keys, *columns])
+
+
+def orders(rows: pd.DataFrame) -> pd.Series[float]:
+    """Return the observed order of each method by its name, without those whose standard error is above `SURE`."""
+    order, error = (of_measure(rows, each).groupby("method")["value"].last() for each in (Measure.ORDER, Measure.ORDER_STDERR))
+    return order[~(error.reindex(order.index) > SURE)]
 
 
 def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:

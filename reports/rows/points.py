@@ -87,8 +87,6 @@ def front(points: pd.DataFrame) -> pd.DataFrame:
 
 
 COLUMNS = ("name", "family", "class", "setting", "error", "time", "sample", "dt", "within")
-AT_FIRST = 8
-"""Largest number of lines that a picture shows at first."""
 SAME = 0.01
 """Relative difference of two values that a picture does not show."""
 
@@ -112,8 +110,8 @@ def joined(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COLUMNS))
 
 
-def first_names(picture: pd.DataFrame) -> tuple[str, ...]:
-    """Return the families that a picture shows at first: the best of our integrators, physics engines and solvers in turn.
+def names_in_turn(picture: pd.DataFrame) -> tuple[str, ...]:
+    """Return the families in the order of a legend: the best of our integrators, physics engines and solvers in turn.
 
     Our closed forms come last, as they solve integrable motions only.
     """
@@ -122,7 +120,7 @@ def first_names(picture: pd.DataFrame) -> tuple[str, ...]:
     turns = (MethodClass.GENERAL, MethodClass.ENGINE, MethodClass.SOLVER)
     sides = [[name for _, name in ranked if classes[name] == kind] for kind in turns]
     rest = [name for _, name in ranked if classes[name] not in turns]
-    return tuple([name for each in zip_longest(*sides) for name in each if name] + rest)[:AT_FIRST]
+    return tuple([name for each in zip_longest(*sides) for name in each if name] + rest)
 
 
 def _rank(line: pd.DataFrame) -> tuple[int, float]:

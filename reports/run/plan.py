@@ -19,6 +19,9 @@ MAIN_TIME_LIMIT = 0.15
 """Time budget of a run, s, in a default report, which then takes a minute; the default of `Study` is used in a full report."""
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""
+FEW_METHODS = ("taylor:order=12", "heyoka:frame=lean", "mujoco")
+"""Methods on the random bodies of a default report, one in each field. Kernels of each further method of ours compile for ten
+seconds in five fields."""
 
 
 @dataclass(frozen=True)
@@ -72,15 +75,15 @@ def plan_report(
     scenes, methods, engines
         Names. Default: the paper's two scenes, `selection.main_methods` (all registered methods if `full`), no engine.
     full
-        True if everything is measured: random bodies, many bodies, hard cases, stability and the paper's figures as well.
+        True if everything is measured: more random bodies, many bodies, hard cases, stability and the paper's figures as well.
     quick, skip_missing, time_limit
         See `Study`. A quick report has no study of hard cases or of many bodies. The default limit is `MAIN_TIME_LIMIT` for the
         scenes, unless `full`.
     png
         True if pictures are also written as PNG.
     bodies, seed
-        Random bodies in each field, and their seed. Default: none; if `full` and no scene is named `BODIES`, or `QUICK_BODIES`
-        if `quick`.
+        Random bodies in each field, and their seed. Default if no scene is named: if `full` `BODIES`, or `QUICK_BODIES` if
+        `quick`; in a default report one, of `FEW_METHODS` with few steps. Otherwise none.
 
     Raises
     ------
@@ -92,10 +95,11 @@ def plan_report(
     if time_limit is not None:
         positive_number("time_limit", time_limit, "a finite duration above 0, s")
     names, methods = tuple(scenes), tuple(methods)
+    few = bodies is None and not (names or methods or full or quick)
     if bodies is None:
-        bodies = 0 if names or not full else QUICK_BODIES if quick else BODIES
+        bodies = 1 if few else 0 if names or not full else QUICK_BODIES if quick else BODIES
     chosen = selection.scenes(names) if names else selection.scenes()
-    every = selection.methods(methods or None, skip_missing) if methods or full or bodies else ()
+    every = selection.methods(methods or None, skip_missing) if methods or full or (bodies and not few) else ()
     compared = every if methods or full else selection.main_methods(skip_missing)
     named = engine_selection.select_engines(engines, skip_missing) if (engines := tuple(engines)) else ()
     if not skip_missing:
@@ -104,8 +108,9 @@ def plan_report(
     made: list[Study] = []
     # Random bodies come first, as on the page. Methods that do not support them are not part of the study.
     processes = PROCESSES if full and not quick else 1
-    if bodies and (drawn := random.select(every)):
-        made.append(random.random_study(drawn, bodies, seed, quick, skip_missing, processes))
+    drawn = tuple(method for method in compared if method.name in FEW_METHODS) if few else random.select(every)
+    if bodies and drawn:
+        made.append(random.random_study(drawn, bodies, seed, quick or few, skip_missing, processes))
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)

@@ -21,8 +21,6 @@ _OWN = (
     "`conservative recommend my_body.toml --error 1e-6`. In Python, `cv.integrate(scene, error=1e-6)` chooses method and step."
 )
 
-_MORE = "`conservative report --bodies 3` adds random bodies in fields to this page."
-
 
 def section(measured: Measured) -> Section:
     """Return the section."""
@@ -42,12 +40,13 @@ def section(measured: Measured) -> Section:
                     command = f"conservative run {scene.name} -m {best['method']} --dt {best['dt']:.10g}"
                     rows.append([scene.name, tolerance(each.error), each.ours.name, cost, engine, contest_cell(each), command])
     general, closed = families.values()
-    parts = [f"Take `{mode(family for _, family in general)}` for bodies in general."] if general else []
+    parts = [f"Take `{mode(family for _, family in general)}` for any body."] if general else []
     if closed:
         names = " and ".join(f"`{family}` ({scene})" for scene, family in closed)
-        parts.append(f"Closed forms have no truncation error, but each solves only its motions: {names}.")
-    random = random_bodies.sentence(measured.ratios) if measured.ratios else _MORE
-    caption = "Fastest of our methods at each attitude error, final state only; ✗: the engine is faster"
-    table = Table(HEADER, rows, caption, source={"study": "work_precision"})
+        parts.append(f"Closed forms are exact to round-off, but each solves only some motions: {names}.")
+    random = random_bodies.sentence(measured.ratios) if measured.ratios else ""
+    caption = "Our fastest method at each attitude error. Only the final state is stored. ✗: the engine is faster."
+    table = Table(HEADER, rows, caption)
     lead = Paragraph(" ".join(parts), Emphasis.LEAD) if parts else None
-    return Section("What to use", filled(lead, Paragraph(f"{_OWN} {random}"), table), "use", "What to use")
+    blocks = filled(lead, Paragraph(f"{_OWN} {random}".strip()), table)
+    return Section("What to use", blocks, "use", "What to use", source={"study": "work_precision"})

@@ -12,14 +12,16 @@ from conservative.method import Role
 
 from ..document.cells import DASH, factor, number, tolerance
 from ..document.model import Table
+from ..rows import lines
 from ..rows.names import of_measure, of_study
 from .summary import MIDDLE
 
 HEADER = ("method", "energy", "momentum", "attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
 LEGEND = (
     "energy, momentum: largest relative drift; attitude: largest error, rad; all at the scene's own step, or at the default "
-    f"tolerance. order: measured order of convergence. µs at {tolerance(MIDDLE)}: wall time per simulated second at an "
-    f"attitude error of {tolerance(MIDDLE)} rad. {DASH}: not measurable, or not reached."
+    f"tolerance. order: measured order of convergence, if its standard error is at most {lines.SURE:g}. µs at "
+    f"{tolerance(MIDDLE)}: wall time per simulated second at an attitude error of {tolerance(MIDDLE)} rad. {DASH}: not "
+    "measurable, or not reached."
 )
 
 
@@ -32,7 +34,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
     accuracy = of_study(table, "paper", scene)
     accuracy = accuracy[(accuracy["role"] != Role.TRUTH.value) & accuracy["value"].notna()]
     times = costs(points, [MIDDLE], ["series"]).set_index("series")["time"]
-    orders = of_measure(of_study(table, "convergence", scene), Measure.ORDER).set_index("method")["value"]
+    orders = lines.orders(of_study(table, "convergence", scene))
     steps = of_measure(of_study(table, "speed", scene), Measure.TIME_PER_STEP).set_index("method")["value"]
     body = []
     for series, line in accuracy.groupby("series", sort=False):

@@ -114,14 +114,15 @@ def section(measured: Measured) -> Section:
                 f"{scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
                 f"relative: ✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more."
             )
-            blocks.append(Section(f"{name}: as installed, and at its best", [Paragraph(about), side_by_side(rows, name)]))
+            sides: list[Block] = [Paragraph(about), side_by_side(rows, name)]
+            blocks.append(Section(f"{name}: as installed, and at its best", sides, source={"scene": name}))
             drawn = picture_points(rows, of_scene(points, name))
             none = Paragraph("No run was close enough to the motion to be timed.")
             blocks.append(Section(f"{name}: work against precision", [figure(drawn, name) if len(drawn) else none]))
-        blocks.append(Section(f"{name}: every setting", [every_setting(rows, dt, name)]))
+        blocks.append(Section(f"{name}: every setting", [every_setting(rows, dt, name)], source={"scene": name}))
     blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
-    return Section("Engines", blocks, "engines")
+    return Section("Engines", blocks, "engines", source={"study": ENGINES})
 
 
 def tables(measured: Measured) -> list[Table]:
@@ -154,8 +155,8 @@ def figure(points: pd.DataFrame, scene: str) -> Figure:
     summary = f"{len(points)} measured runs of {engines} engines; solid lines at their best, dashed ones as installed."
     picture = figures.engines(points, scene)
     panels = vega_embed.embed(picture, ("name", "kind", "setting", "error", "microseconds", "dt"), 520)
-    looks = figures.engine_looks(points["name"]).items()
-    legend = [LegendEntry(name, colour, vega_embed.PATHS[mark], "") for name, (colour, mark) in looks]
+    looks, accurate_first = figures.engine_looks(points["name"]), points.groupby("name")["error"].min().sort_values().index
+    legend = [LegendEntry(name, looks[name][0], vega_embed.PATHS[looks[name][1]], "") for name in accurate_first]
     return Figure(f"engines_{scene}", f"{scene}: engines, wall time against attitude error", summary, picture, panels, legend)
 
 

@@ -33,8 +33,9 @@ def sections(table: pd.DataFrame) -> list[Section]:
         f"run failed; {DASH}: not supported, or nothing to judge."
     )
     cases, steps = hard_cases(table), stability(table)
-    judged = Section("Hard cases", [Paragraph(words), cases], "hard-cases") if cases else None
-    return [each for each in (judged, Section("Stability", [steps], "stability") if steps else None) if each]
+    judged = Section("Hard cases", [Paragraph(words), cases], "hard-cases", source={"study": "hard_cases"}) if cases else None
+    longest = Section("Stability", [steps], "stability", source={"study": "stability"}) if steps else None
+    return [each for each in (judged, longest) if each]
 
 
 def hard_cases(table: pd.DataFrame) -> Table | None:

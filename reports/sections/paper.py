@@ -24,7 +24,8 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         words = "The top's centre of mass for two steps, and exact. The tables of drift above show what the map conserves."
         title = "Figure 2 of the paper: centre of mass of the top"
         figures.append(Figure("paper_figure_2", title, words, *paper.figure_2(positions), Layout.PANELS))
-    return Section("The paper's figures, drawn again", filled(*figures, position_errors(table)), "paper", "The paper")
+    blocks = filled(*figures, position_errors(table))
+    return Section("The paper's figures, drawn again", blocks, "paper", "The paper", source={"study": "paper_figures"})
 
 
 def position_errors(table: pd.DataFrame) -> Table | None:

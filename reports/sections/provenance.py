@@ -16,10 +16,14 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     others = Section("Every other package", [Paragraph(", ".join(packages))], folded=True)
     locks = Section("Environments of engines", lock_sections(source.environments), folded=True)
     processes = max((study.processes for study in plan.studies), default=1)
-    kind = "A quick report: fewer steps and fewer rounds of timing." if plan.quick else "Rounds of timing are interleaved."
+    kind = "A quick report has fewer steps and fewer rounds of timing. " if plan.quick else ""
     timing = f"{processes} processes in turn" if processes > 1 else "one process, so ratios are rough"
     resumed = " It was interrupted and resumed: compare times only within one study." if source.resumed else ""
-    words = f"{kind} Times are the fastest of each method's own loop, final state only, measured by {timing}.{resumed}"
+    words = (
+        f"{kind}Methods are timed in turn, in rounds. A time is that of the fastest round of the method's own loop, which "
+        f"stores the final state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent "
+        "one confirms. All tables are below, behind a click."
+    )
     facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
     facts += [("versions", ", ".join(f"{name} {version}" for name, version in source.compared.items()))]

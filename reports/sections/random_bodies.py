@@ -105,7 +105,7 @@ def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str =
         figure = Figure("random_bodies", title, words, picture, panels, layout=Layout.PAIRS)
     terms = Paragraph(TERMS, Emphasis.NOTE)
     blocks = filled(Paragraph(f"{drawn} {about}"), figure, as_table(ratios), by_engine(ratios), terms)
-    return Section("Random bodies", blocks, "random", "Random bodies")
+    return Section("Random bodies", blocks, "random", "Random bodies", source={"study": RANDOM})
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:

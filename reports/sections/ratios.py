@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from conservative.benchmarks.contest import Contest, costs
+from conservative.benchmarks.studies.studies import RANDOM
 
 from ..document.cells import DASH, grade_ratio, tolerance
 from ..document.model import Cell, Emphasis, Grade, Paragraph, Row, Section, Style, Table
@@ -10,7 +11,7 @@ from ..rows.names import MethodClass
 from ..rows.points import DECADES
 from .measured import Measured
 from .random_bodies import ANY, RandomRatios
-from .scene_contests import sides
+from .scene_contests import STUDY, sides
 
 _RATIOS = (
     "The time of the fastest engine divided by that of our fastest method, at each decade of the largest attitude error. "
@@ -24,7 +25,8 @@ _RATIOS = (
 
 def section(measured: Measured) -> Section:
     """Return the section."""
-    return Section("Where an engine is faster", [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)], "ratios")
+    source, terms = {"study": (RANDOM, "work_precision", STUDY)}, Paragraph(_RATIOS, Emphasis.NOTE)
+    return Section("Where an engine is faster", [ratio_table(measured), terms], "ratios", source=source)
 
 
 def ratio_table(measured: Measured) -> Table:
@@ -56,7 +58,6 @@ def ratio_table(measured: Measured) -> Table:
         body,
         caption,
         Style.FILTERED,
-        {"study": "work_precision"},
     )
 
 

@@ -51,7 +51,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
     if plan.engines:
         details.append(engines.section(measured))
-    details += [part.section(measured.rows, measured.samples) for name, part in SECTIONS.items() if name in plan.names]
+    for name, part in SECTIONS.items():
+        if name in plan.names:
+            details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
     details += hard_cases.sections(rows)
     details += filled(paper.section(rows, measured.samples), failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]

@@ -58,26 +58,29 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         Paragraph(SAMPLE_TERMS, Emphasis.NOTE),
     ]
     if decades.rows:
-        work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))
+        source = {"study": ("work_precision", scene_contests.STUDY)}
+        work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True, source=source))
     errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     fits = lines.fits(errors)
     orders = filled(order(fits, lines.fits(rate_errors), name), accuracy(rows, name))
     curves = spheres_figure(measured, scene)
+    long_times = filled(drift_figure(measured, scene), Paragraph(drift_words), conservation(rows, name))
     return Section(
         f"All tables of {name}",
         filled(
             Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
             Section("Work against precision", work),
-            Section("Drift over time", filled(drift_figure(measured, scene), Paragraph(drift_words), conservation(rows, name))),
-            Section("Drift at the scene's own step", filled(drift(rows, name)), folded=True),
+            Section("Drift over time", long_times, source={"study": "long_runs"}),
+            Section("Drift at the scene's own step", filled(drift(rows, name)), folded=True, source={"study": "paper"}),
             Section("Convergence", [_convergence_figure(errors, fits, name), Paragraph(order_words)]),
-            Section("Orders and errors as tables", orders, folded=True),
-            Section("Wall time", [Paragraph(time_words), time(rows, name)]),
+            Section("Orders and errors as tables", orders, folded=True, source={"study": ("convergence", "paper")}),
+            Section("Wall time", [Paragraph(time_words), time(rows, name)], source={"study": "speed"}),
             Section("The motion itself", [curves]) if curves else None,
         ),
         name,
         folded=True,
+        source={"scene": name},
     )
 
 

@@ -7,13 +7,15 @@ from collections.abc import Mapping
 import pandas as pd
 
 from conservative.benchmarks.contest import cheapest, costs
+from conservative.benchmarks.studies.studies import RANDOM
+from conservative.scenes.random_body import FIELDS
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours
 from ..document.cells import factor, tolerance
 from ..document.model import Emphasis, Figure, Layout, LegendEntry, Paragraph, Section, filled
 from ..rows.names import MethodClass, of_classes
-from ..rows.points import first_names, under
+from ..rows.points import names_in_turn, under
 from . import random_bodies
 from .measured import Measured, of_scene
 from .summary import CAVEAT, MIDDLE, Summary
@@ -21,14 +23,20 @@ from .summary import CAVEAT, MIDDLE, Summary
 
 def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     """Return the section, from the summary of each scene; random bodies are included if the report has them."""
-    pictures = {name: summary.points for name, summary in of_scenes.items()}
+    pictures = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
+    random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
-        pictures["random bodies"] = random_bodies.summary(measured.rows, measured.ratios).points
+        study = next(study for study in measured.plan.studies if study.name == RANDOM)
+        title = f"{len(study.scenes)} random bodies in {len(FIELDS)} fields (geometric mean)"
+        pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
+        random = (
+            f"Random bodies: {measured.plan.bodies} in each field, with {len(study.lines)} methods; `--bodies 20` adds more."
+        )
     name = measured.main_scene.name
     sentence = _sentence(name, of_scene(measured.points, name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
     lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
-    blocks = filled(lead, figure(pictures), Paragraph(f"{CAVEAT}{rough}", Emphasis.NOTE))
+    blocks = filled(lead, figure(pictures), Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE))
     return Section("How wrong, how fast", blocks, "speed", "Speed")
 
 
@@ -46,24 +54,24 @@ def _sentence(scene: str, points: pd.DataFrame) -> str:
         parts.append(f"{more} {theirs.name}, the fastest {words}")
     if not (ours and parts):
         return ""
-    return f"To {tolerance(MIDDLE)} rad on {scene}, {ours.name} is {', and '.join(parts)}."
+    return f"At an attitude error of {tolerance(MIDDLE)} rad on {scene}, {ours.name} is {', and '.join(parts)}."
 
 
 def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
     full = {motion: points for motion, points in pictures.items() if len(points)}
     every = pd.concat(full.values(), ignore_index=True) if full else pd.DataFrame(columns=["name", "family", "class", "error"])
-    shown = first_names(every) if len(every) else ()
+    order = names_in_turn(every) if len(every) else ()
     legend = []
     for line, members in every.groupby("name", sort=False):
         family, kind = members[["family", "class"]].iloc[0]
         dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
-        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash, line in shown))
-    legend.sort(key=lambda entry: shown.index(entry.name) if entry.shown else len(shown))
-    hidden, panels = [entry.name for entry in legend if not entry.shown], []
+        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash))
+    legend.sort(key=lambda entry: order.index(entry.name))
+    panels = []
     for motion, points in full.items():
         fields = ("name", "setting", "error", "microseconds", *(["within"] if points["within"].any() else ["sample", "dt"]))
-        (panel,) = vega_embed.embed(figures.best_of_families(points), fields, 400, hidden)
+        (panel,) = vega_embed.embed(figures.best_of_families(points), fields, 400)
         panels.append(panel | {"usermeta": {"name": motion}})
     same = dict.fromkeys(
         sentence
@@ -72,8 +80,8 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     )
     return Figure(
         "time_against_error",
-        "Computing time against attitude error, each family at its best settings",
-        " ".join(["Lower left is better. Ours are solid, ODE solvers dashed, physics engines dotted.", *same]),
+        "Computing time against attitude error, each method at its fastest settings",
+        " ".join(["Lower left is better: faster and more accurate. Ours: solid, ODE solvers: dashed, engines: dotted.", *same]),
         panels=panels,
         legend=legend,
         layout=Layout.PANELS,

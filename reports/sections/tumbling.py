@@ -14,7 +14,7 @@ from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
-from ..document.model import Emphasis, Motion, Paragraph, Row, Section, Table, filled
+from ..document.model import Block, Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_classes, of_measure, of_study, outcomes
 from .hard_cases import RIGHT, USABLE
@@ -26,6 +26,7 @@ LOST = 1e-3
 PAPER_MAP = "reduced"
 MOST = 8
 """Largest number of motions next to each other, with the exact one."""
+_SIGNS = "Grey outline: exact motion. Arrow: angular momentum. Line: path of a body axis."
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,7 @@ def results(measured: Measured) -> list[Result]:
     points = of_scene(measured.points, scene)
     best = cheapest(of_classes(costs(points, [MIDDLE]), MethodClass.GENERAL))
     families = {PAPER_MAP, *points[points["name"] == (best.name if best else "")]["family"]}
-    orders, times = (
-        of_measure(here, each).groupby("method")["value"].last() for each in (Measure.ORDER, Measure.TIME_PER_STEP)
-    )
+    orders, times = lines.orders(here), of_measure(here, Measure.TIME_PER_STEP).groupby("method")["value"].last()
     found = []
     for method, run in rows[(rows["role"] == Role.ENGINE) | rows["family"].isin(families)].groupby("method", sort=False):
         drifts = run[run["measure"] == Measure.DRIFT_MAX.text]
@@ -87,8 +86,11 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
     motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    blocks = filled(Paragraph(_sentence(found, scene), Emphasis.LEAD), motion if shown else None, table(found, scene))
-    return Section(f"What happens to {subject}", blocks, "motion", "Motion")
+    blocks: list[Block] = [Paragraph(_sentence(found, scene), Emphasis.LEAD)]
+    blocks += [motion, Paragraph(_SIGNS, Emphasis.NOTE)] if shown else []
+    blocks += filled(table(found, scene))
+    source = {"study": ("motion", "convergence", "speed"), "scene": scene.name}
+    return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
 
 
 def _sentence(found: Sequence[Result], scene: Scene) -> str:
@@ -97,18 +99,14 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
     if engines:
         worst = engines[0]
         energy = f"{100 * worst.energy:.2g} %" if worst.energy > LOST else f"{number(worst.energy, 1)} of it"
-        wrong = (
-            f"is wrong by up to {number(worst.error)} rad ({math.degrees(worst.error):.2g}°) and changes the energy by {energy}"
-        )
-        parts.append(f"In {scene.t_end:.3g} s, {worst.line} in steps of {1e3 * worst.dt:.3g} ms {wrong}.")
+        wrong = f"is wrong by {number(worst.error)} rad ({math.degrees(worst.error):.2g}°)"
+        parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong} and its energy changes by {energy}.")
         family = [each for each in engines[1:] if each.method.partition(":")[0] == worst.method.partition(":")[0]]
         if family:
             parts.append(f"{family[-1].line} is wrong by {number(family[-1].error)} rad.")
     if ours:
         best = min(ours, key=lambda each: each.error)
-        cost = "" if math.isnan(best.time) else f" and takes {number(1e6 * best.time)} µs per step"
-        steps = f"`{best.method}` of the Python package `conservative`, in steps of {1e3 * best.dt:.3g} ms,"
-        parts.append(f"{steps} is wrong by {number(best.error)} rad{cost}.")
+        parts.append(f"`{best.method}` of the Python package `conservative` is wrong by {number(best.error)} rad.")
     return " ".join(parts)
 
 
@@ -119,15 +117,21 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
     rows: list[Row] = []
     for each in found:
+        step = numeric(each.dt) if each.name == each.line else Cell("adaptive", value=math.nan)
         if not each.outcome.ok:
-            rows.append([each.name, numeric(each.dt), outcome_cell(each.outcome), *[DASH] * 4])
+            rows.append([each.name, step, outcome_cell(each.outcome), *[DASH] * 4])
             continue
         drifts = (grade(value, limits=(CONSERVED, LOST)) for value in (each.energy, each.momentum))
         order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
         error = grade(each.error, limits=(RIGHT, USABLE))
-        rows.append([each.name, numeric(each.dt), *drifts, error, order, numeric(1e6 * each.time)])
-    steps = f"Steps are the engines' defaults, or else {scene.dt:g} s: a shorter step is more accurate."
-    caption = f"Largest values over {scene.t_end:.3g} s. {steps}"
-    if still := [each.line for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]:
-        caption += f" Conservation is not accuracy: see {still[0]}."
-    return Table(header, rows, caption, source={"study": "motion", "scene": scene.name})
+        rows.append([each.name, step, *drifts, error, order, numeric(1e6 * each.time)])
+    caption = f"Largest values over {scene.t_end:.3g} s. Steps are the engines' defaults, or else {scene.dt:g} s."
+    if ours := [each.line for each in found if each.ours]:
+        caption += f" Ours are the last: {' and '.join(ours)}."
+    still = [each for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]
+    if still:
+        caption += (
+            f" Conservation is not accuracy: {still[0].line} conserves both and is wrong by {number(still[0].error)} rad."
+        )
+    caption += f" Order: the error falls as step^order ({DASH}: adaptive steps, or an uncertain fit)."
+    return Table(header, rows, caption)
