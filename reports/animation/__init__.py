@@ -12,7 +12,7 @@ import gzip
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
@@ -84,7 +84,6 @@ def element(
     labels: Sequence[str],
     id: str = "motion",
     truth: int | None = None,
-    numbers: bool = True,
 ) -> str:
     """Return the HTML of an animation with its data; `script` makes it move.
 
@@ -96,9 +95,7 @@ def element(
         Identifier of the element on the page.
     truth
         Index of the reference solution, or None. The other panels show its attitude as an outline, and their attitude error.
-    numbers
-        True to show the largest drifts and attitude error so far below each panel. If the samples of the truth have other
-        times, the error includes that of the interpolation between them.
+        If its samples have other times, the error includes that of the interpolation between them.
 
     Raises
     ------
@@ -106,7 +103,6 @@ def element(
         A trajectory has no samples, there is not one label for each, or the body turns too often to be watched.
     """
     times, panels = make_panels(trajectories, labels, truth)
-    panels = panels if numbers else [replace(panel, sizes={}) for panel in panels]
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)

@@ -37,7 +37,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     "--bodies",
     type=click.IntRange(0),
     metavar="N",
-    help="Random bodies in each of five fields.  [default: 0; with --full 3]",
+    help="Random bodies in each of five fields.  [default: 1 in three fields with three methods; with --full 3]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random bodies.")
 @click.option(
@@ -66,7 +66,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     help="Folder of the report. An earlier report there is replaced.",
 )
 def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
-    """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes.
+    """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes and three random bodies.
 
     The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
     error. Open OUT/index.html. The folder OUT is replaced when the report is complete. Until then, finished studies are in

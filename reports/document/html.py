@@ -77,7 +77,7 @@ def _datatables() -> str:
 
 
 def _motion(block: Motion) -> Markup:
-    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth, numbers=False))
+    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth))
 
 
 def _whole(text: str) -> Markup:

@@ -110,7 +110,7 @@
   for (const figure of figures) {
     const entries = [...figure.querySelectorAll(".entry")];
     const show = () => set(figure, "hidden", entries.filter((e) => e.ariaPressed === "false").map((e) => e.dataset.series));
-    show();
+    if (entries.length) show();
     const press = (some, on) => { some.forEach((e) => { e.ariaPressed = String(on); }); show(); };
     entries.forEach((entry) => entry.addEventListener("click", () => press([entry], entry.ariaPressed === "false")));
     figure.querySelector(".all")?.addEventListener("click", () => press(entries, true));

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from conservative.benchmarks.contest import cheapest, costs
-from conservative.benchmarks.studies.studies import RANDOM
-from conservative.scenes.random_body import FIELDS
+from conservative.benchmarks.studies.random import RandomStudy
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours
@@ -26,12 +25,12 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     pictures = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
-        study = next(study for study in measured.plan.studies if study.name == RANDOM)
-        title = f"{len(study.scenes)} random bodies in {len(FIELDS)} fields (geometric mean)"
+        study = next(study for study in measured.plan.studies if isinstance(study, RandomStudy))
+        fields = list(dict.fromkeys(each.field for each in study.drawn))
+        title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
         pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
-        random = (
-            f"Random bodies: {measured.plan.bodies} in each field, with {len(study.lines)} methods; `--bodies 20` adds more."
-        )
+        random = f"Random bodies: {measured.plan.bodies} in each field ({', '.join(fields)}), with {len(study.lines)} methods."
+        random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
     name = measured.main_scene.name
     sentence = _sentence(name, of_scene(measured.points, name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""

@@ -57,7 +57,10 @@ DOCUMENT = Document(
             "first",
         ),
         Section(
-            "Second", [GRID, NOTES, Section("Folded", [SORTED], folded=True), Facts([("command", "`conservative`")])], "second"
+            "Second",
+            [GRID, NOTES, Section("Folded", [SORTED], folded=True, source={"study": ["a", "b"]}), FACTS],
+            "second",
+            source={"scene": "brick"},
         ),
     ],
     data={"value": math.nan, "outcome": OK, "grade": Grade.GOOD, "rows": [{"x": 1.0}]},
@@ -146,8 +149,8 @@ def test_page_refers_to_nothing_outside_itself(page):
     parser.feed(page)
     assert parser.references == ["data:,"]
     assert "url(" not in page.partition("</style>")[0]
-    assert parser.anchors == ["#main", "#first", "#second"]
-    assert {anchor[1:] for anchor in parser.anchors} <= set(parser.ids)
+    assert parser.anchors == ["#main", "#first", "#second", *["measurements.csv"] * 3]  # one below each table
+    assert {anchor[1:] for anchor in parser.anchors if anchor.startswith("#")} <= set(parser.ids)
     assert len(parser.ids) == len(set(parser.ids))
 
 
@@ -168,6 +171,29 @@ def test_page_shows_grades_halves_notes_and_intervals(page):
         "Nothing was measured that could be drawn",
     ):
         assert part in page
+
+
+def test_the_rows_of_a_table_are_those_of_its_sections(page):
+    assert "Rows as CSV</a>: scene brick</p>" in page
+    assert "Rows as CSV</a>: scene brick; study a, b</p>" in page
+    without = html.render(Document("", "", [SORTED]))
+    assert "Rows as CSV" not in without
+
+
+@pytest.mark.parametrize(("rows", "filtered"), [(10, False), (11, True)])
+def test_a_long_table_has_a_filter(rows, filtered):
+    page = html.render(Document("", "", [Table(["method"], [["reduced"]] * rows)]))
+    assert ('type="search"' in page) is filtered
+
+
+@pytest.mark.parametrize(("lines", "more"), [(8, 0), (9, 1)])
+def test_a_legend_has_eight_lines_at_first(lines, more):
+    entries = [LegendEntry(f"line {k}", "#000000", "", "") for k in range(lines)]
+    page = html.render(Document("", "", [Figure("picture", "A picture", panels=[], legend=entries)]))
+    page = page.partition("<main")[2].partition("</main>")[0]
+    assert page.count('aria-pressed="true"') == 8
+    assert page.count('aria-pressed="false"') == more
+    assert (f"<summary>{more} more</summary>" in page) is bool(more)
 
 
 def test_a_page_carries_only_the_libraries_that_it_needs(page):

@@ -17,7 +17,8 @@ from conservative.reports.rows import lines
 from conservative.reports.rows.names import with_names
 from conservative.reports.sections import paper
 
-from .made_up import curves
+from .made_up import curves, row
+from .rows import frame
 
 T = np.linspace(0.5, 60, 120)
 
@@ -100,3 +101,14 @@ def test_position_errors_fall_by_the_papers_factor():
         ["0.0205", "0.0206"],
         ["0.0050", "0.0051"],
     ]
+
+
+def test_an_order_is_known_only_if_the_fit_tells_it_from_the_next_one():
+    found = {"sure": (4.1, 0.04), "vague": (15.1, 1.56), "no fit": (np.nan, np.nan)}
+    measures = ("observed order", "observed order stderr")
+    rows = [
+        row("convergence", name, measure, value)
+        for name, pair in found.items()
+        for measure, value in zip(measures, pair, strict=True)
+    ]
+    assert lines.orders(frame(rows)).dropna().to_dict() == {"sure": 4.1}

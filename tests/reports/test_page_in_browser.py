@@ -135,9 +135,23 @@ def test_a_table_has_its_rows_as_csv(opened):
     text = opened.execute_async_script("fetch(arguments[0].href).then(r => r.text()).then(arguments[1])", link)
     found = pd.read_csv(io.StringIO(text))
     measured = pd.read_csv(Path(opened.current_url.removeprefix("file://")).parent / "measurements.csv")
-    expected = measured[(measured["study"] == "motion") & (measured["scene"] == "brick_flip")].reset_index(drop=True)
-    assert len(expected) > 10
+    study = measured["study"].isin(["motion", "convergence", "speed"])
+    expected = measured[study & (measured["scene"] == "brick_flip")].reset_index(drop=True)
+    assert expected["study"].nunique() == 3
     pd.testing.assert_frame_equal(found, expected, check_dtype=False)
+
+
+def test_every_table_has_a_link_and_every_long_one_a_filter(opened):
+    script = """
+    return [...document.querySelectorAll('main table')].map((table) => {
+        const frame = table.closest('.scroll, .grid'), rows = table.tBodies[0].rows.length;
+        const [before, after] = [frame.previousElementSibling, frame.nextElementSibling];
+        return [rows, Boolean(after?.matches('.csv')), Boolean(before?.matches('.filter'))];
+    })"""
+    found = opened.execute_script(script)
+    assert len(found) > 10  # measured 17
+    assert all(linked for _, linked, _ in found)
+    assert all(filtered for rows, _, filtered in found if rows > 10)
 
 
 def test_a_chart_in_a_folded_part_is_drawn_when_it_is_opened(opened):

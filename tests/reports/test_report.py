@@ -73,14 +73,15 @@ def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
 
 def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_everything():
     default, full = plan_report(), plan_report(full=True)
-    assert default.names == studies.MAIN
+    assert default.names == ("random", *studies.MAIN)
     assert set(full.names) == set(studies.MAKERS) - set(studies.ENGINES)
     assert set(default.methods) < set(full.methods)
     left_out = {"exact", "precise", "substepped", "textbook"}
     assert {method.family for method in default.methods} == set(registry.list_methods()) - left_out
     assert "textbook" in {method.family for method in full.methods}
     assert plan_report(bodies=2).names == ("random", *studies.MAIN)
-    assert plan_report(engines=["scipy"]).names == (*studies.MAIN, *studies.ENGINES)
+    assert plan_report(quick=True).names == plan_report(bodies=0).names == studies.MAIN
+    assert plan_report(engines=["scipy"]).names == ("random", *studies.MAIN, *studies.ENGINES)
     assert set(plan_report(["lagrange_top"], full=True).names) == {*studies.MAIN, *studies.MORE}
 
 
