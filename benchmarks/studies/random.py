@@ -74,15 +74,9 @@ UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times t
 
 
 def random_study(
-    methods: tuple[Method, ...],
-    bodies: int,
-    seed: int,
-    quick: bool = False,
-    skip_missing: bool = False,
-    processes: int = 1,
-    fields: tuple[str, ...] = FIELDS,
+    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False, processes: int = 1
 ) -> Study:
-    """Return the study of `bodies` random bodies in each of the fields. The first bodies do not depend on the number.
+    """Return the study of `bodies` random bodies in each field. The first bodies do not depend on the number.
 
     Raises
     ------
@@ -90,7 +84,7 @@ def random_study(
         bodies is not an integer of 1 or more, seed not one of 0 or more, or there is no method.
     """
     positive_integer("bodies", bodies)
-    places = [(field, seed, index) for field in fields for index in range(bodies)]
+    places = [(field, seed, index) for field in FIELDS for index in range(bodies)]
     scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
     drawn = tuple(Drawn(*place) for place in places)
     find = remember_truths(confirm)

@@ -12,7 +12,6 @@ from conservative.check import positive_number
 from conservative.method import Method
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
-from conservative.scenes.random_body import FIELDS
 
 from .provenance import LockedEngine
 
@@ -20,9 +19,9 @@ MAIN_TIME_LIMIT = 0.15
 """Time budget of a run, s, in a default report, which then takes a minute; the default of `Study` is used in a full report."""
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""
-FEW_METHODS, FEW_FIELDS = ("taylor:order=12", "heyoka:frame=lean", "mujoco"), ("gravity", "spring", "attraction")
-"""Methods on the random bodies of a default report, and their fields, with one body each. Each further field takes four seconds
-after the installation, mostly to compile kernels, and each further method of ours two to four seconds a field."""
+FEW_METHODS, FEW_BODIES = ("taylor:order=12", "heyoka:frame=lean", "mujoco"), 3
+"""Methods on the random bodies of a default report, and their number, each in a field of its own. A further field takes four
+seconds after the installation, mostly to compile kernels, and a further method of ours two to four seconds a field."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def plan_report(
         True if pictures are also written as PNG.
     bodies, seed
         Random bodies in each field, and their seed. Default if no scene is named: if `full` `BODIES`, or `QUICK_BODIES` if
-        `quick`; in a default report one in each of `FEW_FIELDS`. Otherwise none.
+        `quick`; in a default report one in each of `FEW_BODIES` fields. Otherwise none.
 
     Raises
     ------
@@ -111,8 +110,8 @@ def plan_report(
     processes = PROCESSES if full and not quick else 1
     drawn = tuple(method for method in compared if method.name in FEW_METHODS) if few else random.select(every)
     if bodies and drawn:
-        fields = FEW_FIELDS if few else FIELDS
-        made.append(random.random_study(drawn, bodies, seed, quick or few, skip_missing, processes, fields))
+        study = random.random_study(drawn, bodies, seed, quick or few, skip_missing, processes)
+        made.append(replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES]) if few else study)
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)

@@ -19,9 +19,8 @@ from .summary import MIDDLE
 HEADER = ("method", "energy", "momentum", "attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
 LEGEND = (
     "energy, momentum: largest relative drift; attitude: largest error, rad; all at the scene's own step, or at the default "
-    f"tolerance. order: measured order of convergence, if its standard error is at most {lines.SURE:g}. µs at "
-    f"{tolerance(MIDDLE)}: wall time per simulated second at an attitude error of {tolerance(MIDDLE)} rad. {DASH}: not "
-    "measurable, or not reached."
+    f"tolerance. order: measured order of convergence, standard error at most {lines.SURE:g}. µs at "
+    f"{tolerance(MIDDLE)}: wall time per simulated second at this attitude error, rad. {DASH}: not measurable, or not reached."
 )
 
 

@@ -31,8 +31,7 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
         pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
         random = f"Random bodies: {measured.plan.bodies} in each field ({', '.join(fields)}), with {len(study.lines)} methods."
         random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
-    name = measured.main_scene.name
-    sentence = _sentence(name, of_scene(measured.points, name))
+    sentence = _sentence(measured.main_scene.name, of_scene(measured.points, measured.main_scene.name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
     lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
     blocks = filled(lead, figure(pictures), Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE))
@@ -46,11 +45,10 @@ def _sentence(scene: str, points: pd.DataFrame) -> str:
     parts = []
     for kind, words in ((MethodClass.SOLVER, "ODE solver"), (MethodClass.ENGINE, "physics engine")):
         theirs = cheapest(of_classes(reached, kind))
-        if not (ours and theirs):
-            continue
-        ratio = theirs.time / ours.time
-        more = f"{factor(ratio)} times as fast as" if ratio >= 1 else f"{factor(1 / ratio)} times as slow as"
-        parts.append(f"{more} {theirs.name}, the fastest {words}")
+        if ours and theirs:
+            ratio = theirs.time / ours.time
+            more = f"{factor(ratio)} times as fast as" if ratio >= 1 else f"{factor(1 / ratio)} times as slow as"
+            parts.append(f"{more} {theirs.name}, the fastest {words}")
     if not (ours and parts):
         return ""
     return f"At an attitude error of {tolerance(MIDDLE)} rad on {scene}, {ours.name} is {', and '.join(parts)}."
@@ -60,13 +58,11 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
     full = {motion: points for motion, points in pictures.items() if len(points)}
     every = pd.concat(full.values(), ignore_index=True) if full else pd.DataFrame(columns=["name", "family", "class", "error"])
-    order = names_in_turn(every) if len(every) else ()
     legend = []
-    for line, members in every.groupby("name", sort=False):
-        family, kind = members[["family", "class"]].iloc[0]
+    for line in names_in_turn(every):
+        family, kind = every.loc[every["name"] == line, ["family", "class"]].iloc[0]
         dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
-        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash))
-    legend.sort(key=lambda entry: order.index(entry.name))
+        legend.append(LegendEntry(line, colours({line: family})[line], path, dash))
     panels = []
     for motion, points in full.items():
         fields = ("name", "setting", "error", "microseconds", *(["within"] if points["within"].any() else ["sample", "dt"]))

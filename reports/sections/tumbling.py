@@ -14,7 +14,7 @@ from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
-from ..document.model import Block, Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
+from ..document.model import Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_classes, of_measure, of_study, outcomes
 from .hard_cases import RIGHT, USABLE
@@ -26,7 +26,6 @@ LOST = 1e-3
 PAPER_MAP = "reduced"
 MOST = 8
 """Largest number of motions next to each other, with the exact one."""
-_SIGNS = "Grey outline: exact motion. Arrow: angular momentum. Line: path of a body axis."
 
 
 @dataclass(frozen=True)
@@ -86,9 +85,9 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
     motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    blocks: list[Block] = [Paragraph(_sentence(found, scene), Emphasis.LEAD)]
-    blocks += [motion, Paragraph(_SIGNS, Emphasis.NOTE)] if shown else []
-    blocks += filled(table(found, scene))
+    signs = Paragraph("Grey outline: exact motion. Arrow: angular momentum. Line: path of a body axis.", Emphasis.NOTE)
+    lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, signs) if shown else ()
+    blocks = filled(lead, *moving, table(found, scene))
     source = {"study": ("motion", "convergence", "speed"), "scene": scene.name}
     return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
 
@@ -128,10 +127,7 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     caption = f"Largest values over {scene.t_end:.3g} s. Steps are the engines' defaults, or else {scene.dt:g} s."
     if ours := [each.line for each in found if each.ours]:
         caption += f" Ours are the last: {' and '.join(ours)}."
-    still = [each for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]
-    if still:
-        caption += (
-            f" Conservation is not accuracy: {still[0].line} conserves both and is wrong by {number(still[0].error)} rad."
-        )
+    if still := [each.line for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]:
+        caption += f" Conservation is not accuracy: {still[0]} conserves both, and its attitude is wrong."
     caption += f" Order: the error falls as step^order ({DASH}: adaptive steps, or an uncertain fit)."
     return Table(header, rows, caption)

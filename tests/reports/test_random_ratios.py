@@ -16,7 +16,7 @@ from conservative.reports.document.model import Section, Table, walk
 from conservative.reports.report import render
 from conservative.reports.run.checkpoint import terms
 from conservative.reports.run.measure import Measurements
-from conservative.reports.run.plan import BODIES, FEW_FIELDS, FEW_METHODS, QUICK_BODIES, plan_report
+from conservative.reports.run.plan import BODIES, FEW_BODIES, FEW_METHODS, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.single_study import plan_study
 from conservative.reports.sections import random_bodies
@@ -261,7 +261,7 @@ def test_how_many_bodies_a_report_has():
     assert (first.name, len(first.scenes)) == ("random", len(FIELDS))
     assert plan_report([], METHODS, bodies=0).studies[0].name != "random"
     default, all_methods = plan_report().studies[0], plan_report(bodies=1).studies[0]
-    assert (len(default.scenes), len(default.methods), default.quick) == (len(FEW_FIELDS), len(FEW_METHODS), True)
+    assert (len(default.scenes), len(default.methods), default.quick) == (FEW_BODIES, len(FEW_METHODS), True)
     assert set(default.methods) < set(all_methods.methods)
 
 
