@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import pandas as pd
 
 from conservative.benchmarks.contest import cheapest, costs
-from conservative.benchmarks.studies.random import RandomStudy
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours
@@ -25,7 +24,7 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     pictures = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
-        study = next(study for study in measured.plan.studies if isinstance(study, RandomStudy))
+        study = next(study for study in measured.plan.studies if study.drawn)
         fields = list(dict.fromkeys(each.field for each in study.drawn))
         title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
         pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
