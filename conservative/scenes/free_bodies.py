@@ -17,7 +17,7 @@ from ..check import choice, finite_number, positive_number
 from ..errors import BadInput
 from ..scene import Scene
 from ..shapes import MassDistribution, box
-from .transforms import in_body_frame, slow_motion
+from .transforms import slow_motion, turned
 
 _BRICK = (13.0, 5.0, 10.0)
 _PLATE = (0.9, 1.3)
@@ -49,9 +49,7 @@ def brick_flip(disturbance: float = 0.05, spin: float = 10.0, t_end: float = 6.0
 
 def turned_brick(angle: float = 0.7, t_end: float | None = None) -> Scene:
     """Return the brick in a body frame turned by `angle`, rad, about (1, 2, 3): an inertia with off-diagonal terms."""
-    F = rotation_about((1.0, 2.0, 3.0), finite_number("angle", angle, "a finite angle, rad"))
-    turned = in_body_frame(brick_flip(), F, "turned_brick")
-    return turned if t_end is None else turned.rename("turned_brick", t_end=t_end)
+    return turned(brick_flip(), angle, t_end, "turned_brick")
 
 
 def offset_brick(t_end: float = 6.0) -> Scene:

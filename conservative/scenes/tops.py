@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
@@ -17,10 +18,20 @@ from ..errors import BadInput
 from ..invariants import Invariant
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
-from .transforms import in_body_frame, slow_motion
+from .transforms import slow_motion, turned
 
 _HEIGHT, _DENSITY, _GRAVITY, _TILT = 0.1, 2700.0, 9.81, math.pi / 3
 """The cone of Krenk & Nielsen. The height, missing in the paper's text, is that of the companion examples in the literature."""
+
+
+def _top(
+    name: str, body: RigidBody, R_WB0: ArrayLike, rates: ArrayLike, t_end: float, field: UniformGravity, dt: float, source: str
+) -> Scene:
+    return Scene(name, body, R_WB0, rates, t_end, field, dt=dt, group="top", source=source)
+
+
+def _tilted(tilt: float) -> Array:
+    return rotation_about((1, 0, 0), finite_number("tilt", tilt, "a finite angle, rad"))
 
 
 def lagrange_top(
@@ -60,18 +71,10 @@ def lagrange_top(
     mass, lever, J1, J3 = cone(height, density)
     body = RigidBody((J1, J1, J3))  # before the division by J3: it refuses moments that are too small
     spin = mass * gravity * lever / (J3 * precession) - (J3 - J1) / J3 * math.cos(tilt) * precession
-    top = Scene(
-        "lagrange_top",
-        body,
-        rotation_about((1, 0, 0), tilt),
-        (0.0, precession * math.sin(tilt), spin + precession * math.cos(tilt)),
-        2 * math.pi / abs(precession) if t_end is None else t_end,
-        UniformGravity(mass * gravity, (0, 0, lever)),
-        dt=0.01,
-        group="top",
-        source="Krenk & Nielsen, 5.2",
-    )
-    return slow_motion(top, slow)
+    rates = (0.0, precession * math.sin(tilt), spin + precession * math.cos(tilt))
+    end = 2 * math.pi / abs(precession) if t_end is None else t_end
+    field = UniformGravity(mass * gravity, (0, 0, lever))
+    return slow_motion(_top("lagrange_top", body, _tilted(tilt), rates, end, field, 0.01, "Krenk & Nielsen, 5.2"), slow)
 
 
 def cone(height: float, density: float) -> tuple[float, float, float, float]:
@@ -149,32 +152,14 @@ def _upright(name: str, stability: float, tilt: float, t_end: float) -> Scene:
     mass, lever, J1, J3 = cone(_HEIGHT, _DENSITY)
     weight = mass * _GRAVITY
     spin = math.sqrt(4 * J1 * weight * lever * stability) / J3
-    return Scene(
-        name,
-        RigidBody((J1, J1, J3)),
-        rotation_about((1, 0, 0), finite_number("tilt", tilt, "a finite angle, rad")),
-        (0.0, 0.0, spin),
-        t_end,
-        UniformGravity(weight, (0, 0, lever)),
-        dt=0.001,
-        group="top",
-        source="Routh; Arnold, Mathematical Methods of Classical Mechanics, 30",
-    )
+    field, source = UniformGravity(weight, (0, 0, lever)), "Routh; Arnold, Mathematical Methods of Classical Mechanics, 30"
+    return _top(name, RigidBody((J1, J1, J3)), _tilted(tilt), (0.0, 0.0, spin), t_end, field, 0.001, source)
 
 
 def simo_wong_top(tilt: float = 0.05, t_end: float = 10.0) -> Scene:
     """Return the fast top of Simo & Wong: J = (5, 5, 1), m g l = 20, spin 50, tilted about its first axis."""
-    return Scene(
-        "simo_wong_top",
-        RigidBody((5.0, 5.0, 1.0)),
-        rotation_about((1, 0, 0), finite_number("tilt", tilt, "a finite angle, rad")),
-        (0.0, 0.0, 50.0),
-        t_end,
-        UniformGravity(20.0, (0, 0, 1)),
-        dt=0.01,
-        group="top",
-        source="Simo & Wong 1991",
-    )
+    body, field = RigidBody((5.0, 5.0, 1.0)), UniformGravity(20.0, (0, 0, 1))
+    return _top("simo_wong_top", body, _tilted(tilt), (0.0, 0.0, 50.0), t_end, field, 0.01, "Simo & Wong 1991")
 
 
 def lie_group_top(spin: float = 150.0, t_end: float = 2.0, slow: float = 1.0) -> Scene:
@@ -185,18 +170,9 @@ def lie_group_top(spin: float = 150.0, t_end: float = 2.0, slow: float = 1.0) ->
     """
     mass, com = 15.0, np.array((0.0, 1.0, 0.0))
     offset = mass * (com @ com * np.eye(3) - np.outer(com, com))  # parallel axes
-    top = Scene(
-        "lie_group_top",
-        RigidBody(np.diag((0.234375, 0.46875, 0.234375)) + offset),
-        np.eye(3),
-        (0.0, finite_number("spin", spin, "a finite rate, rad/s"), -4.61538),
-        t_end,
-        UniformGravity(mass * 9.81, com),
-        dt=0.001,
-        group="top",
-        source="Brüls, Cardona & Arnold 2012",
-    )
-    return slow_motion(top, slow)
+    body, field = RigidBody(np.diag((0.234375, 0.46875, 0.234375)) + offset), UniformGravity(mass * 9.81, com)
+    rates = (0.0, finite_number("spin", spin, "a finite rate, rad/s"), -4.61538)
+    return slow_motion(_top("lie_group_top", body, np.eye(3), rates, t_end, field, 0.001, "Brüls, Cardona & Arnold 2012"), slow)
 
 
 def asymmetric_top(t_end: float = 30.0) -> Scene:
@@ -204,25 +180,14 @@ def asymmetric_top(t_end: float = 30.0) -> Scene:
 
     J = (0.5, 0.85, 1), weight and lever arm 1, q0 = (0.4, 0.2, 0.4, 0.8) scalar first, L0 = (0.2, 1, 0.4).
     """
-    J = (0.5, 0.85, 1.0)
-    return Scene(
-        "asymmetric_top",
-        RigidBody(J),
-        from_quaternion((0.4, 0.2, 0.4, 0.8)),
-        np.divide((0.2, 1.0, 0.4), J),
-        t_end,
-        UniformGravity(1.0, (0, 0, 1)),
-        dt=0.05,
-        group="top",
-        source="Hairer, Lubich & Wanner, VII.5",
-    )
+    J, R_WB0, field = (0.5, 0.85, 1.0), from_quaternion((0.4, 0.2, 0.4, 0.8)), UniformGravity(1.0, (0, 0, 1))
+    rates, source = np.divide((0.2, 1.0, 0.4), J), "Hairer, Lubich & Wanner, VII.5"
+    return _top("asymmetric_top", RigidBody(J), R_WB0, rates, t_end, field, 0.05, source)
 
 
 def turned_top(angle: float = 0.7, t_end: float | None = None) -> Scene:
     """Return the asymmetric heavy top in a body frame turned by `angle` about (1, 2, 3): an inertia with off-diagonal terms."""
-    F = rotation_about((1.0, 2.0, 3.0), finite_number("angle", angle, "a finite angle, rad"))
-    turned = in_body_frame(asymmetric_top(), F, "turned_top")
-    return turned if t_end is None else turned.rename("turned_top", t_end=t_end)
+    return turned(asymmetric_top(), angle, t_end, "turned_top")
 
 
 def kovalevskaya_top(axial: float = 1.0, moment: float = 1.0, t_end: float = 30.0) -> Scene:
@@ -233,18 +198,9 @@ def kovalevskaya_top(axial: float = 1.0, moment: float = 1.0, t_end: float = 30.
     """
     J3, rates = positive_number("axial", axial), (0.5, 1.0, 2.0)
     k = positive_number("moment", moment) / J3
-    return Scene(
-        "kovalevskaya_top",
-        RigidBody((2 * J3, 2 * J3, J3)),
-        np.eye(3),
-        rates,
-        t_end,
-        UniformGravity(moment, (1, 0, 0)),
-        dt=0.02,
-        extra_invariants=(kovalevskaya_integral(k, rates),),
-        group="top",
-        source="Kovalevskaya 1889",
-    )
+    body, field = RigidBody((2 * J3, 2 * J3, J3)), UniformGravity(moment, (1, 0, 0))
+    top = _top("kovalevskaya_top", body, np.eye(3), rates, t_end, field, 0.02, "Kovalevskaya 1889")
+    return top.rename(top.name, extra_invariants=(kovalevskaya_integral(k, rates),))
 
 
 def kovalevskaya_integral(k: float, w0: tuple[float, float, float]) -> Invariant:
@@ -285,14 +241,5 @@ def pendulum_over_top(excess: float = 1e-3, t_end: float = 5.0) -> Scene:
 
 
 def _pendulum(name: str, height: float, rate: float, t_end: float) -> Scene:
-    return Scene(
-        name,
-        RigidBody((1.3, 0.9, 0.7)),
-        np.eye(3),
-        (rate, 0.0, 0.0),
-        t_end,
-        UniformGravity(20.0, (0, 0, height)),
-        dt=0.01,
-        group="top",
-        source="the compound pendulum",
-    )
+    body, field = RigidBody((1.3, 0.9, 0.7)), UniformGravity(20.0, (0, 0, height))
+    return _top(name, body, np.eye(3), (rate, 0.0, 0.0), t_end, field, 0.01, "the compound pendulum")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..attitude import Array
+from ..attitude import Array, rotation_about
 from ..body import RigidBody
-from ..check import positive_number, rotation
+from ..check import finite_number, positive_number, rotation
 from ..errors import BadInput
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
@@ -70,3 +70,9 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
     start = {"R_WB0": scene.R_WB0 @ F.T, "w_WB_B0": F @ scene.w_WB_B0}
     body = RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T))
     return scene.rename(name, body=body, potential=field, flight=flight, **start)
+
+
+def turned(scene: Scene, angle: float, t_end: float | None, name: str) -> Scene:
+    """Return a scene in a body frame turned by `angle`, rad, about (1, 2, 3): an inertia with off-diagonal terms."""
+    F = rotation_about((1.0, 2.0, 3.0), finite_number("angle", angle, "a finite angle, rad"))
+    return in_body_frame(scene, F, name).rename(name, t_end=scene.t_end if t_end is None else t_end)
