@@ -149,6 +149,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
+    order = None
     card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True, rotors=True)
 
     def __post_init__(self) -> None:
@@ -164,10 +165,6 @@ class Precise(Method):
     @property
     def setting_parts(self) -> dict[str, str]:
         return {"bits": f"{self.bits} bits"}
-
-    @property
-    def order(self) -> None:
-        return None
 
     def unsupported(self, scene: Scene) -> str | None:
         if scene.potential is None or find_field(scene.potential) is not None:

@@ -46,20 +46,14 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
+    order = 2
+    conserves = frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
     card: ClassVar[Card] = Card(
         pictures=("",), colour="sky", structure=lambda method: Structure(symmetric=True, symplectic=False)
     )
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)
-
-    @property
-    def order(self) -> int:
-        return 2
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid, self.tol, None)

@@ -59,6 +59,7 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
+    conserves = frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
     card: ClassVar[Card] = Card(
         variants=("stages=2", "stages=4", "stages=6", "stages=8"),
         report=("",),
@@ -82,10 +83,6 @@ class Gauss(Method):
     @property
     def order(self) -> int:
         return 2 * self.stages
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
     bounds = within_round_off
 

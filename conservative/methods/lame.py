@@ -72,6 +72,8 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
+    order = None
+    conserves = frozenset({"energy", "vertical momentum", "axial momentum"})
     card: ClassVar[Card] = Card(
         many=("",),
         rank=1,
@@ -80,14 +82,6 @@ class Lame(Method):
         kernel="lame",
         structure=lambda method: Structure(symmetric=True, symplectic=True),  # the exact flow
     )
-
-    @property
-    def order(self) -> None:
-        return None
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "vertical momentum", "axial momentum"})
 
     bounds = within_round_off
 

@@ -66,6 +66,7 @@ class MoserVeselov(Method):
 
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
+    conserves = frozenset({"energy", "momentum", "axial momentum"})
     card: ClassVar[Card] = Card(
         variants=tuple(f"order={order}" for order in ORDERS),
         report=("",),
@@ -83,10 +84,6 @@ class MoserVeselov(Method):
         if order is not None:
             choice("order", order, ORDERS)
         set_fields(self, order=None if order == "exact" else order)
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "axial momentum"})
 
     bounds = within_round_off
 

@@ -40,6 +40,8 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
+    order = DORMAND_PRINCE_8.order
+    conserves = with_balances("energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis")
     card: ClassVar[Card] = Card(
         rank=2,
         group="explicit",
@@ -51,14 +53,6 @@ class Projected(Method):
         loads=True,
         rotors=True,
     )
-
-    @property
-    def order(self) -> int:
-        return DORMAND_PRINCE_8.order
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return with_balances("energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis")
 
     bounds = within_round_off
 

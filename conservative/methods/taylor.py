@@ -98,6 +98,9 @@ class Taylor(Method):
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
+    conserves = frozenset(
+        {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
+    )
     card: ClassVar[Card] = Card(
         variants=("order=8", "order=12", "order=16", "tolerance=1e-9"),
         report=("order=12",),
@@ -124,11 +127,6 @@ class Taylor(Method):
         elif isinstance(order, bool) or not isinstance(order, int) or not LOWEST <= order <= HIGHEST:
             raise BadInput("order", describe(order), f"an integer from {LOWEST} to {HIGHEST}")
         set_fields(self, order=order, tolerance=tolerance)
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        momenta = {"momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
-        return frozenset({"energy", JACOBI_INTEGRAL, *momenta})
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         parts = 1 if self.tolerance is None else PARTS

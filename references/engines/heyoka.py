@@ -86,6 +86,7 @@ class Heyoka(Method):
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
+    order = None
     card: ClassVar[Card] = Card(
         # Base vectors are the cheapest frame to read if many samples are kept. Lean is often the same: one tolerance is enough.
         variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors"),
@@ -123,10 +124,6 @@ class Heyoka(Method):
         if self.driver != "batch":
             parts["driver"] = self.driver
         return parts if self.numbers == "parameters" else parts | {"numbers": f"numbers={self.numbers}"}
-
-    @property
-    def order(self) -> None:
-        return None
 
     def unsupported(self, scene: Scene) -> str | None:
         potential = static_part(scene.potential)

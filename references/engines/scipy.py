@@ -62,6 +62,7 @@ class SciPy(Method):
 
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
+    order = None
     card: ClassVar[Card] = Card(
         variants=("rtol=1e-9", "rtol=1e-12"),
         report=("",),
@@ -85,10 +86,6 @@ class SciPy(Method):
     @property
     def setting_parts(self) -> dict[str, str]:
         return {"integrator": self.integrator, "rtol": f"rtol={self.rtol:g}"}
-
-    @property
-    def order(self) -> None:
-        return None
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

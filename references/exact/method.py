@@ -21,11 +21,11 @@ from conservative.errors import BadInput, Unsupported
 from conservative.grid import Grid
 from conservative.invariants import axial_direction
 from conservative.method import Method, Role, Run
-from conservative.methods.bounds import bounds_of
+from conservative.methods.bounds import within_round_off
 from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
-from conservative.trajectory import Bounds, Counters, Trajectory
+from conservative.trajectory import Counters, Trajectory
 
 from .digits import MP_LOCK
 from .free_body import free_motion
@@ -127,18 +127,11 @@ class Exact(Method):
 
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
+    order = None
+    conserves = frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
     card: ClassVar[Card] = Card(report=(), colour="black")
 
-    @property
-    def order(self) -> None:
-        return None
-
-    @property
-    def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
-
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+    bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
         return _reason(_pendulum(scene) or scene.body, scene.potential)
