@@ -34,8 +34,8 @@ from .digits import (
     multiply,
     rotation_phase,
 )
-from .start import InitialState
-from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
+from .start import InitialState, Motion
+from .theta import Lattice, Points, Theta, jacobi, theta
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,36 +95,7 @@ def order_axes(start: InitialState) -> OrderedAxes:
     return OrderedAxes(moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP)
 
 
-@dataclass(frozen=True, eq=False)
-class FreeMotion:
-    """A free motion: shape of the polhode, phases and theta functions."""
-
-    size: Number
-    largest: Array
-    inverse_J: Array
-    lattice: Lattice
-    argument: Phase
-    turn: Phase
-    parts: tuple[Quotient, Quotient, Quotient]
-    phase: Theta
-    R_BP: Array
-    q_PB: tuple[complex, complex]
-    q_Wl: tuple[complex, complex]
-
-    def at(self, t: Array) -> tuple[Array, Array]:
-        """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, odd = self.argument.reduce(t)
-        points = Points(self.lattice, v)
-        sn, cn, dn = (points.quotient(part).real for part in self.parts)
-        flip = 1 - 2 * odd
-        m = np.stack([flip * cn, flip * sn, dn], axis=-1) * self.largest
-        chi = self.turn.phasor(t) * Points(self.phase.lattice, v).theta(self.phase)
-        q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
-        R_WB = from_halves(*multiply(multiply(self.q_Wl, q_lP), self.q_PB))
-        return R_WB, (m * (float(self.size) * self.inverse_J)) @ self.R_BP.T
-
-
-def free_motion(start: InitialState) -> FreeMotion:
+def free_motion(start: InitialState) -> Motion:
     """Return the motion of an initial state that is not steady."""
     axes = order_axes(start)
     J, L, size, largest, lattice = axes.J, axes.L, axes.size, axes.largest, axes.lattice
@@ -139,19 +110,22 @@ def free_motion(start: InitialState) -> FreeMotion:
     x, y, z = (component / size for component in L)
     k = 1 / (1 + z)
     R_lP0 = mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])
-    return FreeMotion(
-        size,
-        np.array([float(x / size) for x in largest]),
-        np.array([float(1 / x) for x in J]),
-        lattice,
-        Phase(v0, omega, 2 * lattice.K),
-        rotation_phase(-mp.arg(phase.value_and_slope(v0)[0]), mu),
-        jacobi(lattice),
-        phase,
-        as_array(axes.R_BP),
-        halves_in_double(axes.R_BP.T),
-        halves_in_double(start.attitude * axes.R_BP * R_lP0.T),
-    )
+    q_Wl, q_PB = halves_in_double(start.attitude * axes.R_BP * R_lP0.T), halves_in_double(axes.R_BP.T)
+    argument, turn = Phase(v0, omega, 2 * lattice.K), rotation_phase(-mp.arg(phase.value_and_slope(v0)[0]), mu)
+    shape, inverse_J = np.array([float(x / size) for x in largest]), np.array([float(1 / x) for x in J])
+    parts, R_BP = jacobi(lattice), as_array(axes.R_BP)
+
+    def at(t: Array) -> tuple[Array, Array]:
+        v, odd = argument.reduce(t)
+        points = Points(lattice, v)
+        sn, cn, dn = (points.quotient(part).real for part in parts)
+        flip = 1 - 2 * odd
+        m = np.stack([flip * cn, flip * sn, dn], axis=-1) * shape
+        chi = turn.phasor(t) * Points(phase.lattice, v).theta(phase)
+        q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
+        return from_halves(*multiply(multiply(q_Wl, q_lP), q_PB)), (m * (float(size) * inverse_J)) @ R_BP.T
+
+    return at
 
 
 def pole_phase(axes: OrderedAxes, lattice: Lattice) -> Theta:

@@ -18,6 +18,7 @@ as a function of complex time is -1, 1 or u_E. A passage close to a pole, or thr
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,7 +42,7 @@ from .digits import (
     rotation_phase,
     unit,
 )
-from .start import SYMMETRIC, InitialState
+from .start import SYMMETRIC, InitialState, Motion
 from .theta import Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
@@ -177,16 +178,8 @@ def nutation(start: Top) -> Nutation:
     return Nutation(u1, u2, u3, Lattice.of((u2 - u1) / (u3 - u1), (u3 - u2) / (u3 - u1)))
 
 
-@dataclass(frozen=True, eq=False)
-class Factor:
-    """exp(i mu t) times a quotient of theta functions."""
-
-    clock: Phase
-    shape: Quotient
-
-    def at(self, t: Array, points: Points) -> ComplexArray:
-        """Return the factor (n,) at times t."""
-        return self.clock.phasor(t) * points.quotient(self.shape)
+Factor = Callable[[Array, Points], ComplexArray]
+"""exp(i mu t) times a quotient of theta functions: maps times (n,) and arguments to values (n,)."""
 
 
 def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, start: Number, slope: Number) -> Factor:
@@ -198,39 +191,22 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
     mu = rate - omega * (derivative / value).imag
     value, derivative = shape.value_and_slope(v0)
     scale = start / value if abs(omega * start) > abs(slope) else slope / (omega * derivative + mp.mpc(0, mu) * value)
-    return Factor(rotation_phase(mp.mpf(0), mu), shape.times(scale))
+    clock, scaled = rotation_phase(mp.mpf(0), mu), shape.times(scale)
+    return lambda t, points: clock.phasor(t) * points.quotient(scaled)
 
 
-@dataclass(frozen=True, eq=False)
-class TopMotion:
-    """The motion of a top: phases and theta functions."""
-
-    argument: Phase
-    lattice: Lattice
-    alpha: Factor
-    beta: Factor
-    w: Factor
-    w_scale: float
-    spin: float
-    R_BP: Array
-    q_PB: tuple[complex, complex]
-
-    def at(self, t: Array) -> tuple[Array, Array]:
-        """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, odd = self.argument.reduce(t)
-        points = Points(self.lattice, v)
-        R_WB = from_halves(*multiply((self.alpha.at(t, points), self.beta.at(t, points)), self.q_PB))
-        w = self.w_scale * (1 - 2 * odd) * self.w.at(t, points)
-        w_P = np.stack([w.real, w.imag, np.full_like(w.real, self.spin)], axis=-1)
-        return R_WB, w_P @ self.R_BP.T
+def nutation_phase(start: Top, roots: Nutation) -> Phase:
+    """Return v as a function of time."""
+    omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
+    return Phase(roots.start(start.u, start.rising), omega, 2 * roots.lattice.K)
 
 
-def top_motion(start: Top) -> TopMotion:
+def top_motion(start: Top) -> Motion:
     """Return the motion of an initial state that is not upright."""
     roots = nutation(start)
     lattice, u_E = roots.lattice, max(min(start.u_E, roots.u3), roots.u2)
-    omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
-    v0 = roots.start(start.u, start.rising)
+    argument = nutation_phase(start, roots)
+    v0, omega = argument.start, argument.rate
     v = mp.mpf(1)  # any |v| < K at which no factor vanishes
     u = roots.u1 + (roots.u2 - roots.u1) * jacobi(lattice)[0].value_and_slope(v)[0].real ** 2
     plus, minus, across = start.b_z + start.b3, start.b_z - start.b3, start.b3 * u_E - start.b_z
@@ -246,6 +222,14 @@ def top_motion(start: Top) -> TopMotion:
     slopes = (*start.slopes[:2], start.slopes[2] / w_scale)
     parts = zip(shapes, rates, values, slopes, strict=True)
     alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
-    R_BP = as_array(start.R_BP)
-    argument = Phase(v0, omega, 2 * lattice.K)
-    return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, halves_in_double(start.R_BP.T))
+    R_BP, q_PB = as_array(start.R_BP), halves_in_double(start.R_BP.T)
+
+    def at(t: Array) -> tuple[Array, Array]:
+        v, odd = argument.reduce(t)
+        points = Points(lattice, v)
+        R_WB = from_halves(*multiply((alpha(t, points), beta(t, points)), q_PB))
+        across = float(w_scale) * (1 - 2 * odd) * w(t, points)
+        w_P = np.stack([across.real, across.imag, np.full_like(across.real, float(start.spin))], axis=-1)
+        return R_WB, w_P @ R_BP.T
+
+    return at

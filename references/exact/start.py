@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .digits import Matrix, Phase, Vector, as_array, cross, from_halves, mp, rotation_phase
+from .digits import Matrix, Vector, as_array, cross, from_halves, mp, rotation_phase
 
 _PARALLEL = mp.mpf(10) ** -130
 """Sine of an angle that is round-off: principal axes have 150 digits."""
@@ -65,45 +65,32 @@ class InitialState:
         return bool(mp.norm(cross(w, L)) <= _PARALLEL * mp.norm(w) * mp.norm(L))
 
 
-class ClosedForm(Protocol):
-    """A motion that can be evaluated at any times."""
-
-    def at(self, t: Array) -> tuple[Array, Array]:
-        """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at t (n,)."""
-
+Motion = Callable[[Array], tuple[Array, Array]]
+"""A motion in closed form: maps any times (n,), s, to `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
 
 _BLOCK = 16384
 """Samples evaluated together, so that they fit into a cache."""
 
 
-def in_blocks(motion: ClosedForm, t: Array) -> tuple[Array, Array]:
+def in_blocks(motion: Motion, t: Array) -> tuple[Array, Array]:
     """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at t (n,), block after block."""
     R_WB, w_WB_B = np.empty((len(t), 3, 3)), np.empty((len(t), 3))
     for begin in range(0, len(t), _BLOCK):
         block = slice(begin, begin + _BLOCK)
-        R_WB[block], w_WB_B[block] = motion.at(t[block])
+        R_WB[block], w_WB_B[block] = motion(t[block])
     return R_WB, w_WB_B
 
 
-@dataclass(frozen=True, eq=False)
-class SteadyTurn:
-    """A turn about an axis fixed in body and world, or rest."""
-
-    axis_B: Array
-    half_turn: Phase
-    R_WB0: Array
-    w_WB_B: Array
-
-    def at(self, t: Array) -> tuple[Array, Array]:
-        half = self.half_turn.phasor(t)
-        x, y, z = self.axis_B
-        turn = from_halves(half.real + 1j * z * half.imag, (x + 1j * y) * half.imag)
-        return self.R_WB0 @ turn, np.broadcast_to(self.w_WB_B, (*t.shape, 3)).copy()
-
-
-def steady_turn(start: InitialState) -> SteadyTurn:
-    """Return the motion with the constant rates of a start."""
+def steady_turn(start: InitialState) -> Motion:
+    """Return the motion with the constant rates of a start: a turn about an axis fixed in body and world, or rest."""
     w = start.rates(mp.eye(3))
     speed = mp.norm(w)
-    axis = np.array([float(x / speed) for x in w]) if speed > 0 else np.array([0.0, 0.0, 1.0])
-    return SteadyTurn(axis, rotation_phase(mp.mpf(0), speed / 2), as_array(start.attitude), start.w_WB_B0)
+    x, y, z = np.array([float(x / speed) for x in w]) if speed > 0 else np.array([0.0, 0.0, 1.0])
+    half_turn, R_WB0 = rotation_phase(mp.mpf(0), speed / 2), as_array(start.attitude)
+
+    def at(t: Array) -> tuple[Array, Array]:
+        half = half_turn.phasor(t)
+        turn = from_halves(half.real + 1j * z * half.imag, (x + 1j * y) * half.imag)
+        return R_WB0 @ turn, np.broadcast_to(start.w_WB_B0, (*t.shape, 3)).copy()
+
+    return at

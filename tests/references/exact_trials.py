@@ -12,7 +12,7 @@ import numpy as np
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, rotation_about, to_quaternion
 from conservative.references import precise
-from conservative.references.exact.lagrange_top import top, top_motion
+from conservative.references.exact.lagrange_top import nutation, nutation_phase, top
 from conservative.references.exact.method import free_body, lagrange_top
 from conservative.references.exact.start import InitialState
 
@@ -129,7 +129,8 @@ def draw_top(rng, pole=None):
     trial = Trial(body, potential, R_WP @ R_BP.T, R_BP @ w_P, t)
     if pole is None:
         return trial
-    clock = top_motion(top(InitialState(body, trial.R_WB0, trial.w_WB_B0), potential.moment_B, potential.moment_B)).argument
+    start = top(InitialState(body, trial.R_WB0, trial.w_WB_B0), potential.moment_B, potential.moment_B)
+    clock = nutation_phase(start, nutation(start))
     passages = [float(((n / 2) * clock.period - clock.start) / clock.rate) for n in range(3)]
     passage = min((time for time in passages if time > 0), key=trial.pole_distance)
     return replace(trial, t=np.append(t[t < passage], passage))
