@@ -17,7 +17,6 @@ from ..attitude import Array
 from ..batch import Batch
 from ..deferred_imports import kernels
 from ..grid import Grid
-from ..potentials.field import into_axes
 from ..potentials.uniform_gravity import UniformGravity
 from .many import Block, pause
 
@@ -37,13 +36,11 @@ def find_units_of_moments(moments: Array) -> Array:
     return np.ldexp(1.0, np.frexp(moments.max(axis=1))[1])
 
 
-def fill_columns(rows: Array, width: int) -> Array:
-    """Return the rows (n, 3) of n bodies as columns (3, m). m is the next multiple of `width`; the last body is repeated."""
-    return stack_columns([rows], width)
-
-
 def stack_columns(parts: Sequence[Array], width: int) -> Array:
-    """Return the rows of the parts (n, .), one part under the other, as `fill_columns` does."""
+    """Return the rows of the parts (n, .) of n bodies as columns (., m), one part under the other.
+
+    m is the next multiple of `width`; the last body is repeated.
+    """
     n = len(parts[0])
     columns, row = np.empty((sum(part.shape[1] for part in parts), -(-n // width) * width)), 0
     for part in parts:
@@ -63,8 +60,7 @@ def make_room(n: int, m: int) -> Array:
 def moments_of_gravity(bodies: Batch, R_BP: Array) -> Array:
     """Return weight times centre of mass (n, 3), N m, of bodies in `UniformGravity`, in the axes `R_BP` (n, 3, 3)."""
     potential: Any = bodies.scene.potential
-    weight, com_B = (np.asarray(bodies.parameters.get(name, getattr(potential, name))) for name in ("weight", "com_B"))
-    return into_axes(np.broadcast_to(weight[..., None] * com_B, (len(bodies), 3)), R_BP)
+    return np.stack(potential.fields(bodies.parameters, R_BP), axis=1)
 
 
 def in_gravity_or_free(bodies: Batch) -> bool:

@@ -20,12 +20,12 @@ from ..trajectory import Bounds
 from .bounds import bounds_of
 from .coefficients.compositions import BEST, composition_of
 from .columns import (
-    fill_columns,
     find_unit_of_time,
     find_units_of_moments,
     in_gravity_or_free,
     make_room,
     moments_of_gravity,
+    stack_columns,
     take_pieces,
     turn_samples,
 )
@@ -154,10 +154,10 @@ def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
     time, units = find_unit_of_time(grid), find_units_of_moments(moments)[:, None]
     lengths, tol = find_coefficients(method.order, method.composition, method.tol, grid.dt / time)
     J, L0 = moments / units, bodies.L_P0 / units * time
-    columns = fill_columns(np.concatenate([J, 1 / J], axis=1), kernel.WIDTH)
-    field = None if bodies.scene.free else fill_columns(moments_of_gravity(bodies, R_BP) / units * time * time, kernel.WIDTH)
+    columns = stack_columns([J, 1 / J], kernel.WIDTH)
+    field = None if bodies.scene.free else stack_columns([moments_of_gravity(bodies, R_BP) / units * time * time], kernel.WIDTH)
     starts, room = np.zeros((kernel.ROWS, columns.shape[1])), make_room(kernel.ROOM, kernel.WIDTH)
-    starts[:7] = fill_columns(np.concatenate([bodies.q_WP0, L0], axis=1), kernel.WIDTH)
+    starts[:7] = stack_columns([bodies.q_WP0, L0], kernel.WIDTH)
     q, L = np.empty((columns.shape[1], s, 4)), np.empty((columns.shape[1], s, 3))
     q[:n, 0], L[:n, 0] = bodies.q_WP0, L0
 
