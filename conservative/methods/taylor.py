@@ -19,7 +19,7 @@ from ..errors import BadInput, IntegrationFailed, NotConverged
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, momentum_W
 from ..method import Method, Role, Run
-from ..potentials.field import FieldPotential, into_axes
+from ..potentials.field import FieldPotential, into_axes, to_tuples
 from ..potentials.turning import Orbit, Turning, static_part
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
@@ -28,7 +28,7 @@ from . import principal_axes
 from .bounds import bounds_of
 from .columns import stack_columns, take_pieces
 from .many import Block, RunMany
-from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, spin_rate
+from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start, quadruple, spin_rate
 from .run_kernel import in_main_thread, prepare_run
 from .units import COARSE, SHORTEST, in_own_units
 
@@ -140,11 +140,7 @@ class Taylor(Method):
         return max(LOWEST, min(HIGHEST, round(6 - 2 / 3 * math.log10(self.tolerance))))
 
     def unsupported(self, scene: Scene) -> str | None:
-        if not scene.derive(has_recurrence):
-            return "it is for fields with a recurrence, which functions have not"
-        if scene.derive(turning_rate) is None:
-            return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
-        return None
+        return scene.derive(find_obstacle)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
@@ -195,28 +191,23 @@ def turn_samples(run: Run, orbit: Orbit) -> Run:
     return run_and_turn
 
 
-def has_recurrence(scene: Scene) -> bool:
-    """Return whether a scene has no field or one with a recurrence."""
+def find_obstacle(scene: Scene) -> str | None:
+    """Return why a scene's field is not supported, or None."""
     potential = static_part(scene.potential)
-    if potential is None:
-        return True
-    return hasattr(potential.kernel_field(scene.body.R_BP), "series")
-
-
-def turning_rate(scene: Scene) -> float | None:
-    """Return the rate, rad/s, at which the field turns about an axis at right angles to its own: 0 where it does not turn.
-
-    It is None where the axes are at another angle.
-    """
-    if not isinstance(scene.potential, Turning):
-        return 0.0
-    orbit, axis = scene.potential.orbit, scene.potential.potential.axis_W
-    return orbit.rate if axis is not None and abs(axis @ orbit.normal_W) <= RIGHT_ANGLE else None
+    if potential is not None and not hasattr(potential.kernel_field(scene.body.R_BP), "series"):
+        return "it is for fields with a recurrence, which functions have not"
+    if isinstance(scene.potential, Turning):
+        axis = potential.axis_W
+        if axis is None or abs(axis @ scene.potential.orbit.normal_W) > RIGHT_ANGLE:
+            return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
+    return None
 
 
 def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
-    start, loose = start_about_symmetry(scene)
+    # Where body and field share an axis of symmetry, the frame does not spin, and the third component of L must not change.
+    symmetric = scene.symmetry_axis_B is not None
+    start, loose = principal_start(scene, "non_spinning" if symmetric else "body"), (1.0, 1.0, 0.0 if symmetric else 1.0)
     rotor = start.rotor or ()
     kernel, R_WD, momentum = kernels("taylor"), axes_of(scene), math.hypot(*(np.add(start.L, rotor) if rotor else start.L))
     free = not (field_axis(scene) or isinstance(scene.potential, Turning))
@@ -261,32 +252,16 @@ def reduce_top(start: PrincipalStart, R_DP: Array) -> tuple[Any, ...] | None:
     return top, (g[2], g[0] * w[1] - g[1] * w[0]), ((0.0, 0.0), (0.0, 0.0))
 
 
-def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:
-    """Return the start, and which components of L may be changed.
-
-    Where body and field share an axis of symmetry, the frame is that which does not spin, and the third component stays.
-    """
-    if scene.symmetry_axis_B is None:
-        return principal_start(scene), (1.0, 1.0, 1.0)
-    return principal_start(scene, "non_spinning"), (1.0, 1.0, 0.0)
-
-
 def axes_of(scene: Scene) -> Array:
     """Return the rotation (3, 3) to the world from axes D, of which the third is the field's and, if it turns, it turns about
-    the second.
+    the second. Where nothing acts, the third is the direction of the momentum.
     """
-    if not isinstance(scene.potential, Turning):
-        return axes_about(third_axis(scene))
-    second, third = scene.potential.orbit.normal_W, np.asarray(scene.potential.potential.axis_W)
-    return np.stack([np.cross(second, third), second, third], axis=1)
-
-
-def third_axis(scene: Scene) -> Array:
-    """Return the direction (3,), a unit vector in world axes, of the field's axis; where nothing acts, of the momentum."""
-    axis = field_axis(scene)
-    momentum = momentum_W(scene.body, scene.R_WB0, scene.w_WB_B0)
+    if isinstance(scene.potential, Turning):
+        second, third = scene.potential.orbit.normal_W, np.asarray(scene.potential.potential.axis_W)
+        return np.stack([np.cross(second, third), second, third], axis=1)
+    axis, momentum = field_axis(scene), momentum_W(scene.body, scene.R_WB0, scene.w_WB_B0)
     size = float(np.linalg.norm(momentum))
-    return np.array(axis) if axis else momentum / size if size > 0 else np.array((0.0, 0.0, 1.0))
+    return axes_about(np.array(axis) if axis else momentum / size if size > 0 else np.array((0.0, 0.0, 1.0)))
 
 
 def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
@@ -412,9 +387,4 @@ def zeros_like(value: Any) -> Any:
     """Return the tuple of tuples that arrays (n, ...) in a tuple of tuples are for one body, of zeros."""
     if isinstance(value, tuple):
         return type(value)(*map(zeros_like, value))
-    return nest_zeros(np.shape(value)[1:])
-
-
-def nest_zeros(shape: tuple[int, ...]) -> Any:
-    """Return zeros of a shape in tuples."""
-    return tuple(nest_zeros(shape[1:]) for _ in range(shape[0])) if shape else 0.0
+    return to_tuples(np.zeros(np.shape(value)[1:]))

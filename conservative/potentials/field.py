@@ -67,7 +67,7 @@ class FieldPotential(ABC):
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the field for kernels, in principal axes: tuples of floats."""
-        return _to_tuples(self._field(R_BP))
+        return to_tuples(self._field(R_BP))
 
     def energy(self, R_WB: Array) -> Array:
         """Return V, (...), in J at attitudes (..., 3, 3)."""
@@ -99,9 +99,10 @@ class FieldPotential(ABC):
         return axis / size if size > 0 else None
 
 
-def _to_tuples(value: Any) -> Any:
+def to_tuples(value: Any) -> Any:
+    """Return numbers and arrays, or named tuples of them, as the tuples of floats that kernels accept."""
     if isinstance(value, tuple):
-        return type(value)(*map(_to_tuples, value))
+        return type(value)(*map(to_tuples, value))
     nested = np.asarray(value).tolist()
     return tuple(tuple(x) if isinstance(x, list) else x for x in nested) if isinstance(nested, list) else nested
 
