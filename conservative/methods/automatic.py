@@ -45,9 +45,7 @@ def integrate_to_error(
 
     def estimate(grid: Grid) -> Estimate:
         nonlocal best
-        known, trajectory = trials.known.get((method, grid)), None
-        if known is None or known.sensitivity is None:
-            known, trajectory = trials.make(method, grid, sensitivity=True)
+        known, trajectory = trials.estimate(method, grid, sensitivity=True)
         if best is None or known.total <= best[0]:
             best = known.total, grid, trajectory
         return known

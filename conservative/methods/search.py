@@ -103,7 +103,7 @@ class Candidate:
         grid = even_grid(self.duration, self.dt, max(1, int(self.duration / self.dt / MOST_COMPARED)))
         # The runs differ completely even at short steps. Check if rounding is the reason.
         lost = bool(self.attempts) and self.attempts[-1][1] == math.inf and self.rate * grid.dt < RESOLVED
-        trial = trials.estimate(self.method, grid, sensitivity=lost)
+        trial, _ = trials.estimate(self.method, grid, sensitivity=lost)
         after = replace(
             self,
             dt=grid.dt,

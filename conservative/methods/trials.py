@@ -81,15 +81,11 @@ class Trials:
     known: Known
     observe: Observe
 
-    def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> Estimate:
-        """Return the estimate of a run, with its `sensitivity` if requested."""
+    def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory | None]:
+        """Return the estimate of a run, with its `sensitivity` if requested, and its trajectory, or None if no run was made."""
         known = self.known.get((method, grid))
-        if known is None or (sensitivity and known.sensitivity is None):
-            known, _ = self.make(method, grid, sensitivity)
-        return known
-
-    def make(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory]:
-        """Make a run and return its estimate, with its `sensitivity` if requested, and its trajectory."""
+        if known is not None and not (sensitivity and known.sensitivity is None):
+            return known, None
         self.observe(method, grid)
         error, fine, coarse = run_twice(method, self.scene, grid)
         cost, counters = method.card.cost(method), fine.counters
