@@ -22,7 +22,6 @@ from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.grid import Grid
 from conservative.invariants import axial_direction
-from conservative.potentials.turning import Turning
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -157,13 +156,6 @@ class EngineRun:
 
     def __call__(self) -> Trajectory:
         return self.convert(self.own_loop())
-
-
-def orbit_turn(scene: Scene) -> Array | None:
-    """Return rate, rad/s, and axis of an orbit in which the scene's field is constant, as `samples.States` has it; or None."""
-    if not isinstance(scene.potential, Turning):
-        return None
-    return np.array([[scene.potential.orbit.rate, *scene.potential.orbit.normal_W]])
 
 
 def principal_axes(scene: Scene) -> EngineAxes:

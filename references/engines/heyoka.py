@@ -187,12 +187,12 @@ class Heyoka(Method):
         width = self.width or int(forms.heyoka().recommended_simd_size())
         padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
         parameters, start = (np.array([getattr(each, name) for each in padded]).T for name in ("parameters", "start"))
-        batches = Batches(self.integrators(problems[0], width), width, parameters, start)
+        batches = self.integrators(problems[0], width), width, parameters, start
         march, t = _run_batches if self.driver == "batch" else _run_ensemble, grid.t
         samples, R_BF = formulations.gather(problems), np.array([problem.axes.R_BF for problem in problems])
 
         def run() -> Block:
-            values = march(batches, t)[..., : len(problems)].transpose(2, 0, 1)
+            values = march(*batches, t)[..., : len(problems)].transpose(2, 0, 1)
             R_WB, w_WB_B, finite = to_body_axes(t, samples(values), R_BF)
             return Block(R_WB, w_WB_B, finite == len(t))
 
@@ -225,52 +225,39 @@ def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, str]:
     return states, steps, limit_reason(steps, 1.0) or f"heyoka: {outcome.name}"
 
 
-@dataclass(frozen=True, eq=False)
-class Batches:
-    """Bodies of one form in the lanes of heyoka's batch integrators (heyoka's documentation, Batch mode).
+def _run_batches(integrators: forms.Integrators, width: int, parameters: Array, start: Array, t: Array) -> Array:
+    """Return states (samples, m, n) at times t, batch after batch; nan for a body after its integration stops.
 
-    Attributes
-    ----------
-    integrators, width
-        Integrators, and the number of bodies that each integrates at once.
-    parameters, start
-        Parameters (k, n) and initial states (m, n); n is a multiple of the width.
+    Each batch has `width` bodies in the lanes of an integrator (heyoka's documentation, Batch mode). Parameters are (k, n) and
+    initial states (m, n); n is a multiple of the width.
     """
-
-    integrators: forms.Integrators
-    width: int
-    parameters: Array
-    start: Array
-
-
-def _run_batches(batches: Batches, t: Array) -> Array:
-    """Return states (samples, m, n) at times t, batch after batch; nan for a body after its integration stops."""
-    states = np.full((len(t), *batches.start.shape), np.nan)
-    states[0] = batches.start
-    with batches.integrators.borrow() as integrator:
-        for first in range(0, batches.start.shape[1], batches.width):
-            part = slice(first, first + batches.width)
-            _begin_batch(integrator, batches, part)
+    states = np.full((len(t), *start.shape), np.nan)
+    states[0] = start
+    with integrators.borrow() as integrator:
+        for first in range(0, start.shape[1], width):
+            part = slice(first, first + width)
+            _begin_batch(integrator, parameters[:, part], start[:, part])
             for sample, time in enumerate(t[1:], start=1):
                 integrator.propagate_until(time, max_steps=STEP_LIMIT)
                 states[sample, :, part] = _read_state(integrator, time)
     return states
 
 
-def _run_ensemble(batches: Batches, t: Array) -> Array:
+def _run_ensemble(integrators: forms.Integrators, width: int, parameters: Array, start: Array, t: Array) -> Array:
     """Return the same from `ensemble_propagate_until_batch` on one thread, which copies the integrator for each batch."""
-    hy, states = forms.heyoka(), np.full((len(t), *batches.start.shape), np.nan)
-    states[0] = batches.start
-    count = batches.start.shape[1] // batches.width
+    hy, states = forms.heyoka(), np.full((len(t), *start.shape), np.nan)
+    states[0] = start
+    count = start.shape[1] // width
     made: list[Any] = []
 
     def begin(integrator: Any, i: int) -> Any:
         if made:
             return made[i]
-        _begin_batch(integrator, batches, slice(i * batches.width, (i + 1) * batches.width))
+        part = slice(i * width, (i + 1) * width)
+        _begin_batch(integrator, parameters[:, part], start[:, part])
         return integrator
 
-    with batches.integrators.borrow() as integrator:
+    with integrators.borrow() as integrator:
         for sample, time in enumerate(t[1:], start=1):
             done = hy.ensemble_propagate_until_batch(integrator, time, count, begin, max_workers=1, max_steps=STEP_LIMIT)
             made = [each[0] for each in done]
@@ -278,10 +265,10 @@ def _run_ensemble(batches: Batches, t: Array) -> Array:
     return states
 
 
-def _begin_batch(integrator: Any, batches: Batches, part: slice) -> None:
+def _begin_batch(integrator: Any, parameters: Array, start: Array) -> None:
     integrator.set_time(0.0)
-    integrator.pars[:] = batches.parameters[: len(integrator.pars), part]
-    integrator.state[:] = batches.start[:, part]
+    integrator.pars[:] = parameters[: len(integrator.pars)]
+    integrator.state[:] = start
 
 
 def _read_state(integrator: Any, time: float) -> Array:

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, hat, to_quaternion
+from conservative.potentials.turning import Turning
 from conservative.scene import Scene
 
-from ..engine import EngineAxes, orbit_turn, principal_axes, symmetric_axes
+from ..engine import EngineAxes, principal_axes, symmetric_axes
 from ..samples import AXIS_AND_ANGLE, NON_SPINNING, QUATERNION, RATES_AND_ANGLE, ROWS, States
 from . import forms
 from .accelerations import express_field, order_axes
@@ -82,8 +83,9 @@ def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[
     equations, rotor = forms.EulerEquations(attitude, field.acceleration), (hat(axes.rotor) / axes.J[:, None]).ravel().tolist()
     form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *rotor, *field.parameters])
     start = np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0])
-    turn = orbit_turn(scene)
-    return Formulation(axes, form, parameters, start, kind, [0.0] * 4 if turn is None else turn[0], R_WD)
+    orbit = scene.potential.orbit if isinstance(scene.potential, Turning) else None
+    constants = [orbit.rate, *orbit.normal_W.tolist()] if orbit else [0.0] * 4
+    return Formulation(axes, form, parameters, start, kind, constants, R_WD)
 
 
 def non_spinning(scene: Scene) -> Formulation:
