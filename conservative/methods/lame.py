@@ -31,7 +31,7 @@ only bound the energy error.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -151,20 +151,10 @@ class Tops:
         return Tops(*(getattr(self, each.name)[part] for each in fields(self)))
 
     @property
-    def spin(self) -> Array:
-        """Spin (n, 2): the rate about the axis that the frame omits, rad/s, and 1/J3."""
-        return np.stack([spin_rate(self.J1, self.J3, self.L[:, 2]), 1 / self.J3], axis=1)
-
-    @property
     def rate(self) -> Array:
         """Upper bounds of the angular speed (n,), rad/s, as `bound_rate` computes for scenes."""
         kinetic = (self.L[:, 0] ** 2 + self.L[:, 1] ** 2) / self.J1 + self.L[:, 2] ** 2 / self.J3
         return np.sqrt((kinetic + 2 * np.abs(self.kappa)) / np.minimum(self.J1, self.J3))
-
-    def convert(self, units: Array, time: float) -> Tops:
-        """Convert to other units of moments (n,), kg m^2, and of time, s."""
-        kappa, L = self.kappa / units * time * time, self.L / units[:, None] * time
-        return Tops(self.places, self.J1 / units, self.J3 / units, kappa, self.q, L, self.R_BP)
 
 
 def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
@@ -173,7 +163,9 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     tops, h = find_tops(method, bodies), grid.dt / time
     if tops is not None:
         with np.errstate(all="ignore"):  # the comparison below excludes tops whose numbers overflow
-            tops = tops.convert(find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1)), time)
+            units = find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1))
+            kappa, L = tops.kappa / units * time * time, tops.L / units[:, None] * time
+            tops = replace(tops, J1=tops.J1 / units, J3=tops.J3 / units, kappa=kappa, L=L)
             tops = tops[tops.rate * h <= MOST_RADIANS]
     if tops is None or not len(tops.places):
         return None
@@ -185,7 +177,8 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     tops, table[:, :k] = tops[order], table[:, order]
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L
-    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
+    spin = np.stack([spin_rate(tops.J1, tops.J3, tops.L[:, 2]), 1 / tops.J3], axis=1)  # the rate that the frame omits, and 1/J3
+    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), spin / time, tops.R_BP
     cost = PART * m * float(table[kernel.PARTS].max())
 
     def run() -> Block:
