@@ -7,6 +7,7 @@ out of range.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,41 +53,27 @@ def turned_brick(angle: float = 0.7, t_end: float | None = None) -> Scene:
     return turned(brick_flip(), angle, t_end, "turned_brick")
 
 
+def _flight(
+    name: str, body: MassDistribution, R_WB0: ArrayLike, rates: ArrayLike, t_end: float, source: str, **motion: Any
+) -> Scene:
+    return Scene(name, body, R_WB0, rates, t_end, dt=0.01, group="free flight", source=source, **motion)
+
+
 def offset_brick(t_end: float = 6.0) -> Scene:
     """Return the brick with its body frame off its centre of mass, which is at rest: free flight without gravity.
 
     The exact centre of mass does not move. That of an engine drifts if its free joint couples translation and rotation.
     """
     body, rates = MassDistribution(12.0, (0.3, -0.2, 0.4), _BRICK), (0.0, 0.05, 10.0)
-    return Scene(
-        "offset_brick",
-        body,
-        np.eye(3),
-        rates,
-        t_end,
-        dt=0.01,
-        group="free flight",
-        source="Krenk & Nielsen, 5.1, in another frame",
-        v_WB0=np.cross(body.com_B, rates),
-    )
+    source, v_WB0 = "Krenk & Nielsen, 5.1, in another frame", np.cross(body.com_B, rates)
+    return _flight("offset_brick", body, np.eye(3), rates, t_end, source, v_WB0=v_WB0)
 
 
 def thrown_box(t_end: float = 2.0) -> Scene:
     """Return a box 0.1 x 0.2 x 0.3 of 2 kg that tumbles in gravity, with its body frame off its centre of mass."""
     body = box((0.1, 0.2, 0.3), mass=2.0).rotate(rotation_about((1.0, 2.0, -1.0), 0.7)).about((0.1, 0.05, -0.02))
-    return Scene(
-        "thrown_box",
-        body,
-        rotation_about((1.0, -1.0, 0.3), 1.1),
-        (1.0, 2.0, 3.0),
-        t_end,
-        body.gravity(9.81),
-        dt=0.01,
-        group="free flight",
-        source="ours",
-        p_WB0=(0.3, -0.2, 1.0),
-        v_WB0=(3.0, 1.0, 4.0),
-    )
+    R_WB0, place = rotation_about((1.0, -1.0, 0.3), 1.1), {"p_WB0": (0.3, -0.2, 1.0), "v_WB0": (3.0, 1.0, 4.0)}
+    return _flight("thrown_box", body, R_WB0, (1.0, 2.0, 3.0), t_end, "ours", potential=body.gravity(9.81), **place)
 
 
 def stable_spin(revolutions: float = 100.0, spin: float = 10.0, disturbance: float = 0.1) -> Scene:
