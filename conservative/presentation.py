@@ -1,14 +1,12 @@
-"""A trajectory as a table, a chart, and a card in a notebook. pandas and Altair are imported on demand.
+"""The columns of a table of samples, the chart of a trajectory, and an HTML table. Altair is imported on demand.
 
 The argument `trajectory` is always a `Trajectory`, whose file imports this one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,7 +17,6 @@ from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
-    import pandas
 
 COLUMNS = (
     "t",
@@ -63,16 +60,6 @@ def header(trajectory: Any) -> list[str]:
     return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
 
 
-def table(trajectory: Any) -> pandas.DataFrame:
-    """Return the samples as a table with `columns`; its `attrs` contain scene, method and outcome (`Trajectory.to_pandas`)."""
-    require_extra("Trajectory.to_pandas", "report", "pandas")
-    import pandas as pd
-
-    frame = pd.DataFrame(samples(trajectory), columns=columns(trajectory))
-    frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "outcome": str(trajectory.outcome)}
-    return frame
-
-
 def picture(trajectory: Any) -> altair.VConcatChart:
     """Return an interactive chart of the body rates and of the drift of every invariant over time (`Trajectory.plot`)."""
     require_extra("Trajectory.plot", "report", "altair", "pandas")
@@ -90,15 +77,6 @@ def picture(trajectory: Any) -> altair.VConcatChart:
         _lines(trajectory, drifts, "relative drift", "log"),
     ]
     return _offline(alt.vconcat(*rows, title=title).resolve_scale(color="independent"))
-
-
-def animation(trajectories: Sequence[Any], labels: Sequence[str] | None, truth: Any) -> Any:
-    """Return the animation of trajectories (`Trajectory.animate`)."""
-    if truth is not None and not any(each is truth for each in trajectories):
-        trajectories = [*trajectories, truth]
-    index = next((number for number, each in enumerate(trajectories) if each is truth), None)
-    room = import_module(f"{__package__}.reports.animation")  # a room above this one, only when a user asks for it
-    return room.Animation(trajectories, labels or [each.label for each in trajectories], index)
 
 
 def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
@@ -150,24 +128,6 @@ def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Lite
         .interactive(name=f"zoom_{scale}", bind_y=False)
     )
     return chart
-
-
-def card(trajectory: Any) -> str:
-    """Return a small HTML table with scene, method, outcome, work and drifts."""
-    work = [f"{count} {name}" for name, count in trajectory.work.items()]
-    end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"
-    rows = [
-        ("scene", trajectory.scene.name),
-        ("method", trajectory.label),
-        ("outcome", str(trajectory.outcome)),
-        ("samples", f"{len(trajectory)} to {end}"),
-        ("work", ", ".join(work)),
-        *(
-            (f"drift of {i.name}", f"{sizes(trajectory.drift(i)).max(initial=0.0):.2e} (relative)")
-            for i in trajectory.scene.invariants
-        ),
-    ]
-    return html_table("Trajectory", rows)
 
 
 def html_table(caption: str, rows: list[tuple[str, str]]) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe
-from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest
+from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
 from .flight import FlightInvariant
 from .grid import Grid
 from .invariants import Invariant, sizes
@@ -162,7 +163,12 @@ class Trajectory:
         MissingExtra
             pandas, of the extra `report`, is not installed.
         """
-        return presentation.table(self)
+        require_extra("Trajectory.to_pandas", "report", "pandas")
+        import pandas as pd
+
+        frame = pd.DataFrame(presentation.samples(self), columns=presentation.columns(self))
+        frame.attrs = {"scene": self.scene.name, "method": self.label, "outcome": str(self.outcome)}
+        return frame
 
     def plot(self) -> altair.VConcatChart:
         """Return a chart of the body rates and of the drift of every invariant over time.
@@ -190,17 +196,34 @@ class Trajectory:
         truth
             The reference solution, which has a panel, and is an outline in the others; these show their attitude error.
         """
-        return presentation.animation([self, *others], labels, truth)
+        shown = [self, *others]
+        if truth is not None and not any(each is truth for each in shown):
+            shown.append(truth)
+        index = next((number for number, each in enumerate(shown) if each is truth), None)
+        room = import_module(f"{__package__}.reports.animation")  # a room above this one, only when a user asks for it
+        return room.Animation(shown, labels or [each.label for each in shown], index)
 
     def _repr_html_(self) -> str:
-        return presentation.card(self)
+        rows = [
+            ("scene", self.scene.name),
+            ("method", self.label),
+            ("outcome", str(self.outcome)),
+            ("samples", f"{len(self)} to {self._end}"),
+            ("work", ", ".join(f"{count} {name}" for name, count in self.work.items())),
+        ]
+        drifts = ((each.name, sizes(self.drift(each)).max(initial=0.0)) for each in self.scene.invariants)
+        return presentation.html_table("Trajectory", [*rows, *((f"drift of {k}", f"{x:.2e} (relative)") for k, x in drifts)])
 
     def __len__(self) -> int:
         return len(self.t)
 
     def __repr__(self) -> str:
-        end = f"{self.t[-1]:g} s" if len(self.t) else "nothing"
-        return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {end}, outcome={str(self.outcome)!r})"
+        outcome = str(self.outcome)
+        return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {self._end}, {outcome=})"
+
+    @property
+    def _end(self) -> str:
+        return f"{self.t[-1]:g} s" if len(self) else "nothing"
 
 
 START_TOLERANCE = 1e-6
