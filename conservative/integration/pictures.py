@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import unit_vector
+from ..presentation import LEAST_DRAWN
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
@@ -27,8 +28,6 @@ _RINGS = (*(m * 10.0**k for k in range(-9, 1) for m in (1, 2, 5)), 10.0, 20.0, 3
 """Angles between rings, degrees."""
 _LEAST_EXTENT = 1e-7
 """Smallest half side of a disc, rad."""
-LEAST_DRAWN = 1e-17
-"""Relative drift at which smaller ones, including 0, are drawn."""
 MOST_TIMES = 200
 """Largest number of samples of a line over time."""
 _PER_DECADE = 4

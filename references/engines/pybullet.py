@@ -45,7 +45,7 @@ def prepare(given):
 
     bullet.connect(bullet.DIRECT)
     flies = hasattr(given, "p_WB0")
-    build, look = (_build_free, _look_at_free) if given.free else (_build_held, _look_at_held)
+    build = _build_free if given.free else _build_held
 
     def run():
         bullet.resetSimulation()
@@ -54,7 +54,10 @@ def prepare(given):
         body = build(bullet, given)
 
         def read():
-            (x, y, z, s), w = look(bullet, body)
+            if given.free:
+                (x, y, z, s), w = bullet.getBasePositionAndOrientation(body)[1], bullet.getBaseVelocity(body)[1]
+            else:
+                (x, y, z, s), w = bullet.getJointStateMultiDof(body, 0)[:2]  # getLinkState has single precision
             place = {"p": bullet.getBasePositionAndOrientation(body)[0], "v": bullet.getBaseVelocity(body)[0]} if flies else {}
             return {"q": (s, x, y, z), "w_W": w, **place}
 
@@ -62,7 +65,11 @@ def prepare(given):
         if flies:  # Bullet's frame is at the centre of mass
             arm = np.array([_matrix(q) for q in samples["q"]]) @ given.com
             samples |= {"p": samples["p"] - arm, "v": samples["v"] - np.cross(samples["w_W"], arm)}
-        return samples if given.free else _to_axes(samples["q"], samples["w_W"], given)
+        if given.free:
+            return samples
+        # From the principal axes about the centre of mass to the axes F.
+        back = given.q_com * (1, -1, -1, -1)
+        return {"q": _product(samples["q"], back), "w": samples["w_W"] @ _matrix(given.q_com).T}
 
     return run
 
@@ -80,10 +87,6 @@ def _build_free(bullet, given):
         _switch_off(bullet, body, -1)
     bullet.resetBaseVelocity(body, (getattr(given, "v_WB0", 0) + np.cross(given.w0_W, arm)).tolist(), given.w0_W.tolist())
     return body
-
-
-def _look_at_free(bullet, body):
-    return bullet.getBasePositionAndOrientation(body)[1], bullet.getBaseVelocity(body)[1]
 
 
 def _build_held(bullet, given):
@@ -108,16 +111,6 @@ def _build_held(bullet, given):
     bullet.setJointMotorControlMultiDof(body, 0, bullet.POSITION_CONTROL, **hold)
     bullet.resetJointStateMultiDof(body, 0, _x_first(q0), (given.w0 @ R).tolist())  # rates in its own axes
     return body
-
-
-def _look_at_held(bullet, body):
-    return bullet.getJointStateMultiDof(body, 0)[:2]  # getLinkState has single precision
-
-
-def _to_axes(q, w, given):
-    """Convert attitudes and rates from the principal axes about the centre of mass to the axes F."""
-    back = given.q_com * (1, -1, -1, -1)
-    return {"q": _product(q, back), "w": w @ _matrix(given.q_com).T}
 
 
 def _switch_off(bullet, body, part):
