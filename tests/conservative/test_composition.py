@@ -83,12 +83,12 @@ def test_the_conditions_show_a_wrong_digit_and_a_wrong_order() -> None:
 def test_the_default_set_is_the_best_of_its_order() -> None:
     for order, name in BEST.items():
         assert composition_of(order) is COMPOSITIONS[name]
-        rivals = [known for known in COMPOSITIONS.values() if known.order == order]
+        rivals = [known for known in COMPOSITIONS if COMPOSITIONS[known].order == order]
         # As many stages for each, hence about as much work: 3 s in about 990 stages, for order 10 in 400.
         work = 400 if order == 10 else 990
         errors = {}
         for rival in rivals:
-            n = round(work / rival.stages)
-            run = cv.Reduced(order, rival.name).run(TOP, 3.0 / n, sample_every=10**9)
-            errors[rival.name] = float(angle_between(reference(), run.R_WB[-1]))
+            n = round(work / COMPOSITIONS[rival].stages)
+            run = cv.Reduced(order, rival).run(TOP, 3.0 / n, sample_every=10**9)
+            errors[rival] = float(angle_between(reference(), run.R_WB[-1]))
         assert min(errors, key=lambda rival: errors[rival]) == name

@@ -10,13 +10,12 @@ from ...errors import BadInput
 
 
 class Composition(NamedTuple):
-    """Name, even order and publication of a composition of symmetric steps of order 2, and the first half of its lengths.
+    """Even order and publication of a composition of symmetric steps of order 2, and the first half of its lengths.
 
     `half` has decimals, with more digits than a double, of the lengths of the first stages relative to the step, up to and
     including the middle one; the rest mirrors them. Tests check the order conditions and measure the order.
     """
 
-    name: str
     order: int
     source: str
     half: str
@@ -45,45 +44,39 @@ class Composition(NamedTuple):
         return tuple(rounded)
 
 
-_ALL = (
-    Composition("one_step", 2, "the step itself", "1"),
-    Composition(
-        "forest_ruth_3",
+COMPOSITIONS = {
+    "one_step": Composition(2, "the step itself", "1"),
+    "forest_ruth_3": Composition(
         4,
         "Forest & Ruth 1990; Yoshida 1990",
         "1.351207191959657634047687808971460826922 -1.702414383919315268095375617942921653844",
     ),
-    Composition(
-        "suzuki_5",
+    "suzuki_5": Composition(
         4,
         "Suzuki 1990",
         "0.414490771794375737142354062860761495711775 0.414490771794375737142354062860761495711775 "
         "-0.657963087177502948569416251443045982847098",
     ),
-    Composition(
-        "mclachlan_5",
+    "mclachlan_5": Composition(
         4,
         "McLachlan 1995",
         "0.280000000000000000007541375864594412990231 0.625466428467670044995942535032658194429876 "
         "-0.810932856935340090006967821794505214840213",
     ),
-    Composition(
-        "yoshida_7",
+    "yoshida_7": Composition(
         6,
         "Yoshida 1990, solution A",
         "0.784513610477557263819497633866349875776824 0.235573213359358133684793182978534601686468 "
         "-1.17767998417887100694641568096431573463927 1.31518632068391121888424972823886251435195",
     ),
-    Composition(
-        "kahan_li_9",
+    "kahan_li_9": Composition(
         6,
         "Kahan & Li 1997, s9odr6a",
         "0.392161444007314139279250557422671403804934 0.332599136789359438599748637500049646881587 "
         "-0.706246172557639359809964819549256459395511 0.0822135962935508002314904481020563311032939 "
         "0.798543990934829963398950353048958155211391",
     ),
-    Composition(
-        "kahan_li_17",
+    "kahan_li_17": Composition(
         8,
         "Kahan & Li 1997, s17odr8a",
         "0.130202483088890080878817632096700522357247 0.561162981775108384561964407700150567266159 "
@@ -92,8 +85,7 @@ _ALL = (
         "0.258374387686322047293979109994939471813076 0.295011723609310298870966240218228112976543 "
         "-0.605508533830034511698921079334718587562643",
     ),
-    Composition(
-        "suzuki_umeno_15",
+    "suzuki_umeno_15": Composition(
         8,
         "Suzuki & Umeno 1993",
         "0.741670364350612953448227801783806315603537 -0.409100825800031593997300095893563417309918 "
@@ -101,8 +93,7 @@ _ALL = (
         "0.299064181303655923844463540688602988225823 0.334624918245298183784957979882182288633692 "
         "0.315293092396766596632056663811002430994081 -0.796887939352916354019788840173733053446332",
     ),
-    Composition(
-        "mclachlan_17",
+    "mclachlan_17": Composition(
         8,
         "McLachlan 1995",
         "0.128865979381443298964879690876529454482711 0.581514087105250962431063963983883229745653 "
@@ -111,8 +102,7 @@ _ALL = (
         "0.278335500393679651314353242840553652005516 0.314956683916294857884378740326278311770834 "
         "-0.626994825405133974880563836810092810121667",
     ),
-    Composition(
-        "hairer_lubich_wanner_33",
+    "hairer_lubich_wanner_33": Composition(
         10,
         "Hairer, Lubich & Wanner 2006, V.3.2",
         "0.0904061936860727849216115009321603218120353 0.535918159530301202137849834402254494805461 "
@@ -125,8 +115,7 @@ _ALL = (
         "-0.30399616617237257346546355724557956882626 0.0524695718810006957452161236802525824715398 "
         "0.443733808050190879551113653345330908178812",
     ),
-    Composition(
-        "sofroniou_spaletta_35",
+    "sofroniou_spaletta_35": Composition(
         10,
         "Sofroniou & Spaletta 2005",
         "0.0787957225216864192639076793383782352877653 0.313096103415108527764812471919375119427788 "
@@ -139,9 +128,7 @@ _ALL = (
         "0.0519425029624496470371829049273376385168948 0.0506650907599244963358743424008435193510213 "
         "0.0496743706397298790545688003948408097700571 0.0493177357595945379176800098345828934117586",
     ),
-)
-
-COMPOSITIONS = {composition.name: composition for composition in _ALL}
+}
 """All sets by name."""
 
 BEST = {2: "one_step", 4: "suzuki_5", 6: "kahan_li_9", 8: "kahan_li_17", 10: "sofroniou_spaletta_35"}
@@ -154,7 +141,7 @@ def composition_of(order: int, name: str | None = None) -> Composition:
     Raise `BadInput` if there is no set of this order, or none of this name that has this order.
     """
     choice("order", order, tuple(BEST))
-    allowed = [known.name for known in _ALL if known.order == order]
+    allowed = [known for known in COMPOSITIONS if COMPOSITIONS[known].order == order]
     if name is not None and not (isinstance(name, str) and name in allowed):
         raise BadInput("composition", describe(name), f"None or, of order {order}, one of " + ", ".join(allowed))
     return COMPOSITIONS[BEST[order] if name is None else name]

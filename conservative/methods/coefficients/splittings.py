@@ -69,6 +69,6 @@ def lengths_of(order: int, name: str | None, exact: bool) -> Lengths:
     if found and name in (None, *found):
         return SEQUENCES[found[0]].lengths
     if found:
-        choice("composition", name, (*found, *(each.name for each in COMPOSITIONS.values() if each.order == order)))
+        choice("composition", name, (*found, *(known for known in COMPOSITIONS if COMPOSITIONS[known].order == order)))
     weights = (Fraction(0), *composition_of(order, name).weights, Fraction(0))
     return weights[:-1], tuple((a + b) / 2 for a, b in itertools.pairwise(weights))
