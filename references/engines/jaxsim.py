@@ -50,7 +50,7 @@ def prepare(given):
         base_angular_velocity=jax.numpy.array(given.w0_W),
         velocity_representation=js.common.VelRepr.Mixed,  # angular velocity in the world
     )
-    march, counts = compile_jax(_step, _read), np.diff(given.steps).astype(np.int32)
+    march, counts = compile_jax(js.model.step, _read), np.diff(given.steps).astype(np.int32)
     jax.block_until_ready(march(model, start, counts))
 
     def run():
@@ -58,12 +58,6 @@ def prepare(given):
         return {"q": np.vstack([given.q0, np.asarray(q, float)]), "w_W": np.vstack([given.w0_W, np.asarray(w, float)])}
 
     return run
-
-
-def _step(model, data):
-    import jaxsim.api as js
-
-    return js.model.step(model, data)
 
 
 def _read(data):

@@ -49,7 +49,14 @@ def prepare(given):
     times = (given.steps * given.dt).tolist()
 
     def run():
-        manager = _manager(opensim, model, given)
+        manager = opensim.Manager(model)
+        manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{given.integrator}"))
+        manager.setWriteToStorage(False)
+        manager.setPerformAnalyses(False)
+        if given.accuracy:
+            manager.setIntegratorAccuracy(given.accuracy)
+        else:
+            manager.setIntegratorFixedStepSize(given.dt)
         manager.initialize(opensim.State(state))
         R, w = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
         R[0], w[0] = given.R0, given.w0_W
@@ -80,15 +87,3 @@ def _build(opensim, given):
         joint.get_coordinates(i).setValue(state, angle, False)
         joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
     return model, body, state
-
-
-def _manager(opensim, model, given):
-    manager = opensim.Manager(model)
-    manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{given.integrator}"))
-    manager.setWriteToStorage(False)
-    manager.setPerformAnalyses(False)
-    if given.accuracy:
-        manager.setIntegratorAccuracy(given.accuracy)
-    else:
-        manager.setIntegratorFixedStepSize(given.dt)
-    return manager
