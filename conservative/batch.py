@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .attitude import Array, to_quaternion
+from .attitude import Array
 from .check import replace_unchecked
-from .potentials.field import into_axes
 from .potentials.potential import AnyPotential
 from .potentials.turning import Turning, static_part
 from .potentials.varied import OneByOne, Varied
@@ -114,17 +113,6 @@ class Batch:
             if axis is not None:
                 axes_B[i] = axis
         return axes_B
-
-    @cached_property
-    def q_WP0(self) -> Array:
-        """Initial attitudes (n, 4) of the principal axes, scalar first."""
-        return to_quaternion(self.R_WB0 @ self.principal[1])
-
-    @cached_property
-    def L_P0(self) -> Array:
-        """Initial angular momenta (n, 3), kg m^2/s, principal axes."""
-        moments, R_BP = self.principal
-        return into_axes(self.w_WB_B0, R_BP) * moments
 
 
 def principal_axes(inertia: Array) -> tuple[Array, Array]:

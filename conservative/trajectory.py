@@ -307,19 +307,15 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
             quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / size), bounds.drift))
         if (energy := invariants.find_energy(result.scene.invariants)) is not None:
             quantities.append((energy.name, sizes(result.drift(energy)), bounds.energy))
-    n, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
+    # The appended sample ends the search where all are within the bound.
+    counts = [int(np.argmin(np.append(values <= bound, False))) for _, values, bound in quantities]
+    n, (name, values, bound) = min(zip(counts, quantities, strict=True), key=lambda pair: pair[0])
     if n == len(result):
         return result
     time, drift = float(result.t[max(n - 1, 0)]), float(values.max())
     if name in {"orthonormality", *conserved}:
         return _cut(result, n, NotConserved(time, name, drift, bound))
     return _cut(result, n, Diverged(time, f"the drift of {name} is {drift:.3g}, the bound {bound:.3g}"))
-
-
-def _count_within(values: Array, bound: float) -> int:
-    """Return how many leading values (n,) are within a bound."""
-    within = values <= bound
-    return len(values) if within.all() else int(np.argmin(within))
 
 
 def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..attitude import to_quaternion
 from ..batch import Batch
 from ..card import Card, Cost, Structure
 from ..check import choice, positive_number
@@ -15,6 +16,7 @@ from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import with_balances
 from ..method import Method, Role, Run
+from ..potentials.field import into_axes
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
@@ -153,13 +155,14 @@ def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
     moments, R_BP = bodies.principal
     time, units = find_unit_of_time(grid), find_units_of_moments(moments)[:, None]
     lengths, tol = find_coefficients(method.order, method.composition, method.tol, grid.dt / time)
-    J, L0 = moments / units, bodies.L_P0 / units * time
+    J, q0 = moments / units, to_quaternion(bodies.R_WB0 @ R_BP)
+    L0 = into_axes(bodies.w_WB_B0, R_BP) * moments / units * time
     columns = stack_columns([J, 1 / J], kernel.WIDTH)
     field = None if bodies.scene.free else stack_columns([moments_of_gravity(bodies, R_BP) / units * time * time], kernel.WIDTH)
     starts, room = np.zeros((kernel.ROWS, columns.shape[1])), make_room(kernel.ROOM, kernel.WIDTH)
-    starts[:7] = stack_columns([bodies.q_WP0, L0], kernel.WIDTH)
+    starts[:7] = stack_columns([q0, L0], kernel.WIDTH)
     q, L = np.empty((columns.shape[1], s, 4)), np.empty((columns.shape[1], s, 3))
-    q[:n, 0], L[:n, 0] = bodies.q_WP0, L0
+    q[:n, 0], L[:n, 0] = q0, L0
 
     def run() -> Block:
         states, finished = starts.copy(), np.ones(columns.shape[1], dtype=bool)

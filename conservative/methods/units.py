@@ -21,7 +21,6 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import read_only, replace_unchecked
-from ..flight import Flight
 from ..grid import Grid
 from ..method import Method, Run
 from ..potentials.potential import depends_on_time
@@ -55,7 +54,10 @@ class Units:
         energy, potential = self.moment / self.time / self.time, cast(Any, scene.potential)
         if potential is not None:
             potential = potential.in_units(energy, self.time) if depends_on_time(potential) else potential.in_units(energy)
-        rotor = scene.body.rotor_momentum
+        rotor, flight = scene.body.rotor_momentum, scene.flight
+        if flight is not None:
+            mass, g, v_WB0 = flight.mass / self.moment, flight.g * self.time**2, read_only(flight.v_WB0 * self.time)
+            flight = replace_unchecked(flight, mass=mass, g=g, v_WB0=v_WB0)
         if rotor is not None:
             rotor = read_only(rotor / self.moment * self.time)
         return replace_unchecked(
@@ -68,12 +70,8 @@ class Units:
             damping=scene.damping and scene.damping.in_units(energy, self.time),
             dt=scene.dt / self.time,
             extra_invariants=(),
-            flight=scene.flight and self._convert_flight(scene.flight),
+            flight=flight,
         )
-
-    def _convert_flight(self, flight: Flight) -> Flight:
-        mass, g, v_WB0 = flight.mass / self.moment, flight.g * self.time**2, read_only(flight.v_WB0 * self.time)
-        return replace_unchecked(flight, mass=mass, g=g, v_WB0=v_WB0)
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
