@@ -113,7 +113,16 @@ def lean(scene: Scene) -> Formulation:
 
 
 def _free_rates_and_angle(scene: Scene) -> Formulation:
-    axes = _order_axes(principal_axes(scene))
+    """Return the formulation in principal axes in the order in which the momentum circulates about the third axis, L3 > 0.
+
+    The third is the axis of the largest moment if l^2 > 2 T J_middle, of the smallest otherwise.
+    """
+    axes = principal_axes(scene)
+    L0, order = axes.J * axes.w0, np.argsort(axes.J)
+    third = int(order[2] if L0 @ axes.w0 * axes.J[order[1]] < L0 @ L0 else order[0])
+    axes = order_axes(axes, third)
+    if L0[third] < 0:
+        axes = replace(axes, R_BF=axes.R_BF @ _DOWN)
     L0 = axes.J * axes.w0
     momentum = float(np.linalg.norm(L0))
     slope = momentum / axes.J[2]
@@ -168,18 +177,6 @@ def _heights(axes: EngineAxes) -> tuple[float, float]:
         if low - 1e-6 <= n <= high + 1e-6 and np.polyval(cubic, (low + high) / 2) > 0
     ]
     return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
-
-
-def _order_axes(axes: EngineAxes) -> EngineAxes:
-    """Return principal axes in the order in which a free body's momentum circulates about the third axis, L3 > 0.
-
-    The third is the axis of the largest moment if l^2 > 2 T J_middle, of the smallest otherwise.
-    """
-    L0 = axes.J * axes.w0
-    order = np.argsort(axes.J)
-    third = order[2] if L0 @ axes.w0 * axes.J[order[1]] < L0 @ L0 else order[0]
-    ordered = order_axes(axes, int(third))
-    return EngineAxes(axes.scene, ordered.R_BF @ _DOWN, ordered.J) if L0[third] < 0 else ordered
 
 
 def _least(n: Array) -> Array:
