@@ -15,15 +15,12 @@ quarter periods (K, 2 K') and dc(y, 1 - m) = |L|/L3max.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from conservative.attitude import Array
 
 from .digits import (
     Matrix,
-    Number,
     Phase,
     Vector,
     as_array,
@@ -35,53 +32,14 @@ from .digits import (
     rotation_phase,
 )
 from .start import InitialState, Motion
-from .theta import Lattice, Points, Theta, jacobi, theta
+from .theta import Lattice, Points, jacobi, theta
 
 
-@dataclass(frozen=True, eq=False)
-class OrderedAxes:
-    """Moments and momentum in axes 1, 2, 3 as above, and derived quantities that are computed without cancellation.
+def order_axes(start: InitialState) -> tuple[Vector, Vector, Matrix]:
+    """Return moments and momentum in axes 1, 2, 3 as above, and these axes (R_BP), with L1 and L3 not negative.
 
-    The columns of `R_BP` are the axes, with L1 and L3 not negative.
+    The sign of |L|^2 - 2 T J2 determines the axis that the momentum circles.
     """
-
-    J: Vector
-    L: Vector
-    R_BP: Matrix
-
-    def gap(self, i: int, j: int) -> Number:
-        """Return 1/J_i - 1/J_j, which has the same sign for all i < j."""
-        return (self.J[j] - self.J[i]) / (self.J[i] * self.J[j])
-
-    @property
-    def size(self) -> Number:
-        """|L|."""
-        return mp.norm(self.L)
-
-    @property
-    def excess(self) -> Number:
-        """2T - |L|^2/J3, which has the sign of the gaps."""
-        return self.L[0] ** 2 * self.gap(0, 2) + self.L[1] ** 2 * self.gap(1, 2)
-
-    @property
-    def largest(self) -> Vector:
-        """L1max, L2max, L3max."""
-        third = (self.L[1] ** 2 * self.gap(0, 1) + self.L[2] ** 2 * self.gap(0, 2)) / self.gap(0, 2)
-        return [mp.sqrt(self.excess / self.gap(0, 2)), mp.sqrt(self.excess / self.gap(1, 2)), mp.sqrt(third)]
-
-    @property
-    def lattice(self) -> Lattice:
-        """Periods of L in v. 1 - m = (L3min/L3max)^2 is 0 on the separatrix."""
-        L2max, L3max = self.largest[1:]
-        m = (L2max / L3max) ** 2 * self.gap(0, 1) / self.gap(0, 2)
-        # L3min^2 is the only difference. Without divisions it is exact, so it is 0 on the separatrix.
-        (J1, J2, J3), (L1, _, L3) = self.J, self.L
-        least = (J1 * (J3 - J2) * L3**2 - J3 * (J2 - J1) * L1**2) / (J1 * (J3 - J2))
-        return Lattice.of(m, max(least / L3max**2, mp.mpf(0)))
-
-
-def order_axes(start: InitialState) -> OrderedAxes:
-    """Return the initial state in ordered axes. The sign of |L|^2 - 2 T J2 determines the axis that the momentum circles."""
     J, axes = start.principal
     w = start.rates(axes)
     a, b, c = sorted(range(3), key=lambda i: J[i])
@@ -92,28 +50,39 @@ def order_axes(start: InitialState) -> OrderedAxes:
     columns[1] = cross(columns[2], columns[0])
     R_BP = mp.matrix(columns).T
     moments = [J[i] for i in order]
-    return OrderedAxes(moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP)
+    return moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP
 
 
 def free_motion(start: InitialState) -> Motion:
     """Return the motion of an initial state that is not steady."""
-    axes = order_axes(start)
-    J, L, size, largest, lattice = axes.J, axes.L, axes.size, axes.largest, axes.lattice
-    omega = axes.gap(0, 2) * largest[0] * largest[2] / largest[1]
+    J, L, R_BP = order_axes(start)
+    # 1/J_i - 1/J_j: all have one sign, so that no sum of them cancels.
+    gap_12, gap_13, gap_23 = ((J[j] - J[i]) / (J[i] * J[j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+    size, excess = mp.norm(L), L[0] ** 2 * gap_13 + L[1] ** 2 * gap_23  # |L| and 2T - |L|^2/J3
+    third = (L[1] ** 2 * gap_12 + L[2] ** 2 * gap_13) / gap_13
+    largest = [mp.sqrt(excess / gap_13), mp.sqrt(excess / gap_23), mp.sqrt(third)]
+    # 1 - m = (L3min/L3max)^2. L3min^2 is the only difference. Without divisions it is exact, so it is 0 on the separatrix.
+    (J1, J2, J3), (L1, _, L3) = J, L
+    least = (J1 * (J3 - J2) * L3**2 - J3 * (J2 - J1) * L1**2) / (J1 * (J3 - J2))
+    m = (largest[1] / largest[2]) ** 2 * gap_12 / gap_13
+    lattice = Lattice.of(m, max(least / largest[2] ** 2, mp.mpf(0)))
+    omega = gap_13 * largest[0] * largest[2] / largest[1]
     cn, sn, dn = (a / b for a, b in zip(L, largest, strict=True))
     v0 = sn * mp.elliprf(cn**2, dn**2, 1)
-    phase = pole_phase(axes, lattice)
+    # K' - y = A F(1 - A^2, 1 - A^2 (1 - m), 1) with Carlson's F and A = L3max/|L|, also if K' is infinite.
+    L1max, L2max, L3max = (x / size for x in largest)
+    rest = L3max * mp.elliprf(L1max**2, L1max**2 + L2max**2 * gap_12 / gap_13, 1)
+    phase = theta(Lattice(lattice.K, 2 * lattice.K_prime), 4, lattice.K_prime - rest, lattice.K_prime + rest)
     value, slope = phase.value_and_slope(mp.mpf(0))
-    excess = axes.excess / size
-    mu = (size / J[2] + excess / (1 + largest[2] / size)) / 2 - omega * (slope / value).imag
+    mu = (size / J3 + excess / size / (1 + L3max)) / 2 - omega * (slope / value).imag
     # The smallest rotation from the direction of L, whose third component is positive, to e_z.
     x, y, z = (component / size for component in L)
     k = 1 / (1 + z)
     R_lP0 = mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])
-    q_Wl, q_PB = halves_in_double(start.attitude * axes.R_BP * R_lP0.T), halves_in_double(axes.R_BP.T)
+    q_Wl, q_PB = halves_in_double(start.attitude * R_BP * R_lP0.T), halves_in_double(R_BP.T)
     argument, turn = Phase(v0, omega, 2 * lattice.K), rotation_phase(-mp.arg(phase.value_and_slope(v0)[0]), mu)
     shape, inverse_J = np.array([float(x / size) for x in largest]), np.array([float(1 / x) for x in J])
-    parts, R_BP = jacobi(lattice), as_array(axes.R_BP)
+    parts, axes = jacobi(lattice), as_array(R_BP)
 
     def at(t: Array) -> tuple[Array, Array]:
         v, odd = argument.reduce(t)
@@ -123,18 +92,6 @@ def free_motion(start: InitialState) -> Motion:
         m = np.stack([flip * cn, flip * sn, dn], axis=-1) * shape
         chi = turn.phasor(t) * Points(phase.lattice, v).theta(phase)
         q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
-        return from_halves(*multiply(multiply(q_Wl, q_lP), q_PB)), (m * (float(size) * inverse_J)) @ R_BP.T
+        return from_halves(*multiply(multiply(q_Wl, q_lP), q_PB)), (m * (float(size) * inverse_J)) @ axes.T
 
     return at
-
-
-def pole_phase(axes: OrderedAxes, lattice: Lattice) -> Theta:
-    """Return theta_4(v - i y) with quarter periods (K, 2 K').
-
-    K' - y = A F(1 - A^2, 1 - A^2 (1 - m), 1) with Carlson's F and A = L3max/|L|, also if K' is infinite.
-    """
-    L1max, L2max, L3max = (x / axes.size for x in axes.largest)
-    m_part = L2max**2 * axes.gap(0, 1) / axes.gap(0, 2)  # A^2 m
-    rest = L3max * mp.elliprf(L1max**2, L1max**2 + m_part, 1)
-    y = lattice.K_prime - rest
-    return theta(Lattice(lattice.K, 2 * lattice.K_prime), 4, y, lattice.K_prime + rest)
