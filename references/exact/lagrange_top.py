@@ -85,24 +85,9 @@ class Top:
         return self.u + abs(self.w) ** 2 / (2 * self.k)
 
     @property
-    def rising(self) -> bool:
-        """True if u' >= 0."""
-        return bool((mp.conj(self.across) * self.w).imag >= 0)
-
-    @property
     def upright(self) -> bool:
         """True if the axis stands or hangs at rest."""
         return bool(abs(self.across) < _UPRIGHT and abs(self.w) < _UPRIGHT * mp.sqrt(self.k))
-
-    @property
-    def slopes(self) -> tuple[Number, Number, Number]:
-        """Derivatives of alpha, beta and w."""
-        alpha, beta, w, i = self.alpha, self.beta, self.w, mp.mpc(0, 1)
-        return (
-            (i * self.spin * alpha - beta * mp.conj(w)) / 2,
-            (alpha * w - i * self.spin * beta) / 2,
-            -i * (self.spin - self.b3) * w - i * self.k * self.across,
-        )
 
 
 def top(start: InitialState, moment_B: Array, axis_B: Array) -> Top:
@@ -198,7 +183,8 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
 def nutation_phase(start: Top, roots: Nutation) -> Phase:
     """Return v as a function of time."""
     omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
-    return Phase(roots.start(start.u, start.rising), omega, 2 * roots.lattice.K)
+    rising = bool((mp.conj(start.across) * start.w).imag >= 0)  # u' >= 0
+    return Phase(roots.start(start.u, rising), omega, 2 * roots.lattice.K)
 
 
 def top_motion(start: Top) -> Motion:
@@ -218,8 +204,12 @@ def top_motion(start: Top) -> Motion:
         quotient(lattice, 2, *roots.above(u_E), mirrored=bool(across < 0)),
     )
     w_scale = mp.sqrt(2 * start.k * (u_E - roots.u1))
-    values = (start.alpha, start.beta, start.w / w_scale)
-    slopes = (*start.slopes[:2], start.slopes[2] / w_scale)
+    values, i = (start.alpha, start.beta, start.w / w_scale), mp.mpc(0, 1)
+    slopes = (
+        (i * start.spin * start.alpha - start.beta * mp.conj(start.w)) / 2,
+        (start.alpha * start.w - i * start.spin * start.beta) / 2,
+        (-i * (start.spin - start.b3) * start.w - i * start.k * start.across) / w_scale,
+    )
     parts = zip(shapes, rates, values, slopes, strict=True)
     alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
     R_BP, q_PB = as_array(start.R_BP), halves_in_double(start.R_BP.T)
