@@ -31,7 +31,7 @@ only bound the energy error.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -121,64 +121,33 @@ PART = 1.5e-8
 """Approximate time, s, of a part of a step for a body in lanes. It determines only how often a run can be stopped."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tops:
-    """The initial states of n tops, in the non-spinning frame.
-
-    Attributes
-    ----------
-    places
-        Indices of the tops (n,) in the batch.
-    J1, J3
-        Moments (n,) across and along the axis, kg m^2.
-    kappa
-        Weights times lever arms (n,), N m.
-    q, L
-        Attitudes (n, 4), scalar first, and momenta (n, 3), kg m^2/s.
-    R_BP
-        Rotations (n, 3, 3) from the frame's axes to body axes.
-    """
-
-    places: Any
-    J1: Array
-    J3: Array
-    kappa: Array
-    q: Array
-    L: Array
-    R_BP: Array
-
-    def __getitem__(self, part: Any) -> Tops:
-        return Tops(*(getattr(self, each.name)[part] for each in fields(self)))
-
-    @property
-    def rate(self) -> Array:
-        """Upper bounds of the angular speed (n,), rad/s, as `bound_rate` computes for scenes."""
-        kinetic = (self.L[:, 0] ** 2 + self.L[:, 1] ** 2) / self.J1 + self.L[:, 2] ** 2 / self.J3
-        return np.sqrt((kinetic + 2 * np.abs(self.kappa)) / np.minimum(self.J1, self.J3))
-
-
 def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     """Return the run of many tops (`march_lanes` of `conservative.kernels.lame`); None if no body has such a step."""
     kernel, n, time = kernels("lame"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
-    if tops is not None:
-        with np.errstate(all="ignore"):  # the comparison below excludes tops whose numbers overflow
-            units = find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1))
-            kappa, L = tops.kappa / units * time * time, tops.L / units[:, None] * time
-            tops = replace(tops, J1=tops.J1 / units, J3=tops.J3 / units, kappa=kappa, L=L)
-            tops = tops[tops.rate * h <= MOST_RADIANS]
-    if tops is None or not len(tops.places):
+    if tops is None:
         return None
-    table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
-    kernel.prepare_lanes(tops.J1, tops.kappa, tops.q, tops.L, h, table)
+    places, J1, J3, kappa, q0, L0, R_BP = tops
+    with np.errstate(all="ignore"):  # the comparison below excludes tops whose numbers overflow
+        units = find_units_of_moments(np.stack([J1, J3], axis=1))
+        J1, J3, kappa, L0 = J1 / units, J3 / units, kappa / units * time * time, L0 / units[:, None] * time
+        kinetic = (L0[:, 0] ** 2 + L0[:, 1] ** 2) / J1 + L0[:, 2] ** 2 / J3
+        slow = h * np.sqrt((kinetic + 2 * np.abs(kappa)) / np.minimum(J1, J3)) <= MOST_RADIANS  # as in `bound_rate`
+    places, J1, J3, kappa, q0, L0, R_BP = (each[slow] for each in (places, J1, J3, kappa, q0, L0, R_BP))
+    k, s = len(places), grid.n_samples
+    if not k:
+        return None
+    m = -(-k // kernel.WIDTH) * kernel.WIDTH
+    table = np.empty((kernel.ROWS, m))
+    kernel.prepare_lanes(J1, kappa, q0, L0, h, table)
     # Tops with equal numbers of parts per step are neighbours, so that few lanes wait.
-    order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
-    k, m, s = len(order), table.shape[1], grid.n_samples
-    tops, table[:, :k] = tops[order], table[:, order]
+    order = np.argsort(table[kernel.PARTS, :k], kind="stable")
+    places, J1, J3, q0, L0, R_BP = (each[order] for each in (places, J1, J3, q0, L0, R_BP))
+    table[:, :k] = table[:, order]
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
-    q[:k, 0], L[:k, 0] = tops.q, tops.L
-    spin = np.stack([spin_rate(tops.J1, tops.J3, tops.L[:, 2]), 1 / tops.J3], axis=1)  # the rate that the frame omits, and 1/J3
-    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), spin / time, tops.R_BP
+    q[:k, 0], L[:k, 0] = q0, L0
+    spin = np.stack([spin_rate(J1, J3, L0[:, 2]), 1 / J3], axis=1)  # the rate that the frame omits, and 1/J3
+    turn = np.repeat(1 / J1 / time, 3).reshape(-1, 3), spin / time, R_BP
     cost = PART * m * float(table[kernel.PARTS].max())
 
     def run() -> Block:
@@ -186,13 +155,17 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
         take_pieces(
             grid.n_steps, cost, lambda done, last: kernel.march_lanes(states, done, last, grid.n_steps, grid.every, q, L)
         )
-        return turn_samples(grid, q, L, turn, tops.places, n)
+        return turn_samples(grid, q, L, turn, places, n)
 
     return run
 
 
-def find_tops(method: Lame, bodies: Batch) -> Tops | None:
-    """Return the tops that the method supports; None if there are none."""
+def find_tops(method: Lame, bodies: Batch) -> tuple[Array, ...] | None:
+    """Return the initial states, in the non-spinning frame, of the n tops that the method supports; None if there are none.
+
+    They are the indices (n,) in the batch, the moments (n,) across and along the axis, kg m^2, weights times lever arms (n,),
+    N m, attitudes (n, 4), scalar first, momenta (n, 3), kg m^2/s, and rotations (n, 3, 3) from the frame's to body axes.
+    """
     weights, n = bodies.parameters.get("weight", np.ones(1)), len(bodies)
     one_sign = bool((weights > 0).all() or (weights < 0).all())
     if bodies.inertia is None and "com_B" not in bodies.parameters and one_sign:  # all have the same axis of symmetry
@@ -203,7 +176,7 @@ def find_tops(method: Lame, bodies: Batch) -> Tops | None:
         R_BP = np.tile(axes, (n, 1, 1))
         kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
         q, L = to_quaternion(bodies.R_WB0 @ R_BP), into_axes(bodies.w_WB_B0, R_BP) * (J1, J1, J3)
-        return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)
+        return np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP
     found = []
     for i in range(n):
         scene = bodies.take(i)
@@ -211,4 +184,4 @@ def find_tops(method: Lame, bodies: Batch) -> Tops | None:
             axes, J1, J3 = slow_axes(scene)
             start = start_along(scene, axes, np.array((J1, J1, J3)))
             found.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
-    return Tops(*(np.array(column) for column in zip(*found, strict=True))) if found else None
+    return tuple(np.array(column) for column in zip(*found, strict=True)) if found else None
