@@ -6,7 +6,8 @@ sample; `conservative.invariants` has the definitions and the scales of both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -24,43 +25,30 @@ ORTHONORMALITY = "orthonormality"
 _NO_ENERGIES = np.empty((0, 0))
 
 
-@dataclass(frozen=True, eq=False)
-class ReferenceValues:
-    """Initial values of the invariants of n bodies, and their reference scales.
+def measure_drifts(bodies: Batch, reference: Array, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return the largest drifts (n, 5) of each body, dimensionless; `reference` (n, 10, 3) is from `find_reference`.
 
-    Attributes
-    ----------
-    bodies
-        The bodies.
-    rows
-        Rows (n, 10, 3), as `conservative.kernels.drifts.measure` defines them.
+    The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the method
+    conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not the grid's.
+    Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     """
-
-    bodies: Batch
-    rows: Array
-
-    def measure(self, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
-        """Return the largest drifts (n, 5) of each body, dimensionless.
-
-        The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the
-        method conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not
-        the grid's. Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
-        """
-        drifts, rotor = np.empty((len(self.rows), 5)), self.bodies.scene.body.rotor_momentum
-        V = _NO_ENERGIES if self.bodies.scene.potential is None else field_energies(self.bodies, t, R_WB, w_WB_B)
-        kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, rotor, self.rows, drifts)
-        return drifts
+    drifts, rotor = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum
+    V = _NO_ENERGIES if bodies.scene.potential is None else field_energies(bodies, t, R_WB, w_WB_B)
+    kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts)
+    return drifts
 
 
-def scene_reference(scene: Scene, conserved: frozenset[str]) -> ReferenceValues:
-    """Return the reference values of the body of a scene, for a method that conserves the invariants of these names."""
-    return find_reference(scene.derive(Batch.of), conserved)
+def drifts_of(scene: Scene, conserved: frozenset[str]) -> Callable[[Grid, Array, Array, Array], Array]:
+    """Return `measure_drifts` of the body of a scene, for a method that conserves the invariants of these names."""
+    bodies = scene.derive(Batch.of)
+    return partial(measure_drifts, bodies, find_reference(bodies, conserved))
 
 
-def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> ReferenceValues:
-    """Return the reference values of n bodies, for a method that conserves the invariants of these names.
+def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Array:
+    """Return initial values of the invariants of n bodies, and their reference scales, as rows (n, 10, 3).
 
-    Scales follow the rules of `Scene.energy_scale`, `invariants_of` and `kept_sizes`.
+    `conservative.kernels.drifts.measure` defines the rows. The method conserves the invariants of these names. Scales follow
+    the rules of `Scene.energy_scale`, `invariants_of` and `kept_sizes`.
     """
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
@@ -98,7 +86,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
             rows[:, 9, 0] = 1.0
         elif each.name in conserved:
             rows[:, 9, 2 if each.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
-    return ReferenceValues(bodies, rows)
+    return rows
 
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
@@ -112,7 +100,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     Parameters
     ----------
     bodies, measured
-        n bodies, and their drifts (n, 5), as `ReferenceValues.measure` returns them.
+        n bodies, and their drifts (n, 5), as `measure_drifts` returns them.
     R_WB, w_WB_B
         The samples: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     """

@@ -12,7 +12,7 @@ import numpy as np
 
 from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
 from .card import Role as Role
-from .drifts import scene_reference
+from .drifts import drifts_of
 from .errors import InvalidResult
 from .grid import Grid, grid_for
 from .scene import Scene
@@ -149,8 +149,8 @@ class Method(ABC):
         """
         mistake, conserved, bounds = find_mistake(result, scene, grid), self.conserves, self.bounds(scene, grid)
         if mistake is None and result.failure is None and self.card.kernel and not scene.loaded:
-            reference = scene.derive(scene_reference, conserved)
-            drifts = reference.measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
+            measure = scene.derive(drifts_of, conserved)
+            drifts = measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
             if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift and drifts[1] <= bounds.energy:
                 return result
         mistake = mistake or find_misplaced(result, grid)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..batch import Batch
-from ..drifts import ReferenceValues, arrange_drifts, find_reference
+from ..drifts import arrange_drifts, find_reference, measure_drifts
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..grid import Grid
 from ..method import Method
@@ -83,7 +83,7 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
         measured = np.empty((n, 5))
     else:
         block = run()
-        measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
+        measured = measure_drifts(bodies, reference, grid, grid.t, block.R_WB, block.w_WB_B)
         settled = block.finished & are_accepted(method, bodies, grid, measured)
         settled[list(block.failures)] = True
         alone = np.flatnonzero(~settled)
@@ -94,13 +94,13 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
         if failure is not None:
             failures[i] = failure
     if len(alone):
-        part = ReferenceValues(bodies[alone], reference.rows[alone])
-        measured[alone] = part.measure(grid, grid.t, block.R_WB[alone], block.w_WB_B[alone])
+        samples = block.R_WB[alone], block.w_WB_B[alone]
+        measured[alone] = measure_drifts(bodies[alone], reference[alone], grid, grid.t, *samples)
     return BlockResult(block.R_WB, block.w_WB_B, arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B), failures)
 
 
 def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> Any:
-    """Return booleans (n,), true for bodies within the bounds of a method. `measured` (n, 5) is from `ReferenceValues.measure`.
+    """Return booleans (n,), true for bodies within the bounds of a method. `measured` (n, 5) is from `measure_drifts`.
 
     Bounds grow with the ratio of the moments. All bodies are first compared with the bounds of the smallest ratio. Only bodies
     that exceed these are compared with their own bounds.

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array
 from ..batch import Batch
 from ..check import choice as require_choice
-from ..drifts import arrange_drifts, list_drifts, scene_reference
+from ..drifts import arrange_drifts, drifts_of, list_drifts
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
 from ..outcome import OK, Choice, Counters, Outcome
@@ -244,7 +244,6 @@ def ensemble_of_one(bodies: Batch, grid: Grid, trajectory: Trajectory, choice: C
     n, failure = len(trajectory), trajectory.failure
     R_WB, w_WB_B = np.full((1, grid.n_samples, 3, 3), np.nan), np.full((1, grid.n_samples, 3), np.nan)
     R_WB[0, :n], w_WB_B[0, :n] = trajectory.R_WB, trajectory.w_WB_B
-    reference = bodies.first.derive(scene_reference, frozenset())
-    measured = reference.measure(grid, grid.t, R_WB, w_WB_B)
+    measured = bodies.first.derive(drifts_of, frozenset())(grid, grid.t, R_WB, w_WB_B)
     drifts = dict(zip(list_drifts(bodies), arrange_drifts(bodies, measured, R_WB, w_WB_B).T, strict=True))
     return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, trajectory.label, {0: failure} if failure else {}, choice)

@@ -19,7 +19,7 @@ import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
 from conservative.batch import Batch
-from conservative.drifts import find_reference
+from conservative.drifts import find_reference, measure_drifts
 from conservative.grid import Grid
 from conservative.method import Method
 from conservative.methods.many import Block
@@ -112,7 +112,7 @@ def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
         run = method.prepare_many(bodies, grid)
         block = run and run()
         if block:
-            find_reference(bodies).measure(grid, grid.t, block.R_WB, block.w_WB_B)
+            measure_drifts(bodies, find_reference(bodies), grid, grid.t, block.R_WB, block.w_WB_B)
     return block
 
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative.attitude import from_quaternion, orthonormality, rotation_about
 from conservative.batch import Batch
-from conservative.drifts import arrange_drifts, find_reference, list_drifts
+from conservative.drifts import arrange_drifts, find_reference, list_drifts, measure_drifts
 from conservative.integration import blocks, shared_choice
 from conservative.integration.inputs import read_bodies
 from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
@@ -247,7 +247,7 @@ def samples():
 
 
 def drifts_of(bodies, R_WB, w_WB_B):
-    measured = find_reference(bodies).measure(GRID, T, R_WB, w_WB_B)
+    measured = measure_drifts(bodies, find_reference(bodies), GRID, T, R_WB, w_WB_B)
     return arrange_drifts(bodies, measured, R_WB, w_WB_B)
 
 
@@ -270,7 +270,7 @@ def require_drifts(bodies):
             off = orthonormality(R[i]) if invariant is None else sizes(trajectory.drift(invariant))
             assert values[i, column] == pytest.approx(off.max(), rel=1e-13)  # 5e-15
             if invariant in kept:
-                bounded = find_reference(bodies, frozenset({name})).measure(GRID, GRID.t, R, w)[i, 4]
+                bounded = measure_drifts(bodies, find_reference(bodies, frozenset({name})), GRID, GRID.t, R, w)[i, 4]
                 assert bounded == pytest.approx(off.max() * invariant.scale / kept[invariant], rel=1e-13)
             compared.add(name)
     return compared
