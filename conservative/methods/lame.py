@@ -160,7 +160,7 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     return run
 
 
-def find_tops(method: Lame, bodies: Batch) -> tuple[Array, ...] | None:
+def find_tops(method: Lame, bodies: Batch) -> tuple[Any, ...] | None:
     """Return the initial states, in the non-spinning frame, of the n tops that the method supports; None if there are none.
 
     They are the indices (n,) in the batch, the moments (n,) across and along the axis, kg m^2, weights times lever arms (n,),
