@@ -36,7 +36,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, to_quaternion
+from ..attitude import to_quaternion
 from ..batch import Batch
 from ..card import Card, Structure
 from ..deferred_imports import kernels

@@ -16,7 +16,6 @@ symbols and floats. `conservative.references.precise` has its own copy of the to
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -40,35 +39,22 @@ _ROUND_OFF = 4 * np.finfo(float).eps
 """Relative size of a component in principal axes below which it is round-off of the change of axes."""
 
 
-@dataclass(frozen=True, eq=False)
-class FieldInAxes:
-    """A scene's field as expressions in principal axes.
+Law = tuple[EngineAxes, Acceleration, list[float]]
+"""A field: principal axes of the body, ordered for it, its expressions, and the values of their parameters."""
 
-    Attributes
-    ----------
-    axes
-        Principal axes of the body, ordered for the field.
-    R_WD
-        Rotation (3, 3) whose third column is the field's axis in world axes.
-    acceleration, parameters
-        Expressions, and the values of their parameters.
-    turn_D
-        Rates (3,) of the axes D, rad/s, in D. The first is 0. The field is constant in D.
+
+def express_field(scene: Scene) -> tuple[Array, Array, Law]:
+    """Return the field of a scene whose potential, or the potential that turns, is None or one of `READERS`.
+
+    The result is the rotation R_WD (3, 3) whose third column is the field's axis in world axes, the rates (3,) of the axes D,
+    rad/s, in D, and the law. The first rate is 0. The field is constant in D.
     """
-
-    axes: EngineAxes
-    R_WD: Array
-    acceleration: Acceleration
-    parameters: list[float]
-    turn_D: Array = field(default_factory=lambda: np.zeros(3))
-
-
-def express_field(scene: Scene) -> FieldInAxes:
-    """Return the field of a scene whose potential, or the potential that turns, is None or one of `READERS`."""
-    potential = static_part(scene.potential)
+    potential, axes, turn_D = static_part(scene.potential), principal_axes(scene), np.zeros(3)
     line = None if potential is None else potential.axis_W
+    # A potential without an axis has no torque.
+    law = (axes, uniform, [0.0] * 9) if potential is None or line is None else READERS[type(potential)](axes, potential)
     if not isinstance(scene.potential, Turning):
-        return _express(scene, potential, np.eye(3) if line is None else axes_about(line))
+        return np.eye(3) if line is None else axes_about(line), turn_D, law
     orbit = scene.potential.orbit
     third = orbit.normal_W if line is None else line
     first = np.cross(orbit.normal_W, third)  # perpendicular to the normal, so that the first rate of D is 0
@@ -76,15 +62,7 @@ def express_field(scene: Scene) -> FieldInAxes:
     R_WD = axes_about(third)
     if size > _ROUND_OFF:
         R_WD = np.stack([first / size, np.cross(third, first / size), third], axis=1)
-    return replace(_express(scene, potential, R_WD), turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
-
-
-def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInAxes:
-    """Return a potential as a field in axes D. A potential without an axis has no torque."""
-    axes = principal_axes(scene)
-    if potential is None or potential.axis_W is None:
-        return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
-    return READERS[type(potential)](axes, R_WD, potential)
+    return R_WD, _drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)), law
 
 
 def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
@@ -121,40 +99,37 @@ def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], E
     return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
 
 
-def _read_spring(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_spring(axes: EngineAxes, potential: Any) -> Law:
     if potential.rest_length == 0:
         moment = -potential.stiffness * np.linalg.norm(potential.anchor_W) * (potential.point_B @ axes.R_BF)
-        return FieldInAxes(axes, R_WD, uniform, _turning(axes, moment))
-    return _read_points(axes, R_WD, potential, (spring, potential.stiffness, potential.rest_length))
+        return axes, uniform, _turning(axes, moment)
+    return _read_points(axes, potential, spring, potential.stiffness, potential.rest_length)
 
 
-def _read_points(
-    axes: EngineAxes, R_WD: Array, potential: PointPotential, law: tuple[Acceleration, float, float]
-) -> FieldInAxes:
-    """Return the field of a force along the line between two points; `law` has expressions, strength and unit of length."""
-    acceleration, strength, unit = law
+def _read_points(axes: EngineAxes, potential: PointPotential, acceleration: Acceleration, strength: float, unit: float) -> Law:
+    """Return the law of a force along the line between two points, from expressions, strength and unit of length."""
     if not potential.point_B.any():
-        return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
+        return axes, uniform, [0.0] * 9
     axes = order_axes(axes, int(np.argmax(np.abs(potential.point_B @ axes.R_BF))))
     b, A = _drop_round_off(potential.point_B @ axes.R_BF), float(np.linalg.norm(potential.anchor_W))
     third = -b[:2] * axes.J[:2] / (b[2] * axes.J[2])
     distance = np.array([b @ b + A * A, *(2 * A * b)]) / unit**2
-    return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()])
+    return axes, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()]
 
 
-def _read_gradient(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_gradient(axes: EngineAxes, potential: Any) -> Law:
     inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]
         B[i] = inertia[j, k]
-    return FieldInAxes(axes, R_WD, gradient, [*(A / axes.J[:, None]).ravel().tolist(), *(B / axes.J).tolist()])
+    return axes, gradient, [*(A / axes.J[:, None]).ravel().tolist(), *(B / axes.J).tolist()]
 
 
-READERS: dict[type[Potential], Callable[[EngineAxes, Array, Any], FieldInAxes]] = {
-    UniformGravity: lambda axes, R_WD, field: FieldInAxes(axes, R_WD, uniform, _turning(axes, field.moment_B @ axes.R_BF)),
+READERS: dict[type[Potential], Callable[[EngineAxes, Any], Law]] = {
+    UniformGravity: lambda axes, field: (axes, uniform, _turning(axes, field.moment_B @ axes.R_BF)),
     LinearSpring: _read_spring,
-    PointAttraction: lambda axes, R_WD, field: _read_points(axes, R_WD, field, (attraction, field.strength, 1.0)),
+    PointAttraction: lambda axes, field: _read_points(axes, field, attraction, field.strength, 1.0),
     GravityGradient: _read_gradient,
 }
 """Functions that express a potential, by its type."""

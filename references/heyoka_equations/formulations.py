@@ -78,10 +78,9 @@ def base_vectors(scene: Scene) -> Formulation:
 
 def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], kind: int) -> Formulation:
     """Return Euler's equations with those of an attitude that `write` makes of a matrix."""
-    field = express_field(scene)
-    axes, R_WD = field.axes, field.R_WD
-    equations, rotor = forms.EulerEquations(attitude, field.acceleration), (hat(axes.rotor) / axes.J[:, None]).ravel().tolist()
-    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *rotor, *field.parameters])
+    R_WD, turn_D, (axes, acceleration, values) = express_field(scene)
+    equations, rotor = forms.EulerEquations(attitude, acceleration), (hat(axes.rotor) / axes.J[:, None]).ravel().tolist()
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *turn_D.tolist(), *rotor, *values])
     start = np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0])
     orbit = scene.potential.orbit if isinstance(scene.potential, Turning) else None
     constants = [orbit.rate, *orbit.normal_W.tolist()] if orbit else [0.0] * 4
