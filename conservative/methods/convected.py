@@ -92,26 +92,19 @@ def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[
     """
     samples, total = [u], 0
     for step in range(1, grid.n_steps + 1):
-        u, corrections, norm = _take_step(linearise, u, tol)
+        u0, norm = u, math.inf  # 2) prediction: the state itself
+        for corrections in range(MAX_ITERATIONS + 1):
+            try:
+                r, K = linearise(u0, u)  # 3)
+                norm = math.sqrt(r @ r)
+                if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
+                    break
+                u = u - np.linalg.solve(K, r)  # 4), (28)
+            except np.linalg.LinAlgError:  # C C' or the tangent can become singular at steps of a radian and more
+                break
         total += corrections
         if not norm <= tol:
             return np.array(samples), total, NotConverged(step, (step - 1) * grid.dt, norm)
         if step % grid.every == 0 or step == grid.n_steps:
             samples.append(u)
     return np.array(samples), total, None
-
-
-def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, int, float]:
-    """Return the state after one step, its number of corrections, and the norm of its last residual."""
-    u = u0  # 2) prediction: the state itself
-    norm = math.inf
-    for corrections in range(MAX_ITERATIONS + 1):
-        try:
-            r, K = linearise(u0, u)  # 3)
-            norm = math.sqrt(r @ r)
-            if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
-                break
-            u = u - np.linalg.solve(K, r)  # 4), (28)
-        except np.linalg.LinAlgError:  # C C' or the tangent can become singular at steps of a radian and more
-            break
-    return u, corrections, norm

@@ -139,15 +139,6 @@ class Nutation:
         )
         return self.lattice.K_prime - rest, rest
 
-    def start(self, u: Number, rising: bool) -> Number:
-        """Return v, |v| <= K, at a value of u."""
-        if self.u1 == self.u2:
-            return mp.mpf(0)
-        size = self.u2 - self.u1
-        sn = root(unit((u - self.u1) / size))
-        v = sn * mp.elliprf(unit((self.u2 - u) / size), unit((self.u3 - u) / (self.u3 - self.u1)), 1)
-        return v if rising else -v
-
 
 def nutation(start: Top) -> Nutation:
     """Return the roots of the cubic, by Viete's formula, and the periods."""
@@ -182,9 +173,12 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
 
 def nutation_phase(start: Top, roots: Nutation) -> Phase:
     """Return v as a function of time."""
-    omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
-    rising = bool((mp.conj(start.across) * start.w).imag >= 0)  # u' >= 0
-    return Phase(roots.start(start.u, rising), omega, 2 * roots.lattice.K)
+    u, u1, u2, u3, v = start.u, roots.u1, roots.u2, roots.u3, mp.mpf(0)
+    if u1 != u2:
+        sn = root(unit((u - u1) / (u2 - u1)))
+        v = sn * mp.elliprf(unit((u2 - u) / (u2 - u1)), unit((u3 - u) / (u3 - u1)), 1)
+    rising = (mp.conj(start.across) * start.w).imag >= 0  # u' >= 0
+    return Phase(v if rising else -v, mp.sqrt(start.k * (u3 - u1) / 2), 2 * roots.lattice.K)
 
 
 def top_motion(start: Top) -> Motion:
