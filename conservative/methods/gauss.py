@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, axes_about, from_quaternion, triple
+from ..attitude import axes_about, from_quaternion, triple
 from ..card import Card, Cost, Structure
 from ..check import choice, describe, positive_integer
 from ..deferred_imports import kernels
@@ -127,14 +127,7 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
 
 @lru_cache(maxsize=256)
 def find_coefficients(stages: int, dt: float) -> Any:
-    """Return the kernel's coefficients of a step dt, s."""
-    return kernels("gauss").Coefficients(stages, *pad_tableau(stages), dt)
-
-
-@lru_cache(maxsize=MOST_STAGES)
-def pad_tableau(stages: int) -> tuple[Array, ...]:
-    """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `FOUR`; all are factors."""
-    table = tableau(stages)
-    extra = (0, -len(table.b) % kernels("lanes").FOUR)
-    rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
-    return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
+    """Return the kernel's coefficients of a step dt, s: stages are filled up with zeros to a multiple of `FOUR`."""
+    table, extra = tableau(stages), (0, -stages % kernels("lanes").FOUR)
+    A, E = (np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E))
+    return kernels("gauss").Coefficients(stages, A, E, np.pad(table.b, extra), np.pad(table.b_low, extra), dt)
