@@ -24,7 +24,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .shared import compile_jax, write_mjcf
+from .shared import run_jax, write_mjcf
 
 ENGINE = {
     "package": "brax",
@@ -52,15 +52,8 @@ def prepare(given):
     place = [np.array([0, 0, 0, *values], system.gravity.dtype) for values in (given.q0, given.w0)]
     pipeline, step = _pipeline(given.pipeline)
     start = jax.jit(pipeline.init)(system, *place)
-    march, counts = compile_jax(step, _read), np.diff(given.steps).astype(np.int32)
-    jax.block_until_ready(march(system, start, counts))
-
-    def run():
-        samples = zip(_read(start), march(system, start, counts), strict=True)
-        q, w = (np.vstack([first, rest]).astype(float) for first, rest in samples)
-        return {"q": q, "w_W": w}
-
-    return run
+    q, w = (np.asarray(part, float) for part in _read(start))
+    return run_jax(given, step, _read, system, start, {"q": q, "w_W": w})
 
 
 @lru_cache(maxsize=8)

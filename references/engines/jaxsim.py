@@ -18,9 +18,7 @@ Precision: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py
 Models and their joints: https://jaxsim.readthedocs.io/en/latest/modules/api.html
 """
 
-import numpy as np
-
-from .shared import compile_jax
+from .shared import run_jax
 
 ENGINE = {
     "package": "jaxsim",
@@ -50,14 +48,7 @@ def prepare(given):
         base_angular_velocity=jax.numpy.array(given.w0_W),
         velocity_representation=js.common.VelRepr.Mixed,  # angular velocity in the world
     )
-    march, counts = compile_jax(js.model.step, _read), np.diff(given.steps).astype(np.int32)
-    jax.block_until_ready(march(model, start, counts))
-
-    def run():
-        q, w = march(model, start, counts)
-        return {"q": np.vstack([given.q0, np.asarray(q, float)]), "w_W": np.vstack([given.w0_W, np.asarray(w, float)])}
-
-    return run
+    return run_jax(given, js.model.step, _read, model, start, {"q": given.q0, "w_W": given.w0_W})
 
 
 def _read(data):

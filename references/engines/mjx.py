@@ -21,7 +21,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .shared import compile_jax, compile_models
+from .shared import compile_jax, compile_models, run_jax
 
 ENGINE = {
     "package": "mujoco-mjx",
@@ -49,14 +49,7 @@ def prepare(given):
     data = mjx.make_data(model)
     number = data.qpos.dtype
     start = data.replace(qpos=jax.numpy.array([*place, *given.q0], number), qvel=jax.numpy.array([*place, *given.w0], number))
-    march, counts = compile_jax(mjx.step, _read), np.diff(given.steps).astype(np.int32)
-    jax.block_until_ready(march(model, start, counts))
-
-    def run():
-        q, w = march(model, start, counts)
-        return {"q": np.vstack([given.q0, np.asarray(q, float)]), "w": np.vstack([given.w0, np.asarray(w, float)])}
-
-    return run
+    return run_jax(given, mjx.step, _read, model, start, {"q": given.q0, "w": given.w0})
 
 
 def prepare_many(bodies):

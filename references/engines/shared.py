@@ -158,6 +158,20 @@ def compile_jax(step, read):
     return jax.jit(march)
 
 
+def run_jax(given, step, read, model, start, first):
+    """Return a run by `compile_jax` from a state, compiled. `first` has the arrays of the sample at the start, by name."""
+    import jax
+
+    march, counts = compile_jax(step, read), np.diff(given.steps).astype(np.int32)
+    jax.block_until_ready(march(model, start, counts))
+
+    def run():
+        rest = march(model, start, counts)
+        return {name: np.vstack([x, np.asarray(y, float)]) for (name, x), y in zip(first.items(), rest, strict=True)}
+
+    return run
+
+
 def record_warp(step):
     """Return a function that replays a step; the step itself if this version of Warp does not record on the CPU."""
     import warp
