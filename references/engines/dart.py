@@ -52,14 +52,11 @@ def _build(dart, given):
     joint, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
     body.setInertia(dart.dynamics.Inertia(given.mass, given.com, given.inertia_com))
     world.addSkeleton(skeleton)
-    joint.setPositions(_positions(dart, given))
+    if given.free:
+        place = dart.math.Isometry3()
+        place.set_rotation(given.R0)
+        joint.setPositions(dart.dynamics.FreeJoint.convertToPositions(place))
+    else:
+        joint.setPositions(dart.dynamics.BallJoint.convertToPositions(given.R0))
     joint.setVelocities(np.concatenate([given.w0, np.zeros(3 * given.free)]))  # spatial velocity in body axes
     return world, joint, body
-
-
-def _positions(dart, given):
-    if not given.free:
-        return dart.dynamics.BallJoint.convertToPositions(given.R0)
-    place = dart.math.Isometry3()
-    place.set_rotation(given.R0)
-    return dart.dynamics.FreeJoint.convertToPositions(place)

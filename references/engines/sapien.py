@@ -58,7 +58,10 @@ def prepare(given):
     entity = sapien.Entity()
     entity.add_component(body)
     if not given.free:
-        entity.add_component(_hold(sapien, body))
+        joint = sapien.physx.PhysxDriveComponent(body)  # with the world
+        for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
+            lock(0, 0)
+        entity.add_component(joint)
     scene.add_entity(entity)
     start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
     drift = given.v0.astype(np.float32)
@@ -72,11 +75,3 @@ def prepare(given):
 
     run.owner = scene  # of the body
     return run
-
-
-def _hold(sapien, body):
-    """Return a joint with the world that locks the three translations."""
-    joint = sapien.physx.PhysxDriveComponent(body)
-    for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
-        lock(0, 0)
-    return joint
