@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from .outcome import Outcome, OutcomeKind
 
@@ -96,11 +96,6 @@ class IntegrationFailed(_Error, ArithmeticError):
     """A run failed. Attribute: `outcome`."""
 
     outcome: Outcome
-
-    def at_times(self, unit: float) -> Self:
-        """Return this failure with its time, if it has one, converted from units of `unit` s to s."""
-        values = {name: value for name, value in vars(self).items() if name != "outcome"}
-        return type(self)(**values | {"time": values["time"] * unit}) if "time" in values else self
 
 
 class NotConverged(IntegrationFailed):

@@ -75,7 +75,10 @@ class Units:
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
-        failure = found.failure and found.failure.at_times(self.time)
+        failure = found.failure
+        if failure and "time" in vars(failure):
+            values = {name: value for name, value in vars(failure).items() if name != "outcome"}
+            failure = type(failure)(**values | {"time": values["time"] * self.time})
         w_WB_B = found.w_WB_B / self.time
         supplied = None if found.supplied is None else found.supplied * self.supply
         frame = found.frame and (found.frame[0], found.frame[1] / self.time)
