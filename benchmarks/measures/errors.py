@@ -17,7 +17,7 @@ from conservative.trajectory import Trajectory
 from .convergence_order import fit_line
 from .measure import Measure, Value
 
-CONSERVED, SMALL = 1e-10, 1e-4
+CONSERVED, SMALL = 1e-10, 1e-3
 """Relative drift up to which a quantity is conserved, and up to which its drift is small."""
 
 

@@ -10,6 +10,8 @@ from conservative.outcome import Outcome, OutcomeKind
 from .model import Cell, Grade
 
 DASH = "–"
+SPREAD = 0.05
+"""Relative uncertainty of a ratio of times from one process."""
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
 _DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED, OutcomeKind.NOT_CONSERVED)
 
@@ -66,10 +68,13 @@ def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED
 
 
 def grade_ratio(ratio: float, note: str = "", digits: int = 3, interval: tuple[float, float] = (math.nan, math.nan)) -> Cell:
-    """Return an engine's time divided by ours with its interval: good from 1 on, fair if 1 is within the interval."""
+    """Return an engine's time divided by ours with its interval: good from 1 on, fair if 1 is within the interval.
+
+    A ratio of times from one process has no interval; `SPREAD` takes its place.
+    """
     if math.isnan(ratio):
         return Cell(DASH, Grade.NONE, note, value=ratio)
-    low, high = (ratio if math.isnan(end) else end for end in interval)
+    low, high = ((1 - SPREAD) * ratio, (1 + SPREAD) * ratio) if math.isnan(interval[0]) else interval
     symbol, graded = ("✓", Grade.GOOD) if low >= 1 else ("✗", Grade.BAD) if high < 1 else ("≈", Grade.FAIR)
     return Cell(f"{symbol} {ratio_text(ratio, interval, digits)}", graded, note, value=ratio)
 

@@ -47,14 +47,15 @@ def render(document: Document) -> str:
     if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
         scripts["datatables"] = _datatables()
     rows = document.data.get("rows", ()) if isinstance(document.data, Mapping) else ()
-    if rows and any(isinstance(block, Table) for block in blocks):
+    has_rows = any(isinstance(block, Section) and block.source for block in blocks)  # of measurements.csv, next to the page
+    if rows and has_rows:
         packed = pack(json.dumps([list(rows[0]), *(list(row.values()) for row in rows)], separators=(",", ":")))
         if len(packed) <= MOST_ROWS:
             scripts["rows"] = packed
     player = Markup(animation.script()) if any(isinstance(block, Motion) for block in blocks) else ""
     template = environment.get_template("page.html.j2")
     shown = {"document": document, "linked": linked, "scripts": scripts, "player": player}
-    return re.sub(r"\n{2,}", "\n", template.render(shown, has_rows=bool(rows), at_first=AT_FIRST)) + "\n"
+    return re.sub(r"\n{2,}", "\n", template.render(shown, has_rows=has_rows, at_first=AT_FIRST)) + "\n"
 
 
 def pack(text: str) -> str:

@@ -17,8 +17,8 @@ from .measured import Measured, of_scene
 from .tumbling import Result, drawn
 
 _WHY = (
-    "Each step changes energy and momentum a little, and in most methods these changes add up. Smaller steps delay the drift "
-    "but do not end it. Methods that conserve stay on the middle line at any step that they can take."
+    "Each step changes energy and momentum a little, and in most methods these changes add up. Smaller steps or tolerances "
+    "make them smaller, down to round-off. Methods that conserve stay on the middle line with large steps, too."
 )
 
 
@@ -38,7 +38,8 @@ def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None
     return Figure(
         f"drift_{scene.name}" if methods is None else "drift_over_time",
         f"{scene.name}: change of energy and momentum in {long_runs.DURATIONS * scene.t_end:.3g} s",
-        "Middle line: exact. Above it a method gains, below it loses. The axis is logarithmic on both sides of it.",
+        f"Steps of {scene.dt:g} s, unless adaptive. Middle line: exact. Above it a method gains, below it loses. The axis is "
+        "logarithmic on both sides of it.",
         picture if methods is None else None,
         vega_embed.embed(picture, ("name", "t", "drift"), 260),
         vega_embed.legend(families_of(drifts), marks=False),

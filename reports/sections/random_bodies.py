@@ -26,6 +26,8 @@ from .summary import MIDDLE, MOST, Summary, cheapest_of_each, geometric_mean
 
 ANY = "fastest engine"
 """Stands for all engines: on each body, the fastest of them."""
+FEW = 5
+"""Smallest number of bodies whose mean has an interval in a sentence."""
 MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Errors, rad, of the table of engines."""
 ROUGH = "All times are of one process, so ratios are rough: two identical programs differ by several percent."
@@ -218,12 +220,12 @@ def sentence(ratios: Iterable[RandomRatios]) -> str:
     goal = f"{tolerance(MIDDLE)} rad"
     if not every.both:
         return f"On no random body do our integrators and an engine both reach {goal}."
-    sides = ["our fastest general integrator", "the fastest engine"][:: 1 if every.ratio >= 1 else -1]
-    low, high = every.interval
+    sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if every.ratio >= 1 else -1]
+    low, high = every.interval if len(every.both) >= FEW else (math.nan, math.nan)
     ends = sorted((low, high) if every.ratio >= 1 else (1 / low, 1 / high)) if not math.isnan(low) else []
     parts = ["geometric mean", *([f"interval {' to '.join(map(factor, ends))}"] if ends else [])]
     if slower := [1 / contest.ratio for contest in every.both if contest.lost]:
-        parts.append(f"an engine is faster on {len(slower)}, by up to {factor(max(slower))} times")
+        parts.append(f"an engine or solver is faster on {len(slower)}, by up to {factor(max(slower))} times")
     else:
         parts.append(f"single bodies: {factor(every.worst)} to {factor(every.best)}")
     if every.open:

@@ -14,12 +14,13 @@ from .random_bodies import ANY, RandomRatios
 from .scene_contests import STUDY, sides
 
 _RATIOS = (
-    "The time of the fastest engine divided by that of our fastest method, at each decade of the largest attitude error. "
-    "✓: ours is faster. ✗: an engine is faster. ≈: open, 1 is within the interval. In parentheses is the interval of 95 % "
-    "over processes, if several measured the times. Random bodies have the geometric mean, its interval over bodies and "
-    "processes, and the number of bodies on which an engine is faster beyond the body's interval, or alone in reaching the "
-    "error. Times between two measured points are interpolated log-log and not extrapolated. The error of a point is the "
-    "largest of its own and of all finer points, so isolated good results are ignored."
+    "The time of the fastest engine or ODE solver divided by that of our fastest method, at each decade of the largest "
+    "attitude error. ✓: ours is faster. ✗: the other is faster. ≈: open, 1 is within the interval, or 5 % from a ratio that "
+    "one process measured. In parentheses is the interval of 95 % over processes, if several measured the times. Random "
+    "bodies have the geometric mean, its interval over bodies and processes, and the number of bodies on which an engine is "
+    "faster beyond the body's interval, or alone in reaching the error. Times between two measured points are interpolated "
+    "log-log and not extrapolated. The error of a point is the largest of its own and of all finer points, so isolated good "
+    "results are ignored."
 )
 
 
@@ -52,7 +53,7 @@ def ratio_table(measured: Measured) -> Table:
     body: list[Row] = [
         [label, kind.value, *(cells.get(error, DASH) for error in errors), winners] for label, kind, cells, winners in rows
     ]
-    caption = "The fastest engine's time divided by ours, by attitude error, rad"
+    caption = "The time of the fastest engine or solver divided by ours, by attitude error, rad"
     return Table(
         ["motion", "our methods", *map(tolerance, errors), "faster engine"],
         body,

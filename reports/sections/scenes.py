@@ -36,7 +36,8 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     """Return the section of a scene."""
     name, rows, points = scene.name, measured.scene_rows, of_scene(measured.points, scene.name)
     contests = scene_contests.as_table(points, scene.t_end / step_ladder.SAMPLES, measured.every_step[name])
-    sample = f"A sample is one of {step_ladder.SAMPLES} in the duration; in the last rows, each of the scene's own steps."
+    sample = f"A sample is one of {step_ladder.SAMPLES} in the duration"
+    sample += "; in the last rows, each of the scene's own steps." if measured.every_step[name] else "."
     decades = replace(contests, caption=f"{name}: fastest method of each class at each decade of the error")
     drift_words = (
         f"Largest drift over {long_runs.DURATIONS:g} durations, relative (✓ up to {tolerance(CONSERVED)}, ≈ up to "

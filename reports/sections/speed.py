@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.contest import cheapest, costs
+from conservative.benchmarks.contest import costs
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours
@@ -22,35 +23,36 @@ from .summary import CAVEAT, MIDDLE, Summary
 def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     """Return the section, from the summary of each scene; random bodies are included if the report has them."""
     pictures = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
+    main = measured.main_scene.name
+    sentence = _sentence(main, costs(of_scene(measured.points, main), [MIDDLE]))
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
         study = next(study for study in measured.plan.studies if study.drawn)
         fields = list(dict.fromkeys(each.field for each in study.drawn))
         title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
         pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
+        sentence += " " + _sentence(f"{len(study.scenes)} random bodies", pictures[title])
         random = f"Random bodies: {measured.plan.bodies} in each field ({', '.join(fields)}), with {len(study.lines)} methods."
         random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
-    sentence = _sentence(measured.main_scene.name, of_scene(measured.points, measured.main_scene.name))
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
     lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
     blocks = filled(lead, figure(pictures), Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE))
     return Section("How wrong, how fast", blocks, "speed", "Speed")
 
 
-def _sentence(scene: str, points: pd.DataFrame) -> str:
+def _sentence(subject: str, points: pd.DataFrame) -> str:
     """Return how much faster our fastest general integrator is at `MIDDLE` than the fastest solver and physics engine."""
-    reached = costs(points, [MIDDLE])
-    ours = cheapest(of_classes(reached, MethodClass.GENERAL))
-    parts = []
+    at_middle = points[points["error"] == MIDDLE].sort_values("time")
+    first: dict[MethodClass, Any] = {kind: next(of_classes(at_middle, kind).itertuples(), None) for kind in MethodClass}
+    ours, parts = first[MethodClass.GENERAL], []
     for kind, words in ((MethodClass.SOLVER, "ODE solver"), (MethodClass.ENGINE, "physics engine")):
-        theirs = cheapest(of_classes(reached, kind))
-        if ours and theirs:
+        if ours and (theirs := first[kind]):
             ratio = theirs.time / ours.time
             more = f"{factor(ratio)} times as fast as" if ratio >= 1 else f"{factor(1 / ratio)} times as slow as"
             parts.append(f"{more} {theirs.name}, the fastest {words}")
     if not (ours and parts):
         return ""
-    return f"At an attitude error of {tolerance(MIDDLE)} rad on {scene}, {ours.name} is {', and '.join(parts)}."
+    return f"At an attitude error of {tolerance(MIDDLE)} rad on {subject}, {ours.name} is {', and '.join(parts)}."
 
 
 def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:

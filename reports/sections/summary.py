@@ -70,7 +70,7 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
     goal = f"{tolerance(MIDDLE)} rad"
     if ours and engine:
         first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
-        sides = ["our fastest general integrator", "the fastest engine"][:: 1 if first is ours else -1]
+        sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if first is ours else -1]
         times = f"{_speedup(first, second)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
     elif there := ours or engine:

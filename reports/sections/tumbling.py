@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from conservative.benchmarks.contest import cheapest, costs
-from conservative.benchmarks.measures.errors import CONSERVED
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.method import Role
 from conservative.outcome import Outcome
@@ -21,8 +23,6 @@ from .hard_cases import RIGHT, USABLE
 from .measured import Measured, of_scene
 from .summary import MIDDLE
 
-LOST = 1e-3
-"""Relative drift above which an invariant is lost."""
 PAPER_MAP = "reduced"
 MOST = 8
 """Largest number of motions next to each other, with the exact one."""
@@ -85,7 +85,7 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
     motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    signs = Paragraph("Grey outline: exact motion. Arrow: angular momentum. Line: path of a body axis.", Emphasis.NOTE)
+    signs = Paragraph("Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far.", Emphasis.NOTE)
     lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, signs) if shown else ()
     blocks = filled(lead, *moving, table(found, scene))
     source = {"study": ("motion", "convergence", "speed"), "scene": scene.name}
@@ -94,24 +94,26 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
 
 def _sentence(found: Sequence[Result], scene: Scene) -> str:
     engines, ours = ([each for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
-    parts = []
+    parts, others = [], dict[str, float]()
     if engines:
         worst = engines[0]
-        energy = f"{100 * worst.energy:.2g} %" if worst.energy > LOST else f"{number(worst.energy, 1)} of it"
+        energy = f"{100 * worst.energy:.2g} %" if worst.energy > SMALL else f"{number(worst.energy, 1)} of it"
         wrong = f"is wrong by {number(worst.error)} rad ({math.degrees(worst.error):.2g}°)"
         parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong} and its energy changes by {energy}.")
         family = [each for each in engines[1:] if each.method.partition(":")[0] == worst.method.partition(":")[0]]
-        if family:
-            parts.append(f"{family[-1].line} is wrong by {number(family[-1].error)} rad.")
+        others = {each.line: each.error for each in (*family[-1:], *engines[1:][-1:])}  # its best setting, the best engine
     if ours:
         best = min(ours, key=lambda each: each.error)
-        parts.append(f"`{best.method}` of the Python package `conservative` is wrong by {number(best.error)} rad.")
+        others[f"`{best.method}` of the Python package `conservative`"] = best.error
+    if others:
+        first, *rest = (f"{name} {{}}by {number(error)} rad" for name, error in others.items())
+        parts.append(", ".join([first.format("is wrong "), *(each.format("") for each in rest)]) + ".")
     return " ".join(parts)
 
 
 def table(found: Sequence[Result], scene: Scene) -> Table:
     """Return the results as a table with grades."""
-    drift = f"✓ to {tolerance(CONSERVED)}, ✗ above {tolerance(LOST)}"
+    drift = f"✓ to {tolerance(CONSERVED)}, ✗ above {tolerance(SMALL)}"
     header = ["method", "step, s", f"energy drift ({drift})", f"momentum drift ({drift})"]
     header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
     rows: list[Row] = []
@@ -120,14 +122,16 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
         if not each.outcome.ok:
             rows.append([each.name, step, outcome_cell(each.outcome), *[DASH] * 4])
             continue
-        drifts = (grade(value, limits=(CONSERVED, LOST)) for value in (each.energy, each.momentum))
+        drifts = (grade(value) for value in (each.energy, each.momentum))
         order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
         error = grade(each.error, limits=(RIGHT, USABLE))
         rows.append([each.name, step, *drifts, error, order, numeric(1e6 * each.time)])
-    caption = f"Largest values over {scene.t_end:.3g} s. Steps are the engines' defaults, or else {scene.dt:g} s."
+    moments, rate = ", ".join(f"{each:.3g}" for each in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
+    caption = f"Largest values over {scene.t_end:.3g} s. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
+    caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
     if ours := [each.line for each in found if each.ours]:
-        caption += f" Ours are the last: {' and '.join(ours)}."
+        caption += f" Ours: {' and '.join(ours)}."
     if still := [each.line for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]:
         caption += f" Conservation is not accuracy: {still[0]} conserves both, and its attitude is wrong."
-    caption += f" Order: the error falls as step^order ({DASH}: adaptive steps, or an uncertain fit)."
+    caption += f" Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit)."
     return Table(header, rows, caption)

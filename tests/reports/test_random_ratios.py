@@ -132,11 +132,11 @@ def test_without_an_engine_there_are_no_ratios():
 def test_the_sentence_has_the_mean_and_the_bodies_that_are_lost():
     assert random_bodies.sentence(found(*TWICE)) == (
         "On one random body in fields, our fastest general integrator reaches 1e-6 rad "
-        "2.0 times as fast as the fastest engine (geometric mean; single bodies: 2.0 to 2.0)."
+        "2.0 times as fast as the fastest engine or solver (geometric mean; single bodies: 2.0 to 2.0)."
     )
     lost = random_bodies.sentence(found(*TWICE, *SLOWER, *NEITHER))
     assert (
-        "(geometric mean; interval 0.50 to 2.0; an engine is faster on 1, by up to 2.0 times; 1 more are not reached by both)"
+        "(geometric mean; an engine or solver is faster on 1, by up to 2.0 times; 1 more are not reached by both)"
         in lost
     )
 

@@ -87,7 +87,7 @@ def test_junit_accepts_any_message_of_an_engine():
 def test_markdown_has_tables_changes_and_versions():
     text = text_of(build(history(BAD, GOOD, FAILED, times=(TIMES, SLOW)), gated=True), "markdown")
     assert text.startswith("# Versions of made: 1.0, 2.0, 3.0\n\n**3.0 against 2.0: FAILED**\n")
-    assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-4 | 3.0e-3 | ✓ done | 2 | 2 |" in text
+    assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-3 | 3.0e-3 | ✓ done | 2 | 2 |" in text
     assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
     assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text
     assert "| 1.0 | Python 3.11.7 | made==1.0 |" in text

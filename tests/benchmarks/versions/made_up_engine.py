@@ -28,7 +28,7 @@ GOOD = Observation(
     attitude_order=Order(2.0, 0.01),
     rates_order=Order(2.01, 0.01),
     error=near(3e-3),
-    drifts={"energy": near(2e-13, 0.2), "momentum": near(9e-4)},
+    drifts={"energy": near(2e-13, 0.2), "momentum": near(9e-3)},
 )
 """Order 2, energy conserved."""
 BAD = replace(

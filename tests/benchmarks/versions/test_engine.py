@@ -63,7 +63,7 @@ def test_energy_that_is_lost_instead_of_gained_is_a_change():
 
 
 def test_a_small_drift_instead_of_a_large_one_is_a_change():
-    before, after = (replace(GOOD, drifts={"energy": near(drift)}) for drift in (3e-4, 1e-6))
+    before, after = (replace(GOOD, drifts={"energy": near(drift)}) for drift in (3e-3, 1e-6))
     assert changes(before, after) == {(Aspect.DRIFT, "energy"): False}
     assert changes(after, before) == {(Aspect.DRIFT, "energy"): True}
 
@@ -75,11 +75,11 @@ ALIKE = {
     "orders within half": replace(GOOD, attitude_order=Order(1.6, 0.01), rates_order=Order(2.4, 0.01)),
     "an order that is badly known": replace(GOOD, attitude_order=Order(1.2, 0.4)),
     "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
-    "drifts close to the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
+    "drifts close to the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-3)}),
     "errors within a factor": replace(GOOD, error=near(6e-3)),
     "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
     "no order where the error is the same": replace(GOOD, rates_order=Order(reason="no descent")),
-    "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-4)}),
+    "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-3)}),
 }
 
 
