@@ -62,7 +62,8 @@ def test_a_sentence_compares_general_integrators_and_tells_of_a_solution_apart()
     sentence = told(OURS, SOLVER, SOLUTION).sentence
     assert sentence.startswith("made_up is integrable. Our fastest general integrator, gauss, reaches 1e-6 rad ")
     assert (
-        f"{between:.1f} times as fast as the fastest engine or solver, scipy. lame, which solves integrable motions only, is" in sentence
+        f"{between:.1f} times as fast as the fastest engine or solver, scipy. lame, which solves integrable motions only, is"
+        in sentence
     )
     assert sentence.endswith("74 times as fast as scipy.")  # 6 (8/6)^0.75 / 0.1
     slow = told(OURS, SOLVER, point("lame", "ours", 1e-12, 1e-5)).sentence
