@@ -47,7 +47,7 @@ def answer(request):
     for number in request.get("forget", []):
         del runs[number]
     if request["do"] == "hello":
-        return {"protocol": 1, "program": "plain", "version": "1", "framing": "lines"}
+        return {"protocol": 1, "program": "plain", "version": "1", "framing": "lines", "engine": {"order": 4}}
     if request["do"] == "prepare":
         if not request["free"]:
             return {"error": "unsupported", "message": "only free bodies"}
