@@ -127,7 +127,8 @@ DOUBLES = """
 names = {}
 for name, module in sys.modules.items():
     file = getattr(module, "__file__", None)
-    if file and Path(file).resolve().is_relative_to(sys.argv[1]):
+    place = Path(file or sys.prefix).resolve()
+    if place.is_relative_to(sys.argv[1]) and not place.is_relative_to(sys.prefix):  # an environment may be in the checkout
         names.setdefault(Path(file).resolve(), set()).add(name)
 assert names, "nothing of ours was imported"
 print(*(sorted(each) for each in names.values() if len(each) > 1))
