@@ -2,16 +2,19 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures import measurement
+from conservative.reports.document.cells import grade_ratio
+from conservative.reports.document.model import Grade
 from conservative.reports.rows import points as families
 from conservative.reports.rows.names import MethodClass, class_of, with_names
 from conservative.reports.rows.points import points
-from conservative.reports.sections import random_bodies, summary
+from conservative.reports.sections import advice, random_bodies, summary
 
 from .rows import frame, point
 from .test_random_ratios import ENGINE_ALONE, TWICE
@@ -123,3 +126,21 @@ def test_the_sentence_has_the_interval_over_processes():
 
     sentence = told(times("gauss", "ours", 1.0, 1.1, 1.0), times("scipy", "engine", 2.0, 2.2, 2.2)).sentence
     assert "reaches 1e-6 rad 2.1 (2.0 to 2.2) times as fast as the fastest engine or solver, scipy." in sentence
+
+
+@pytest.mark.parametrize(("time", "used"), [(1e-7, {"gauss", "lame"}), (1e-4, {"gauss"})])
+def test_a_closed_form_is_advised_only_if_it_is_faster(time, used):
+    """At 1e-9 rad, which `gauss` reaches in 8e-6 s."""
+    lines = (OURS, point("gauss", "ours", 1e-10, 8e-6, 0.001), SOLVER, point("lame", "ours", 1e-12, time))
+    table = points(frame([each for line in lines for each in line]))
+    plan = SimpleNamespace(scenes=[SimpleNamespace(name="made_up")])
+    found = advice.section(SimpleNamespace(plan=plan, points=table, ratios=()))
+    rows = found.blocks[-1].rows
+    assert {str(row[2]) for row in rows} == used
+    assert ("lame" in found.blocks[0].text) == ("lame" in used)
+
+
+@pytest.mark.parametrize(("ratio", "grade"), [(0.94, Grade.BAD), (0.97, Grade.FAIR), (1.03, Grade.FAIR), (1.07, Grade.GOOD)])
+def test_a_ratio_of_one_process_is_open_close_to_one(ratio, grade):
+    assert grade_ratio(ratio).grade is grade
+    assert grade_ratio(ratio, interval=(ratio, ratio)).grade is (Grade.GOOD if ratio > 1 else Grade.BAD)
