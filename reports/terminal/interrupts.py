@@ -1,7 +1,8 @@
 """Ctrl-C, SIGTERM and SIGHUP end a command by an exception, so that its temporary files and processes are removed.
 
 Kernels call handlers of signals between blocks of steps (`kernels/signals.py`). During a call of an engine's compiled code a
-signal waits until that call returns.
+signal waits until that call returns. It waits for llvmlite too: an exception between a call of LLVM and the line of Python that
+notes which of the two owns the result makes both free it.
 """
 
 from __future__ import annotations
@@ -10,14 +11,16 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from types import FrameType
 from typing import Any
 
 _NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _AGAIN = 0.01
-"""Time, s, after which a lost signal is sent again."""
+"""Time, s, after which a signal that was lost, or came while LLVM compiled, is sent again."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -43,8 +46,11 @@ def handle_signals() -> None:
     sys.unraisablehook = _send_again
 
 
-def _interrupt(number: int, frame: object) -> None:
+def _interrupt(number: int, frame: FrameType | None) -> None:
     if not received:
+        if any(caller.f_globals.get("__name__", "").startswith("llvmlite.") for caller, _ in traceback.walk_stack(frame)):
+            _send_later(number)
+            return
         received.append(Interrupted(number))
         raise received[0]
     if number == signal.SIGINT:
@@ -56,11 +62,15 @@ def _send_again(unraisable: Any) -> None:
     """Send a signal again if its exception was ignored, as in callbacks of weak references, which imports use."""
     if unraisable.exc_value in received:
         received.clear()
-        # On Windows os.kill would end the process at once. Elsewhere it also ends a wait of the main thread.
-        send = signal.raise_signal if os.name == "nt" else partial(os.kill, os.getpid())
-        threading.Timer(_AGAIN, send, (unraisable.exc_value.number,)).start()
+        _send_later(unraisable.exc_value.number)
     else:
         sys.__unraisablehook__(unraisable)
+
+
+def _send_later(number: int) -> None:
+    # On Windows os.kill would end the process at once. Elsewhere it also ends a wait of the main thread.
+    send = signal.raise_signal if os.name == "nt" else partial(os.kill, os.getpid())
+    threading.Timer(_AGAIN, send, (number,)).start()
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Signals end commands: nothing half-written and no process is left, and the exit code tells which signal it was."""
 
+import gc
 import json
 import os
 import signal
@@ -11,6 +12,8 @@ import weakref
 import psutil
 import pytest
 from click.testing import CliRunner
+from llvmlite import binding
+from llvmlite.binding import ffi
 
 from conservative.reports.cli.main import main
 from conservative.reports.terminal import interrupts
@@ -159,6 +162,26 @@ def test_an_interrupt_is_not_lost_where_no_exception_can_be_raised(handled):
     del name
     with pytest.raises(Interrupted):
         work(names)
+
+
+def test_what_llvm_has_freed_is_not_freed_again_after_an_interrupt(handled, monkeypatch):
+    freed, library = [], ffi.lib
+
+    def free(string):
+        freed.append(string)
+        if len(freed) == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    class Library:
+        def __getattr__(self, name):
+            return free if name == "LLVMPY_DisposeString" else getattr(library, name)
+
+    monkeypatch.setattr(ffi, "lib", Library())
+    with pytest.raises(Interrupted):
+        [binding.get_default_triple(), time.sleep(60)]
+    interrupts.received.clear()  # the exception has the string in its traceback
+    gc.collect()
+    assert len(freed) == 1
 
 
 def test_an_ignored_signal_stays_ignored():
