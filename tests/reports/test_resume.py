@@ -170,7 +170,7 @@ HANG = 600
 
 
 def started(start, arguments, folder):
-    code = [sys.executable, "-c", "from conservative.reports.cli.launch import launch; launch()"]
+    code = [sys.executable, "-X", "faulthandler", "-c", "from conservative.reports.cli.launch import launch; launch()"]
     return start([*code, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -217,7 +217,7 @@ def resumed(tmp_path_factory):
 @pytest.mark.slow
 def test_an_interrupt_stores_finished_studies_and_prints_the_command_that_continues(resumed):
     _, (code, out, err), left, earlier, content, again, _ = resumed
-    assert code == 130
+    assert code == 130, err
     assert out == ""
     assert "\nInterrupted; " in err
     said = re.search(r"(\d) of 6 studies are finished \((.*)\) and stored", err)
