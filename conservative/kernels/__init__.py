@@ -87,5 +87,11 @@ def _drop_stale_code(cache: Path, sources: Path) -> None:
     write_text(stamp, current, "NUMBA_CACHE_DIR")
 
 
-if CACHED:
-    _drop_stale_code(Path(brief(lambda: None).stats.cache_path), Path(__file__).parents[1])
+_folder = Path(brief(lambda: None).stats.cache_path) if CACHED else None
+if _folder:
+    _drop_stale_code(_folder, Path(__file__).parents[1])
+
+
+def is_first_use() -> bool:
+    """Return whether compiled code can be stored, and none is stored yet."""
+    return _folder is not None and not any(_folder.glob("*.nbi"))

@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+import os
+from collections import defaultdict
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 
 import pandas as pd
 
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Finding
+from conservative.errors import IntegrationFailed
+from conservative.grid import Grid
+from conservative.integration.pickling import NotTransferable
+from conservative.kernels import is_first_use
+from conservative.method import Role
+from conservative.references.worker.calls import run_within
 
 from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
 from .plan import Plan
+
+COMPILERS = 4
+"""Largest number of processes that compile kernels; each takes 0.3 GB."""
+COMPILATION_LIMIT = 300.0
+"""Time, s, after which such a process is ended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +51,42 @@ class Measurements:
         )
 
 
+def compile_kernels(plan: Plan, step: Step) -> None:
+    """Compile the kernels of a plan side by side if none is stored yet. Otherwise each is compiled when it is needed.
+
+    Each process takes two steps with all methods that share a kernel, so that no kernel is compiled twice.
+    """
+    if not is_first_use():
+        return
+    announce("compilation of kernels, for the first time")
+    cases: dict[str, set[Case]] = defaultdict(set)
+    for study in plan.studies:
+        for scene, method in product(study.scenes, study.competitors):
+            if method.role != Role.ENGINE:
+                case = Case("compilation", scene, method, Grid(scene.dt, 2))
+                cases[method.card.kernel or method.family].add(case)
+
+    def compile_one(kernel: str) -> None:
+        mine = cases[kernel]
+
+        def take_steps() -> None:
+            for case in mine:
+                attempt(case)
+
+        with suppress(IntegrationFailed, NotTransferable):  # then the study compiles, and finds out why
+            run_within(COMPILATION_LIMIT, take_steps)
+
+    with ThreadPoolExecutor(min(COMPILERS, os.cpu_count() or 1)) as threads:
+        for i, _ in enumerate(threads.map(compile_one, cases), start=1):
+            step(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
+
+
 def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
     """Return rows and samples in the order of the plan.
 
     Studies in the checkpoint are not measured again, others are added to it. `step` is called with the finished share.
     """
+    compile_kernels(plan, step)
     for i, study in enumerate(plan.studies):
         if study.name in checkpoint.results:
             continue

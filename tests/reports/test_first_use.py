@@ -1,0 +1,46 @@
+"""The first report with an empty cache compiles its kernels in other processes, and finds them there."""
+
+from ..environments import run_python
+
+TWICE = """
+import conservative as cv
+from conservative.kernels import moser_veselov, is_first_use
+from conservative.reports.run.measure import compile_kernels
+from conservative.reports.run.plan import plan_report
+plan = plan_report(["brick_flip"], ["moser_veselov:order=2", "mujoco"], quick=True)
+for _ in range(2):
+    steps = []
+    compile_kernels(plan, lambda share, what: steps.append(what))
+    print(steps, is_first_use())
+cv.integrate(cv.scenes.brick_flip(), 0.01, method=plan.methods[0])
+print(sum(moser_veselov.enter.stats.cache_hits.values()), sum(moser_veselov.enter.stats.cache_misses.values()))
+"""
+
+
+def test_kernels_are_compiled_once_before_the_studies(tmp_path):
+    code, out, err = run_python(TWICE, NUMBA_CACHE_DIR=str(tmp_path))
+    assert code == 0, err
+    assert out.splitlines() == ["['compilation of kernels, for the first time: 1 of 1'] False", "[] False", "1 0"]
+    assert err == "compilation of kernels, for the first time\n"
+
+
+CRASH = """
+import os
+import conservative as cv
+from conservative.methods.moser_veselov import MoserVeselov
+from conservative.reports.run.measure import compile_kernels
+from conservative.reports.run.plan import plan_report
+here = os.getpid()
+class Crashing(MoserVeselov):
+    def prepare(self, scene, grid):
+        return os._exit(3) if os.getpid() != here else super().prepare(scene, grid)
+from dataclasses import replace
+plan = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+studies = [replace(study, methods=(Crashing(order=2),)) for study in plan.studies]
+compile_kernels(replace(plan, studies=tuple(studies)), print)
+"""
+
+
+def test_a_process_that_ends_leaves_the_compilation_to_the_studies(tmp_path):
+    code, out, err = run_python(CRASH, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (code, out) == (0, "0.0 compilation of kernels, for the first time: 1 of 1\n"), err
