@@ -169,14 +169,11 @@ class FittedLine(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> FittedLine:
-    """Return the line through three points or more, x (n,) and y (n,).
+    """Return the least-squares line through three points or more, x (n,) and y (n,).
 
-    The scatter is computed from the residuals, because the standard error of `linregress`, from 1 - r^2, loses its digits if
-    the points lie on a line.
+    The scatter is computed from the residuals: from 1 - r^2 it would lose its digits where the points lie on a line.
     """
-    from scipy.stats import linregress  # here, as importing it takes as long as everything else of a command
-
-    fitted = linregress(x, y)
-    residuals = (y - y.mean()) - fitted.slope * (x - x.mean())
-    scatter = float(np.sqrt(np.sum(residuals**2) / (len(x) - 2)))
-    return FittedLine(float(fitted.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)
+    dx, dy = x - x.mean(), y - y.mean()
+    slope = dx @ dy / (dx @ dx)
+    scatter = float(np.linalg.norm(dy - slope * dx)) / math.sqrt(len(x) - 2)
+    return FittedLine(float(slope), scatter / float(np.linalg.norm(dx)), scatter)

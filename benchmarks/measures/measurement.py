@@ -167,8 +167,8 @@ def samples_frame(lines: Iterable[Samples]) -> pd.DataFrame:
     """Return a table with a row for each sample and the columns `SAMPLE_COLUMNS`, typed as in `frame`."""
     import pandas as pd
 
-    parts = [pd.DataFrame(flat_samples(line), columns=list(SAMPLE_COLUMNS)) for line in lines]
-    return _typed(pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(SAMPLE_COLUMNS)))
+    table = pd.DataFrame([flat_samples(line) for line in lines], columns=list(SAMPLE_COLUMNS))
+    return _typed(table.explode(["t", "value"], ignore_index=True))
 
 
 def _typed(table: pd.DataFrame) -> pd.DataFrame:
