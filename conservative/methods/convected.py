@@ -27,7 +27,7 @@ Linearisation = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Convected(Method):
-    """Krenk & Nielsen's algorithm, Table 1, with its analytic tangent (29); see also `kernels/convected.py`.
+    """Krenk & Nielsen's algorithm, Table 1, on base vectors and their momenta, with its analytic tangent (29).
 
     Parameters
     ----------

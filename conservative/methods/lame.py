@@ -60,7 +60,7 @@ MOST_RADIANS = 1e6
 
 @dataclass(frozen=True)
 class Lame(Method):
-    """Closed-form steps of a symmetric top in uniform gravity (centre of mass on its axis); see the module for the equations.
+    """Closed-form steps of a symmetric top in uniform gravity (centre of mass on its axis), by elliptic functions.
 
     The accuracy does not depend on dt: a step adds about 1e-15 rad to the attitude error. Energy, momenta and orthonormality
     are conserved to round-off, but a free body's momentum turns by 6e-19 rad a step. Steps longer than about half a period of

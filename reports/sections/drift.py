@@ -17,8 +17,9 @@ from .measured import Measured, of_scene
 from .tumbling import Result, drawn
 
 _WHY = (
-    "Each step changes energy and momentum a little, and in most methods these changes add up. Smaller steps or tolerances "
-    "make them smaller, down to round-off. Methods that conserve stay on the middle line with large steps, too."
+    "A step of most methods follows the equations to some order. What it leaves out changes energy and momentum, often in the "
+    "same direction in each step, and adds up. Smaller steps or tolerances reduce it, down to round-off. Methods that are "
+    "built to conserve stay on the middle line with large steps, too."
 )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from conservative.method import Role
+
 from ..document.model import Block, Facts, Paragraph, Section, filled
 from ..run.provenance import LockedEngine
 from .measured import Measured
@@ -21,13 +23,18 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     resumed = " It was interrupted and resumed: compare times only within one study." if source.resumed else ""
     words = (
         f"{kind}A time is that of the fastest of several rounds, in which methods take turns: of the method's own loop, final "
-        f"state only, in {timing}.{resumed} Two independent reference solutions agree. All tables are below, behind a click."
+        f"state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one confirms. "
+        "All tables are below, behind a click."
     )
     facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
     facts += [("versions", ", ".join(f"{name} {version}" for name, version in source.compared.items()))]
     versions = Facts([*facts, *(("resumed", part) for part in source.resumed)])
-    return Section("How it was measured", filled(Paragraph(words), versions, *details, others, locks), "made", "Measured")
+    ours = [each for each in plan.methods if each.role not in (Role.ENGINE, Role.TRUTH)]
+    about = {each.family: (type(each).__doc__ or "").partition("\n")[0] for each in ours}
+    methods = Section("Methods of this package", [Facts(list(about.items()))] if about else [], folded=True)
+    blocks = filled(Paragraph(words), versions, *details, methods, others, locks)
+    return Section("How it was measured", blocks, "made", "Measured")
 
 
 def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:

@@ -46,8 +46,9 @@ def ratio_table(measured: Measured) -> Table:
             for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
                 contests = sides(reached, kind)
                 if any(each.ours for each in contests):
-                    names = dict.fromkeys(each.theirs.name for each in contests if each.lost and each.theirs)
                     cells = {each.error: contest_cell(each) for each in contests}
+                    faster = (each.theirs for each in contests if each.theirs and cells[each.error].grade is Grade.BAD)
+                    names = dict.fromkeys(each.name for each in faster)
                     rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]
     body: list[Row] = [
