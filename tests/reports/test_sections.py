@@ -175,6 +175,12 @@ def test_scenes_are_those_of_the_plan_in_its_order(built, planned, table):
         assert facts == f"{scene.source}. {scene.t_end:g} s; the scene's own step is {scene.dt:g} s."
 
 
+def test_each_method_of_the_package_is_described_once(built):
+    (facts,) = section(built, "Methods of this package").blocks
+    assert facts.facts[0] == ("reduced", Reduced.__doc__.splitlines()[0])
+    assert [name for name, _ in facts.facts] == ["reduced", "gauss"]
+
+
 def test_each_scene_has_its_rows_and_no_others(built):
     for scene, order in zip(SCENES, (2, 4), strict=True):
         orders = texts_of(tables(built, f"All tables of {scene}")[f"{scene}: observed order"])

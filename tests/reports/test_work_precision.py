@@ -162,3 +162,13 @@ def test_the_verdict_has_a_row_for_each_motion_and_class_and_names_the_faster_en
         ("made_up, every 0.1 s, final state only", general): ("✗ 0.50", "heyoka"),
         ("made_up, every 0.1 s, final state only", solution): ("✓ 5.0", "–"),
     }
+
+
+def test_an_engine_whose_time_is_within_5_percent_is_not_named_as_faster():
+    table = frame([*point("gauss", "ours", 1e-7, 1.03), *point("heyoka", "engine", 1e-7, 1.0)])
+    scene = SimpleNamespace(name="made_up")
+    measured = SimpleNamespace(
+        plan=SimpleNamespace(scenes=[scene]), ratios=[], points=points(table), every_step={"made_up": None}
+    )
+    (line,) = texts(ratios.ratio_table(measured))
+    assert line[-2:] == ["≈ 0.97", "–"]
