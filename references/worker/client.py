@@ -323,6 +323,13 @@ def close_workers() -> None:
             worker.close()
 
 
+def kill_workers() -> None:
+    """End the processes of all workers at once. Requests that wait in other threads raise `EngineCrashed`."""
+    for worker in list(_workers):
+        if process := worker._process:
+            process.kill()
+
+
 def _wait(descriptor: int, event: int, deadline: float) -> None:
     """Wait until a pipe can be read or written, or its other end is gone. Raise TimeoutError after the deadline."""
     if not _CAN_WAIT:

@@ -23,6 +23,7 @@ from conservative.integration.pickling import NotTransferable
 from conservative.kernels import is_first_use
 from conservative.method import Role
 from conservative.references.worker.calls import run_within
+from conservative.references.worker.client import kill_workers
 
 from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
@@ -77,8 +78,12 @@ def compile_kernels(plan: Plan, step: Step) -> None:
             run_within(COMPILATION_LIMIT, take_steps)
 
     with ThreadPoolExecutor(min(COMPILERS, os.cpu_count() or 1)) as threads:
-        for i, _ in enumerate(threads.map(compile_one, cases), start=1):
-            step(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
+        try:
+            for i, _ in enumerate(threads.map(compile_one, cases), start=1):
+                step(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
+        except BaseException:  # such as an interrupt, which does not reach the threads
+            kill_workers()
+            raise
 
 
 def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:

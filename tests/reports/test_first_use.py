@@ -24,23 +24,35 @@ def test_kernels_are_compiled_once_before_the_studies(tmp_path):
     assert err == "compilation of kernels, for the first time\n"
 
 
-CRASH = """
-import os
-import conservative as cv
+ELSEWHERE = """
+import os, signal, sys, time
+from dataclasses import replace
+from threading import Timer
 from conservative.methods.moser_veselov import MoserVeselov
 from conservative.reports.run.measure import compile_kernels
 from conservative.reports.run.plan import plan_report
 here = os.getpid()
-class Crashing(MoserVeselov):
+class Elsewhere(MoserVeselov):
     def prepare(self, scene, grid):
-        return os._exit(3) if os.getpid() != here else super().prepare(scene, grid)
-from dataclasses import replace
+        return does_there() if os.getpid() != here else super().prepare(scene, grid)
 plan = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
-studies = [replace(study, methods=(Crashing(order=2),)) for study in plan.studies]
-compile_kernels(replace(plan, studies=tuple(studies)), print)
+plan = replace(plan, studies=tuple(replace(study, methods=(Elsewhere(order=2),)) for study in plan.studies))
 """
 
 
 def test_a_process_that_ends_leaves_the_compilation_to_the_studies(tmp_path):
-    code, out, err = run_python(CRASH, NUMBA_CACHE_DIR=str(tmp_path))
+    what = "def does_there(): os._exit(3)\ncompile_kernels(plan, print)"
+    code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))
     assert (code, out) == (0, "0.0 compilation of kernels, for the first time: 1 of 1\n"), err
+
+
+def test_an_interrupt_does_not_wait_for_the_compilation(tmp_path):
+    """Without the kill the process waits for the sleeping one until the time limit of this test."""
+    what = """
+def does_there(): time.sleep(1e6)
+Timer(3, os.kill, (here, signal.SIGINT)).start()
+try: compile_kernels(plan, print)
+except KeyboardInterrupt: print("interrupted")
+"""
+    code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (code, out) == (0, "interrupted\n"), err
