@@ -128,10 +128,9 @@ def test_a_program_that_cannot_be_started_is_named(start):
         start("no_such_program").ask("check")
 
 
-def test_a_silent_program_is_ended(start, monkeypatch):
-    monkeypatch.setattr("conservative.references.worker.client.START_LIMIT", 0.5)
+def test_a_silent_program_is_ended(start):
     with pytest.raises(EngineTimeout):
-        start(sys.executable, "-c", SILENT).ask("check")
+        start(sys.executable, "-c", SILENT).greet(0.5)
 
 
 ADAPTER = """
