@@ -27,30 +27,14 @@ HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class EachStep:
-    """Methods at their coarsest setting with an error of at most `ERROR` at each of a scene's own steps.
+    """Methods at their coarsest setting with an error of at most `ERROR` at each of a scene's own steps, `interval` s apart.
 
-    Attributes
-    ----------
-    interval
-        Time between two steps of the scene, s.
-    stored, own_loop, final
-        Costs (see `contest.costs`) at `ERROR` of runs with every step stored, of the same without an engine's conversion of its
-        states, and of runs with the final state only.
+    `runs` are the costs (see `contest.costs`) at `ERROR` by name: of runs with every step stored, of the same without an
+    engine's conversion of its states, and of runs with the final state only.
     """
 
     interval: float
-    stored: pd.DataFrame
-    own_loop: pd.DataFrame
-    final: pd.DataFrame
-
-    @property
-    def runs(self) -> dict[str, pd.DataFrame]:
-        """The costs of each kind of runs by name."""
-        return {
-            f"every {self.interval:.3g} s stored": self.stored,
-            f"every {self.interval:.3g} s stored, engines without conversion": self.own_loop,
-            f"every {self.interval:.3g} s, final state only": self.final,
-        }
+    runs: dict[str, pd.DataFrame]
 
 
 def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
@@ -58,8 +42,17 @@ def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
     rows = table[(table["study"] == STUDY) & (table["scene"] == scene)]
     times = (Measure.TIME_SAMPLED, Measure.TIME_OWN_LOOP, Measure.TIME)
     stored, engines, final = (costs(points(rows, STUDY, time), [ERROR]) for time in times)
+    if stored.empty:
+        return None
     own_loop = pd.concat([stored[~stored["name"].isin(engines["name"])], engines])
-    return None if stored.empty else EachStep(float(rows["dt"].max()), stored, own_loop, final)
+    interval = float(rows["dt"].max())
+    every = f"every {interval:.3g} s"
+    runs = {
+        f"{every} stored": stored,
+        f"{every} stored, engines without conversion": own_loop,
+        f"{every}, final state only": final,
+    }
+    return EachStep(interval, runs)
 
 
 def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[Contest]:
