@@ -29,6 +29,7 @@ from . import (
     ratios,
     scenes,
     speed,
+    summary,
     tumbling,
 )
 from .measured import Measured, of_scene
@@ -43,7 +44,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     """Return the document of measurements. Every number that a report shows is computed here; nothing is measured."""
     measured = Measured(plan, measurements, source)
     found = tumbling.results(measured)
-    summaries = {scene.name: scenes.summarize(measured, scene) for scene in plan.scenes}
+    points = {scene.name: of_scene(measured.points, scene.name) for scene in plan.scenes}
+    summaries = {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes}
     rows = measured.scene_rows
     details: list[Block] = [ratios.section(measured)]
     if RANDOM in plan.names:
@@ -58,9 +60,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     details += filled(paper.section(rows, measured.samples), failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
     blocks += [advice.section(measured), provenance.section(measured, [_fold(each) for each in details])]
-    tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]
+    tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]
     sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
-    sentences += [summary.sentence for summary in summaries.values()]
+    sentences += [each.sentence for each in summaries.values()]
     return Document(
         "conservative report",
         "conservative: which integrator for a rotating body?",

@@ -24,12 +24,6 @@ from . import scene_contests
 from .drift import drift_figure, spheres_figure
 from .measured import Measured, long_run_drifts, of_scene
 from .summary import SAMPLE_TERMS, Summary
-from .summary import of_scene as summary_of_scene
-
-
-def summarize(measured: Measured, scene: Scene) -> Summary:
-    """Return the summary of a scene."""
-    return summary_of_scene(of_scene(measured.points, scene.name), scene.integrable)
 
 
 def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
