@@ -25,13 +25,9 @@ ANALYTICAL = "analytical"
 """Name of the exact motion in the paper's figure 2."""
 
 
-def _samples_of(samples: pd.DataFrame, study: str) -> pd.DataFrame:
-    return samples[samples["study"] == study]
-
-
 def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the relative drifts of the study of motions: columns scene, method, family, name, t (s), quantity, drift."""
-    rows = _samples_of(samples, "motion").rename(columns={"value": "drift"})
+    rows = samples[samples["study"] == "motion"].rename(columns={"value": "drift"})
     rows = rows[rows["quantity"].str.startswith(motion.SIGNED)]
     rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=rows["line"])
     return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
@@ -39,8 +35,8 @@ def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
 
 def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
     """Return the motion of each method over the first duration of a scene, by the name of the method."""
-    rows = _samples_of(samples, "motion")
-    points = _points(rows[rows["scene"] == scene.name], ["method", "name", "t"], motion.STATES)
+    rows = samples[(samples["study"] == "motion") & (samples["scene"] == scene.name)]
+    points = _points(rows, ["method", "name", "t"], motion.STATES)
     return {
         str(method): Trajectory(
             scene,
@@ -56,7 +52,7 @@ def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
     keys = ["scene", "method", "family", "name", "t"]
-    rows = _samples_of(samples, "motion")
+    rows = samples[samples["study"] == "motion"]
     return _points(rows.assign(name=rows["line"]), keys, motion.AXES)
 
 
@@ -88,8 +84,7 @@ def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def _of_figure(samples: pd.DataFrame, scene: str) -> pd.DataFrame:
-    rows = _samples_of(samples, "paper_figures")
-    return rows[rows["scene"] == scene]
+    return samples[(samples["study"] == "paper_figures") & (samples["scene"] == scene)]
 
 
 def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
