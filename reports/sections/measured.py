@@ -7,13 +7,12 @@ from functools import cached_property
 
 import pandas as pd
 
-from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.benchmarks.studies.studies import ENGINES, LONG_TIME, PRICE, RANDOM, THROUGHPUT
 from conservative.scene import Scene
 
 from ..rows import points
-from ..rows.names import of_study, with_names
+from ..rows.names import with_names
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -70,10 +69,3 @@ class Measured:
 def of_scene(rows: pd.DataFrame, scene: str) -> pd.DataFrame:
     """Return the rows of one scene, numbered from 0."""
     return rows[rows["scene"] == scene].reset_index(drop=True)
-
-
-def long_run_drifts(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the largest drift of each quantity in long runs; orthonormality counts as a quantity."""
-    rows = of_study(table, "long_runs")
-    rows = rows[rows["measure"].isin([Measure.DRIFT_MAX.text, Measure.ORTHONORMALITY.text])]
-    return rows.assign(quantity=rows["quantity"].mask(rows["quantity"] == "", "orthonormality"))

@@ -22,7 +22,7 @@ from ..rows.names import MethodClass, of_measure, of_study, outcomes
 from ..rows.points import front
 from . import scene_contests
 from .drift import drift_figure, spheres_figure
-from .measured import Measured, long_run_drifts, of_scene
+from .measured import Measured, of_scene
 from .summary import SAMPLE_TERMS, Summary
 
 
@@ -185,8 +185,13 @@ def time(table: pd.DataFrame, scene: str) -> Table:
 
 
 def conservation(table: pd.DataFrame, scene: str) -> Table:
-    """Return the drift of every quantity with every method in the long runs, the best methods first, and the outcomes."""
-    rows = of_scene(long_run_drifts(table), scene)
+    """Return the drift of every quantity with every method in the long runs, the best methods first, and the outcomes.
+
+    Orthonormality counts as a quantity.
+    """
+    rows = of_study(table, "long_runs", scene)
+    rows = rows[rows["measure"].isin([Measure.DRIFT_MAX.text, Measure.ORTHONORMALITY.text])]
+    rows = rows.assign(quantity=rows["quantity"].mask(rows["quantity"] == "", "orthonormality"))
     quantities = list(rows["quantity"].unique())
 
     def rank(members: pd.DataFrame) -> tuple[bool, float]:
