@@ -90,12 +90,8 @@ def colours(families: Families) -> dict[str, str]:
 
 def number_in_family(families: Families) -> dict[str, int]:
     """Return the number of each line within its family, from 0."""
-    counts: dict[str, int] = {}
-    numbers = {}
-    for name, family in families.items():
-        numbers[name] = counts.get(family, 0)
-        counts[family] = numbers[name] + 1
-    return numbers
+    lines = pd.Series(list(families.values()), dtype="object")
+    return dict(zip(families, lines.groupby(lines).cumcount().tolist(), strict=True))
 
 
 def scale(looks: Mapping[str, Any]) -> alt.Scale:
