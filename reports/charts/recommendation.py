@@ -58,10 +58,8 @@ def picture(recommendation: Recommendation) -> Any:
 
 def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> Any:
     reach = pd.concat([data["expected"], pd.Series([error])])
-    x, y = (
-        alt.X(**log_channel("setting", kind, data["setting"])),
-        alt.Y(**log_channel("expected", "error to expect, rad", reach)),
-    )
+    x = alt.X(**log_channel("setting", kind, data["setting"]))
+    y = alt.Y(**log_channel("expected", "error to expect, rad", reach))
     channels = look(families, "shape", title="method")
     base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x, y=y)
     lines = base.mark_line(strokeWidth=1.2).encode(color=channels["color"], detail="name:N", order="run:Q")

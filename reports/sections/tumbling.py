@@ -77,10 +77,8 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     """Return the section, from the `results`."""
     scene = measured.main_scene
     motions = lines.trajectories(measured.samples, scene)
-    names, truth = (
-        {each.method: each.line for each in found},
-        set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"]),
-    )
+    names = {each.method: each.line for each in found}
+    truth = set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"])
     exact = [method for method in motions if method in truth]
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
     motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
