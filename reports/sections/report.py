@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
 
-from ..document.model import Block, Document, Paragraph, Section, filled
+from ..document.model import Document, Paragraph, Section
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -47,7 +47,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     points = {scene.name: of_scene(measured.points, scene.name) for scene in plan.scenes}
     summaries = {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes}
     rows = measured.scene_rows
-    details: list[Block] = [ratios.section(measured)]
+    details: list[Section] = [ratios.section(measured)]
     if RANDOM in plan.names:
         details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
     details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
@@ -57,9 +57,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         if name in plan.names:
             details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
     details += hard_cases.sections(rows)
-    details += filled(paper.section(rows, measured.samples), failures.section(rows))
+    details += [each for each in (paper.section(rows, measured.samples), failures.section(rows)) if each.blocks]
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
-    blocks += [advice.section(measured), provenance.section(measured, [_fold(each) for each in details])]
+    blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]
     tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]
     sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
     sentences += [each.sentence for each in summaries.values()]
@@ -71,10 +71,6 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
         failures=failures.failures_of_ours(rows),
     )
-
-
-def _fold(block: Block) -> Block:
-    return replace(block, folded=True) if isinstance(block, Section) else block
 
 
 def records(table: pd.DataFrame) -> list[dict[str, object]]:
