@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.contest import LINE, Cheapest, Ratios, contests, costs
@@ -22,7 +23,7 @@ from ..document.cells import DASH, factor, grade_ratio, number, numeric, ratio_t
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, with_outcome, without_outcome
 from ..rows.points import joined, points
-from .summary import MIDDLE, MOST, Summary, cheapest_of_each, geometric_mean
+from .summary import MIDDLE, MOST, Summary
 
 ANY = "fastest engine"
 """Stands for all engines: on each body, the fastest of them."""
@@ -192,7 +193,8 @@ def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios]) -> Summary:
     measured = points(supported_rows(table), RANDOM, untimed=True)
     reached = costs(measured, DECADES, [*LINE, "version", "series"])
     families = map(display_name, reached["family"], reached["version"], [""] * len(reached))
-    best = cheapest_of_each(reached.assign(name=list(families)), "name")
+    reached = reached.assign(name=list(families))
+    best = reached.loc[reached.groupby(["name", "scene", "error"], sort=False)["time"].idxmin()]
     return Summary(sentence(ratios), joined([_means(best, measured["scene"].nunique())]))
 
 
@@ -203,7 +205,7 @@ def _means(reached: pd.DataFrame, bodies: int) -> pd.DataFrame:
             **members.iloc[0][["name", "family", "class"]],
             "setting": members["series"].mode().iloc[0],
             "error": error,
-            "time": geometric_mean(members["time"]),
+            "time": math.exp(float(np.log(members["time"]).mean())),
             "within": f"{len(members)} of {bodies}",
         }
         for (_, error), members in reached.groupby(["name", "error"], sort=False)

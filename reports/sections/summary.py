@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
@@ -50,16 +48,6 @@ def of_scene(points: pd.DataFrame, integrable: bool) -> Summary:
     """Return the summary of a scene from its points."""
     scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
     return Summary(_sentence(scene, costs(points, [MIDDLE]), integrable), picture(points))
-
-
-def cheapest_of_each(reached: pd.DataFrame, by: str) -> pd.DataFrame:
-    """Return the cheapest line of each family, or of each class, for each scene and error."""
-    return reached.loc[reached.groupby([by, "scene", "error"], sort=False)["time"].idxmin()]
-
-
-def geometric_mean(values: pd.Series[float]) -> float:
-    """Return the geometric mean."""
-    return math.exp(float(np.log(values).mean()))
 
 
 def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
