@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from .baseline import ORDER, Allowed, Baseline, BaselineRow
+from .baseline import ORDER, Baseline, BaselineRow
 from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, Status, find_runaway
 
 ACCEPT = 'accept with: conservative gate --update "REASON"'
@@ -99,15 +99,12 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Vio
         yield violation("engine version", was.engine, row.engine, was.engine)
     else:
         for name, allowed in was.measures.items():
-            if not passes(name, row.values.get(name, math.nan), allowed):
+            value = row.values.get(name, math.nan)
+            passed = value >= allowed.limit if name == ORDER else value <= allowed.limit  # NaN does not pass
+            if not passed:
                 side = "at least" if name == ORDER else "at most"
                 limit = f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
                 yield violation(name, f"{allowed.value:.6g}", _write_value(row.values.get(name)), limit)
-
-
-def passes(measure: str, value: float, allowed: Allowed) -> bool:
-    """Return whether a value is on the good side of its limit; NaN is not."""
-    return value >= allowed.limit if measure == ORDER else value <= allowed.limit
 
 
 def _write_value(value: float | None) -> str:
