@@ -48,8 +48,11 @@ def list_methods(names: list[str], project: str = "") -> Answer:
     methods: list[Method] = []
     ours = [name for name, family in sorted(families.items()) if family and family.role == Role.OURS]
     for name in names or [name for name in ours if name in registered] or ours:
-        if families.get(name):
-            methods += _suite_settings(families[name])
+        family = families.get(name)
+        if family and hasattr(family, "settings_for"):
+            methods += family.settings_for("suite")
+        elif family:  # of a version before cards
+            methods += getattr(family, "suite_settings", family.variants)()
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             methods.append(registry.method(name))
 
@@ -58,12 +61,6 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
     return {"methods": [describe(method) for method in methods]}
-
-
-def _suite_settings(family: Any) -> tuple[Method, ...]:
-    if hasattr(family, "settings_for"):
-        return tuple(family.settings_for("suite"))
-    return tuple(getattr(family, "suite_settings", family.variants)())  # versions before cards
 
 
 def describe_scene(scene: str, probes: Array) -> Answer:
