@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, many_runs, price, random, selection, studies, throughput
 from conservative.benchmarks.studies.study import Study
-from conservative.check import positive_number
 from conservative.method import Method
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
@@ -92,8 +91,6 @@ def plan_report(
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    if time_limit is not None:
-        positive_number("time_limit", time_limit, "a finite duration above 0, s")
     names, methods = tuple(scenes), tuple(methods)
     few = bodies is None and not (names or methods or full or quick)
     if bodies is None:
@@ -114,7 +111,7 @@ def plan_report(
         made.append(replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES]) if few else study)
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
-    main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
+    main_limit = MAIN_TIME_LIMIT if time_limit is None and not full else time_limit
     made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit, processes)
     made = [replace(each, methods=(*compared, *named)) if each.name == "motion" else each for each in made]
     if named:
