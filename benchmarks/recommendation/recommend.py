@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -306,13 +307,9 @@ def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: fl
     if name is None or last.cost > conditions.cost_limit:
         return None
     power = round(math.log10(last.setting))
-    for cut in range(max(-LARGEST_TOLERANCE_CUT, min(-1, wanted)), 0):
-        if power + cut < TIGHTEST:
-            continue
-        try:
+    for cut in range(max(-LARGEST_TOLERANCE_CUT, min(-1, wanted), TIGHTEST - power), 0):
+        with suppress(BadInput):  # tighter than the engine allows
             return selection.at_tolerance(last.method, name, float(f"1e{power + cut}")), last.dt, last.cost
-        except BadInput:  # tighter than the engine allows
-            continue
     return None
 
 
