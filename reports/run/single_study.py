@@ -75,15 +75,12 @@ def plan_study(
         return throughput.throughput_study(compared, quick=quick, skip_missing=skip_missing, processes=processes, **given)
     if name == "hard_cases":
         compared = hard_cases.settings(compared)
-    if scenes:
-        chosen = selection.scenes(scenes)
-    else:
-        usual = {
-            "stability": lambda: selection.scenes(stability.SCENES),
-            "hard_cases": hard_cases.scenes,
-            "price": price.scenes,
-        }
-        chosen = usual.get(name, selection.scenes)()
+    usual = {
+        "stability": lambda: selection.scenes(stability.SCENES),
+        "hard_cases": hard_cases.scenes,
+        "price": price.scenes,
+    }
+    chosen = selection.scenes(scenes) if scenes else usual.get(name, selection.scenes)()
     return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit, processes=processes)
 
 
