@@ -44,14 +44,8 @@ HARD = ("stability", "hard_cases")
 """Studies of the hard cases: of selected scenes, and of every registered scene."""
 ENGINES = ("engines_at_one_step", "engines_over_steps")
 """Studies of the selected scenes with engines only."""
-RANDOM = "random"
-"""Study of random bodies."""
-THROUGHPUT = "throughput"
-"""Study of many random bodies."""
-LONG_TIME = "long_time"
-"""Study of errors over a million turns."""
-PRICE = "price"
-"""Study of new processes."""
+RANDOM, THROUGHPUT, LONG_TIME, PRICE = "random", "throughput", "long_time", "price"
+"""Studies of random bodies, of many random bodies, of errors over a million turns, and of new processes."""
 MAIN = ("motion", "paper", "convergence", "speed", "work_precision", "long_runs")
 """Studies of the selected scenes and methods in every report."""
 IN_TURN = ("random", "work_precision", "each_step", "throughput")
