@@ -115,13 +115,7 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
 
 
 def _judge(options: dict[str, Any]) -> Document:
-    """Compare results with the baseline, or accept them.
-
-    Raises
-    ------
-    BadInput
-        A file holds no results, there is no baseline, or the results cannot be accepted.
-    """
+    """Compare results with the baseline, or accept them."""
     from conservative.benchmarks.gate import baseline, results
     from conservative.benchmarks.gate.compare import judge
 
@@ -153,13 +147,7 @@ def _judge(options: dict[str, Any]) -> Document:
 
 
 def _compare(options: dict[str, Any]) -> Document:
-    """Install both versions and compare them.
-
-    Raises
-    ------
-    BadInput
-        A version or a scene cannot be used, or neither version has a method.
-    """
+    """Install both versions and compare them."""
     from conservative.benchmarks.versions.project import compare_projects
     from conservative.benchmarks.versions.version import Version, build_version, install_version
     from conservative.programs import list_programs, project_file
