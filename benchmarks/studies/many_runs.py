@@ -29,16 +29,9 @@ COMPILED = 1.0
 
 @dataclass(frozen=True)
 class Way:
-    """A method, and how it runs many bodies.
+    """A method, and how it runs many bodies: `together` by `Method.prepare_many`, or each body in a run of its own.
 
-    Attributes
-    ----------
-    method
-        The method.
-    together
-        True if `Method.prepare_many` runs the bodies at once; otherwise each body has its own run.
-    threads
-        Number of our threads for blocks of bodies; the threads of an engine are one of its settings.
+    `threads` is the number of our threads for blocks of bodies; the threads of an engine are one of its settings.
     """
 
     method: Method
