@@ -15,14 +15,11 @@ def build() -> Document:
     environments, programs = list_environments(), list_programs()
     lines = [str(program) for program in programs.values()]
     for engine in (name for name in registry.list_engines() if name not in programs):
-        mine = [environment for environment in environments if environment.engine == engine]
-        lines += [_line(environment) for environment in mine] or [f"{engine}: no environment"]
+        mine = [each for each in environments if each.engine == engine]
+        installed = [f"{engine}=={each.version}: {each.runtime}, {', '.join(each.packages)}" for each in mine]
+        lines += installed or [f"{engine}: no environment"]
     data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}
     return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)
-
-
-def _line(environment: Environment) -> str:
-    return f"{environment.engine}=={environment.version}: {environment.runtime}, {', '.join(environment.packages)}"
 
 
 def installation_line(done: Installation) -> str:
