@@ -36,16 +36,10 @@ NOT_DRAWN = Drawn()
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and a method on a grid.
+    """A scene and a method on a grid, in the study with this name.
 
-    Attributes
-    ----------
-    study
-        Name of the study.
-    drawn
-        The random body that the scene is.
-    bodies, way
-        Number of bodies of a batch, and how they run, such as "one at a time".
+    `drawn` is the random body that the scene is. `bodies` and `way` are the number of bodies of a batch, and how they run, such
+    as "one at a time".
     """
 
     study: str

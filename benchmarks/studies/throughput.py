@@ -75,14 +75,7 @@ EXACT = "closed form"
 
 @dataclass(frozen=True)
 class ThroughputStudy(Study):
-    """The study of many bodies.
-
-    Attributes
-    ----------
-    sizes
-        Numbers of bodies in timed runs.
-    bodies, seed
-        Number of bodies whose errors are measured, and the seed of all bodies.
+    """The study of many bodies, drawn from a `seed`: errors are measured on `bodies` of them, and times on each of `sizes`.
 
     Raises
     ------

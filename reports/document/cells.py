@@ -50,16 +50,9 @@ def numeric(value: float, text: str = "", digits: int = 2) -> Cell:
 
 
 def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED, SMALL)) -> Cell:
-    """Return a size with the symbol of its grade; the default limits are those of drifts.
+    """Return a size with the symbol of its grade, a dash for NaN; the default text is the size as a number.
 
-    Parameters
-    ----------
-    value
-        The size; NaN gives a dash.
-    text
-        Default: the size as a number.
-    limits
-        Largest sizes that are good, and fair.
+    `limits` are the largest sizes that are good, and fair. By default they are those of drifts.
     """
     if math.isnan(value):
         return Cell(DASH, Grade.NONE, value=value)
