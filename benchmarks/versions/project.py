@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -178,12 +178,9 @@ def compare_projects(
     """
     for name in scenes:
         define_scene(name)  # before any work
-    with ExitStack() as stack:
-        truths = remember_truths()
-        sides = ProjectSide(base, methods, truths), ProjectSide(head, methods, truths)
-        for side in sides:
-            stack.callback(side.close)
-        made: ProjectComparison = compare(sides, scenes, tell)
+    truths = remember_truths()
+    with closing(ProjectSide(base, methods, truths)) as was, closing(ProjectSide(head, methods, truths)) as now:
+        made: ProjectComparison = compare((was, now), scenes, tell)
         if not made.lines:
             raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
 
@@ -192,7 +189,7 @@ def compare_projects(
             for line in made.lines
             if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
         ]
-        times = compare_times(*sides, good, processes, tell)
+        times = compare_times(was, now, good, processes, tell)
         lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
         return replace(made, lines=tuple(lines))
 
