@@ -119,7 +119,7 @@ def _judge(options: dict[str, Any]) -> Document:
     from conservative.benchmarks.gate import baseline, results
     from conservative.benchmarks.gate.compare import judge
 
-    from ..document.model import Block, Document, Paragraph, Table
+    from ..document.model import Document, Paragraph, Table, filled
 
     path = options["baseline"] or baseline.PATH
     runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
@@ -141,7 +141,7 @@ def _judge(options: dict[str, Any]) -> Document:
         for id in (*entry["added"], *entry["changed"])
         for name, allowed in new.rows[id].measures.items()
     ]
-    blocks: list[Block] = [Paragraph(text), *([Table(LIMITS, limits, "Limits that are new or changed")] if limits else [])]
+    blocks = filled(Paragraph(text), Table(LIMITS, limits, "Limits that are new or changed"))
     data = {"passed": True, "baseline": path, "rows": len(new.rows), "entry": entry}
     return Document("conservative gate", "A new baseline", blocks, data=data)
 

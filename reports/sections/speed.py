@@ -14,7 +14,7 @@ from ..charts.style import colours
 from ..document.cells import factor, tolerance
 from ..document.model import Emphasis, Figure, Layout, LegendEntry, Paragraph, Section, filled
 from ..rows.names import MethodClass, of_classes
-from ..rows.points import names_in_turn, under
+from ..rows.points import joined, names_in_turn, under
 from . import random_bodies
 from .measured import Measured, of_scene
 from .summary import CAVEAT, MIDDLE, Summary
@@ -58,7 +58,7 @@ def _sentence(subject: str, points: pd.DataFrame) -> str:
 def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
     full = {motion: points for motion, points in pictures.items() if len(points)}
-    every = pd.concat(full.values(), ignore_index=True) if full else pd.DataFrame(columns=["name", "family", "class", "error"])
+    every = joined(full.values())
     legend = []
     for line in names_in_turn(every):
         family, kind = every.loc[every["name"] == line, ["family", "class"]].iloc[0]
