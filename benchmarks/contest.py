@@ -27,7 +27,6 @@ SMALLEST = 1e-17
 LINE = ("scene", "name", "family", "class")
 """Columns of points that identify a line of settings."""
 CONFIDENCE = 0.95
-"""Confidence of intervals."""
 RESAMPLES = 4999
 
 

@@ -32,7 +32,6 @@ SLOW_PREPARATION = 1.0
 PREPARATIONS = 30.0
 """Time, s, for all preparations of a method on a scene. Step sizes beyond it are skipped."""
 SKIPPED = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
-"""Outcome of skipped step sizes."""
 TIMED = 1.0
 """Largest attitude error, rad, of a timed run. A run with a larger error is another motion."""
 

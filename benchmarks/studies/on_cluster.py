@@ -18,7 +18,6 @@ from . import studies
 from .study import Finding, Progress, Study, remember_truths
 
 UNTIMED = ("paper", "convergence", "long_runs", "motion", "paper_figures", "stability", "hard_cases")
-"""Studies without times."""
 
 
 def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterator[Finding]:
