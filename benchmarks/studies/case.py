@@ -36,7 +36,7 @@ NOT_DRAWN = Drawn()
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and a method on a grid, in the study with this name.
+    """A scene and a method on a grid, in a study (its name).
 
     `drawn` is the random body that the scene is. `bodies` and `way` are the number of bodies of a batch, and how they run, such
     as "one at a time".
