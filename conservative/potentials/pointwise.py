@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,87 +17,61 @@ GradientFunction = Callable[[Array], Array] | Callable[[Array, float], Array]
 """Functions of a matrix (3, 3), or of a matrix and a time, s."""
 
 
-@contextmanager
-def _blamed() -> Iterator[None]:
-    """Turn whatever goes wrong in a function that is not ours into `PotentialFailed`, with that as its cause."""
-    try:
-        yield
-    except Exception as error:
-        raise PotentialFailed(error) from error
-
-
 @dataclass(frozen=True)
-class Product:
-    """A function of a matrix (3, 3), and maybe a time, times a constant: called, it gives the product, a number or a matrix.
-
-    The time it is called with is in units of `time`, s.
-    """
+class _OfAttitude:
+    """A function of a matrix (3, 3) and, if `in_time`, of a time, s. Subclasses have the shape of its values."""
 
     function: Callable[..., Any]
-    factor: float
-    time: float = 1.0
+    in_time: bool = False
+    shape: ClassVar[tuple[int, ...]]
 
-    def __call__(self, R: Array, *t: float) -> Any:
-        """Return the product, in the function's unit."""
-        return self.function(R, *(each * self.time for each in t)) * self.factor
+    def at(self, R: Array, *t: float) -> Any:
+        """Return the value, J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives no such value.
+
+        A function of attitude and time is not called without the time, whatever its defaults.
+        """
+        try:
+            if len(t) != self.in_time:
+                raise TypeError(f"it is a function of {'attitude and time' if self.in_time else 'the attitude alone'}")
+            return self._read(self.function(R.copy(), *t))
+        except Exception as error:
+            raise PotentialFailed(error) from error
+
+    def _read(self, found: Any) -> Any:
+        """Return what the function gave as a float or an array of floats. Raise an exception if it is something else."""
+        raise NotImplementedError
+
+    def __call__(self, R_WB: Array, *t: Array) -> Array:
+        """Return the values, (...) or (..., 3, 3), in J at matrices (..., 3, 3), and times (...), s."""
+        R = np.asarray(R_WB, dtype=float)
+        times = [np.broadcast_to(np.asarray(each, dtype=float), R.shape[:-2]).ravel().tolist() for each in t]
+        found = [self.at(*each) for each in zip(R.reshape(-1, 3, 3), *times, strict=True)]
+        return np.array(found).reshape((*R.shape[:-2], *self.shape))
 
 
-@dataclass(frozen=True)
-class Energy:
+class Energy(_OfAttitude):
     """V in J: `at` one matrix (3, 3), and called with matrices (..., 3, 3); `in_time`, with times in s as well."""
 
-    function: EnergyFunction
-    in_time: bool = False
+    shape = ()
 
-    def at(self, R: Array, *t: float) -> float:
-        """Return V, J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives no real number."""
-        with _blamed():
-            found = _call(self, R, t)
-            if type(found) is float:
-                return found
-            if isinstance(found, bool | str | bytes) or np.ndim(found):
-                raise TypeError(f"the energy is {describe(found)}, not a real number")
-            return float(found)
-
-    def __call__(self, R_WB: Array, *t: Array) -> Array:
-        """Return V, (...), in J."""
-        return np.array([self.at(*each) for each in _each(R_WB, *t)]).reshape(np.shape(R_WB)[:-2])
+    def _read(self, found: Any) -> float:
+        if type(found) is float:
+            return found
+        if isinstance(found, bool | str | bytes) or np.ndim(found):
+            raise TypeError(f"the energy is {describe(found)}, not a real number")
+        return float(found)
 
 
-@dataclass(frozen=True)
-class Gradient:
+class Gradient(_OfAttitude):
     """dV/dR in J: `at` one matrix (3, 3), and called with matrices (..., 3, 3); `in_time`, with times in s as well."""
 
-    function: GradientFunction
-    in_time: bool = False
+    shape = (3, 3)
 
-    def at(self, R: Array, *t: float) -> Array:
-        """Return dV/dR, (3, 3), in J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives none."""
-        with _blamed():
-            found = _call(self, R, t)
-            gradient = real_array(found)
-            if gradient is None or gradient.shape != (3, 3):
-                raise TypeError(f"the gradient is {describe(found)}, not a matrix (3, 3) of real numbers")
-            return gradient
-
-    def __call__(self, R_WB: Array, *t: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J."""
-        return np.array([self.at(*each) for each in _each(R_WB, *t)]).reshape(np.shape(R_WB))
-
-
-def _call(of: Energy | Gradient, R: Array, t: tuple[float, ...]) -> Any:
-    """Return what the function gives; one of attitude and time is not called without the time, whatever its defaults."""
-    if len(t) != of.in_time:
-        raise TypeError("it is a function of attitude and time" if of.in_time else "it is a function of the attitude alone")
-    function: Callable[..., Any] = of.function
-    return function(R.copy(), *t)
-
-
-def _each(R_WB: Array, *t: Array) -> Iterator[tuple[Any, ...]]:
-    """Yield matrices (3, 3) out of (..., 3, 3), and with them the times, floats, out of (...)."""
-    R = np.asarray(R_WB, dtype=float)
-    times = [np.broadcast_to(np.asarray(each, dtype=float), R.shape[:-2]).ravel().tolist() for each in t]
-    return zip(R.reshape(-1, 3, 3), *times, strict=True)
+    def _read(self, found: Any) -> Array:
+        gradient = real_array(found)
+        if gradient is None or gradient.shape != (3, 3):
+            raise TypeError(f"the gradient is {describe(found)}, not a matrix (3, 3) of real numbers")
+        return gradient
 
 
 @dataclass(frozen=True)

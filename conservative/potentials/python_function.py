@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..check import describe, finite_array, positive_number, replace_unchecked, 
 from ..deferred_imports import kernels
 from ..errors import BadInput, PotentialFailed
 from .callback import Callback, moment
-from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
+from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _PROBED_TIMES = ((0.0,), (0.7,))
@@ -129,8 +130,12 @@ class FunctionPotential:
 
     def in_units(self, energy: float, time: float = 1.0) -> FunctionPotential:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
-        V = Energy(Product(self.energy.at, 1 / energy, time), self.time_dependent)
-        G = Gradient(Product(self.gradient.at, 1 / energy, time), self.time_dependent)
+
+        def convert(function: Callable[..., Any]) -> Callable[..., Any]:
+            return lambda R, *t: function(R, *(each * time for each in t)) / energy
+
+        V = Energy(convert(self.energy.at), self.time_dependent)
+        G = Gradient(convert(self.gradient.at), self.time_dependent)
         return replace_unchecked(self, energy=V, gradient=G, scale=Size(self.scale() / energy))
 
     def kernel_field(self, R_BP: Array) -> Any:
