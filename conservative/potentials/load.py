@@ -158,24 +158,16 @@ class OfTime:
 
     def in_units(self, unit: float, time: float) -> Self:
         """Return the function in units of its values and with times in units of `time`, s, powers of two."""
-        value: Value
+
+        def scaled(t: float) -> Array:
+            return self.at(t * time) / unit
+
+        value: Value = scaled
         if isinstance(self.value, np.ndarray):
             value = self.value / unit
         elif isinstance(self.value, tuple):
             value = self.value[0] / time, self.value[1] / unit
-        else:
-            value = _Scaled(self, unit, time)
         return replace_unchecked(self, value=value, breaks=self.breaks / time)
-
-
-@dataclass(frozen=True)
-class _Scaled:
-    function: OfTime
-    unit: float
-    time: float
-
-    def __call__(self, t: float) -> Array:
-        return self.function.at(t * self.time) / self.unit
 
 
 @dataclass(frozen=True, eq=False, init=False)
