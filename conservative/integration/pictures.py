@@ -87,12 +87,8 @@ def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
     counts = {name: np.histogram(np.clip(values, edges[0], edges[-1]), edges)[0] for name, values in finite.items()}
     bodies = {name: np.maximum([*each, 0], 0.5) for name, each in counts.items()}  # half a body is below the axis
     data = pd.concat([pd.DataFrame({"of": name, "drift": edges, "bodies": each}) for name, each in bodies.items()])
-    x = alt.X(
-        "drift:Q",
-        title="largest drift, relative",
-        scale=alt.Scale(type="log", nice=False),
-        axis=_power_axis(edges[0], edges[-1], "~e"),
-    )
+    axis = _power_axis(edges[0], edges[-1], "~e")
+    x = alt.X("drift:Q", title="largest drift, relative", scale=alt.Scale(type="log", nice=False), axis=axis)
     y = alt.Y("bodies:Q", scale=alt.Scale(type="log", domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
     colour = alt.Color("of:N", title="drift of", sort=list(drifts), scale=alt.Scale(range=list(_COLOURS)))
     chart: alt.Chart = (
@@ -138,16 +134,10 @@ def _rings(extent: float) -> list[Any]:
     angles = np.arange(1, math.floor(reach / step) + 1) * step
     turn = np.linspace(0, 2 * math.pi, 61)
     radii = 2 * np.sin(np.radians(angles) / 2)
-    n, many = len(turn), len(radii)
-    lines = pd.DataFrame(
-        {
-            "x": np.outer(radii, np.sin(turn)).ravel(),
-            "y": np.outer(radii, np.cos(turn)).ravel(),
-            "order": np.tile(np.arange(n), many),
-            "ring": np.repeat(angles, n),
-        }
-    )
-    apart = np.append(np.diff(radii) > 0.15 * extent, True)[:many]
+    ring, order = np.meshgrid(angles, np.arange(len(turn)), indexing="ij")
+    x, y = np.outer(radii, np.sin(turn)), np.outer(radii, np.cos(turn))
+    lines = pd.DataFrame({"x": x.ravel(), "y": y.ravel(), "order": order.ravel(), "ring": ring.ravel()})
+    apart = np.append(np.diff(radii) > 0.15 * extent, True)[: len(radii)]
     angles, radii = angles[apart], radii[apart]
     labels = pd.DataFrame({"x": 0 * radii, "y": radii, "label": [f"{angle:g}°" for angle in angles]})
     halo, text = ({"stroke": "white", "strokeWidth": 3}, {"color": "#404040"})
