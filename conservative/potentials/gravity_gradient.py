@@ -53,15 +53,9 @@ class GradientField(NamedTuple):
     def find_constants(self, J_inverse: Any) -> Any:
         """Return the rows of two matrices that map (r, s, g) to J^-1 u in the arrangements r and s, with u = G g."""
         x, y, z = self.rows
-        rows = (
-            (y[1], z[2], x[0]),
-            (y[2], z[0], x[1]),
-            (y[0], z[1], x[2]),
-            (z[1], x[2], y[0]),
-            (z[2], x[0], y[1]),
-            (z[0], x[1], y[2]),
-        )
-        return tuple(times(J_inverse, row) for row in rows)
+        of_r = (y[1], z[2], x[0]), (y[2], z[0], x[1]), (y[0], z[1], x[2])
+        of_s = (z[1], x[2], y[0]), (z[2], x[0], y[1]), (z[0], x[1], y[2])
+        return tuple(times(J_inverse, row) for row in (*of_r, *of_s))
 
     def slope(self, constants: Any, g: Any) -> Any:
         """Return V and dV/dg in J."""
