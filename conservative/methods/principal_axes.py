@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..attitude import Array, axes_about, to_quaternion, triple
-from ..attitude import Triple as Triple
+from ..attitude import Array, Triple, axes_about, to_quaternion, triple
 from ..errors import BadInput
 from ..invariants import jacobi_scale, largest_momentum
 from ..potentials.load import load_field

@@ -162,11 +162,9 @@ class Turning:
 
     def in_units(self, energy: float, time: float) -> Turning:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
-        convert = getattr(self.potential, "in_units", None)
-        assert convert is not None  # `conservative.methods.units.find_units` has looked
-        return replace_unchecked(
-            self, potential=convert(energy), orbit=replace_unchecked(self.orbit, rate=self.orbit.rate * time)
-        )
+        potential: Any = self.potential  # one with `in_units`, as `conservative.methods.units.find_units` requires
+        orbit = replace_unchecked(self.orbit, rate=self.orbit.rate * time)
+        return replace_unchecked(self, potential=potential.in_units(energy), orbit=orbit)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and O."""
