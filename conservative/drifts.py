@@ -97,12 +97,7 @@ def list_drifts(bodies: Batch) -> tuple[str, ...]:
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
     """Return the largest drifts (n, k) by the names of `list_drifts`; nan if a body failed or does not have the invariant.
 
-    Parameters
-    ----------
-    bodies, measured
-        n bodies, and their drifts (n, 5), as `measure_drifts` returns them.
-    R_WB, w_WB_B
-        The samples: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    `measured` (n, 5) is from `measure_drifts`, whose samples are passed as well.
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]

@@ -211,16 +211,9 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def require_extra(what: str, extra: str, *packages: str) -> None:
-    """Raise `MissingExtra` if a package is not installed. No package is imported.
+    """Raise `MissingExtra` if a package that `what`, such as `conservative report`, needs is not installed.
 
-    Parameters
-    ----------
-    what
-        The command or function that needs the packages, such as `conservative report`.
-    extra
-        The extra that installs them, a key of `EXTRAS`.
-    packages
-        Their import names; by default all packages of the extra.
+    `extra` is a key of `EXTRAS`. `packages` are import names, by default all of the extra. No package is imported.
     """
     missing = [package for package in packages or EXTRAS[extra] if find_spec(package) is None]
     if missing:

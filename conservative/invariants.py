@@ -102,16 +102,8 @@ def invariants_of(
     vector) of a free body, or its component along the axis of the field (the vertical in uniform gravity); and the axial
     momentum if body and field are symmetric about one axis. Momenta include that of a rotor.
 
-    Parameters
-    ----------
-    body, potential
-        The body and its field.
-    w_WB_B0
-        Initial angular velocity (3,), rad/s, body axes.
-    energy_scale
-        Reference scale of the energy, J, above 0.
-    axis
-        Unit vector (3,), body axes, about which body and field are symmetric, or None (`axial_direction`).
+    The initial rates (3,) are in rad/s, the reference scale of the energy in J, above 0. `axis` is the unit vector (3,), body
+    axes, about which body and field are symmetric, or None (`axial_direction`).
     """
     conserved = []
     if isinstance(potential, Turning):

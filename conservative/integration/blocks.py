@@ -180,20 +180,10 @@ def run_blocks(
     write: Callable[[int, Batch, BlockResult], object],
     progress: Callable[[ProgressOfMany], object] | None,
 ) -> None:
-    """Integrate the blocks with the first indices `left`.
+    """Integrate the blocks with the first indices `left`. `workers` are an executor and how many blocks to submit at a time.
 
-    Parameters
-    ----------
-    method, bodies, grid
-        The method, all bodies, and the steps.
-    workers
-        An executor, and the number of blocks to submit to it at a time.
-    left
-        The first indices of the blocks.
-    write
-        Called with the first index, the bodies and the result of each block, as soon as it has ended.
-    progress
-        Called after each block, or None.
+    `write` is called with the first index, the bodies and the result of each block as soon as it has ended, and then
+    `progress`, unless it is None.
     """
     (executor, in_flight), total, size = workers, len(bodies), list_blocks(len(bodies), grid).step
     done = found = total - sum(min(size, total - first) for first in left)

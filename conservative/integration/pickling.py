@@ -31,16 +31,10 @@ class NotTransferable(TypeError):
 def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] = ()) -> bytes:
     """Return a value as bytes.
 
-    Raise `NotTransferable` if a part of it cannot be pickled, and `MissingExtra` without cloudpickle, of the extra `report`.
+    The bytes contain the indices of `shared` objects, which the other process also has, instead of the objects. They contain
+    the functions and classes that the value uses of the modules `by_value`, which the other process cannot import.
 
-    Parameters
-    ----------
-    value
-        Any value.
-    shared
-        Objects that the other process also has. The bytes contain their indices in this list instead.
-    by_value
-        Modules that the other process cannot import. The bytes contain their functions and classes that the value uses.
+    Raise `NotTransferable` if a part of it cannot be pickled, and `MissingExtra` without cloudpickle, of the extra `report`.
     """
     stream, pickler = io.BytesIO(), _pickler()
     import cloudpickle

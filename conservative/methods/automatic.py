@@ -66,20 +66,11 @@ def integrate_to_error(
 def cut_step(
     method: Method, dt: float, error: float, grid_with: Callable[[float], Grid], estimate: Callable[[Grid], Estimate]
 ) -> tuple[tuple[float, float], ...]:
-    """Cut a step until the estimated error is small enough, or shorter steps do not help.
+    """Cut a step dt, s, until the estimated error is at most `error`, rad, or shorter steps do not help.
 
-    Raise `BadInput` if the first step makes more steps or samples than are possible.
-
-    Parameters
-    ----------
-    method, dt, error
-        The method, its first step, s, and the requested attitude error, rad.
-    grid_with, estimate
-        Return the grid of the whole run for a step, s, and the estimate of a run, including its sensitivity.
-
-    Returns
-    -------
-    The steps tried, s, and the estimated total error of each, rad.
+    Return the steps tried, s, and the estimated total error of each, rad. `grid_with` returns the grid of the whole run for a
+    step, s, and `estimate` the estimate of a run, including its sensitivity. Raise `BadInput` if the first step makes more
+    steps or samples than are possible.
     """
     grid = grid_with(dt)
     attempts: tuple[tuple[float, float], ...] = ()
