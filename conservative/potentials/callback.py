@@ -30,14 +30,17 @@ class Callback:
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         known, outputs = getattr(self.last, "pair", (b"", buffer))
         if inputs != known:  # residual and tangent of one iteration need the same
-            outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
+            functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping)
+            with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
+                outputs = functions[what](self.potential, buffer[:9].reshape(3, 3).copy(), buffer[9:N_INPUTS].copy())
             self.last.pair = inputs, outputs  # at once: an interrupt may come anywhere
         buffer[N_INPUTS : N_INPUTS + len(outputs)] = outputs
 
-    def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
-        functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping)
-        with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
-            return functions[what](self.potential, R_BP.copy(), state.copy())
+
+def find_address(function: Any) -> int:
+    """Return the address that kernels call for a potential or a function of time. It is valid as long as that lives."""
+    # Atomic: of threads that come here at once, each gets the one that stays.
+    return id(function.__dict__.setdefault("_callback", Callback(function)))
 
 
 def _energy(potential: Any, R_BP: Array, state: Array) -> Array:

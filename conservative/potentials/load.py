@@ -17,7 +17,7 @@ from ..attitude import Array, triple
 from ..check import choice, describe, finite_array, read_only, real_array, replace_unchecked, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, TorqueFailed
-from .callback import Callback
+from .callback import find_address
 from .uniform_gravity import UniformField
 
 FRAMES = ("body", "world")
@@ -258,7 +258,7 @@ def load_field(field: Any, torque: Torque | None, damping: Damping | None, R_BP:
     D = np.zeros((3, 3)) if damping is None else R_BP.T @ damping.matrix @ R_BP
     matrix = tuple(triple(row) for row in D)
     if damping is not None and damping.factor is not None:
-        factor = kernels("function_field").DampingInTime(_address(damping.factor), matrix)
+        factor = kernels("function_field").DampingInTime(find_address(damping.factor), matrix)
     body = world = zero
     if torque is not None and isinstance(torque.value, np.ndarray):
         if torque.frame == "body":
@@ -266,11 +266,6 @@ def load_field(field: Any, torque: Torque | None, damping: Damping | None, R_BP:
         else:
             world = triple(torque.value)
     elif torque is not None:
-        call = kernels("function_field").Torques(_address(torque), tuple(triple(row) for row in R_BP))
+        call = kernels("function_field").Torques(find_address(torque), tuple(triple(row) for row in R_BP))
     beside = UniformField(0.0, 0.0, 0.0) if field is None else field
     return Loaded(beside, call, body, world, matrix, 0.0, factor)
-
-
-def _address(function: OfTime) -> int:
-    """Return the address that kernels call. As for potentials: atomic, and valid as long as the function lives."""
-    return id(function.__dict__.setdefault("_callback", Callback(function)))

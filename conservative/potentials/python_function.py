@@ -13,7 +13,7 @@ from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, hat, rotation
 from ..check import describe, finite_array, positive_number, replace_unchecked, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, PotentialFailed
-from .callback import Callback, moment
+from .callback import find_address, moment
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
@@ -140,9 +140,7 @@ class FunctionPotential:
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
-        kernel = kernels("function_field")
-        # Atomic: of threads that come here at once, each gets the one that stays.
-        address, rows = id(self.__dict__.setdefault("_callback", Callback(self))), tuple(triple(row) for row in R_BP)
+        kernel, address, rows = kernels("function_field"), find_address(self), tuple(triple(row) for row in R_BP)
         return kernel.FunctionInTime(address, rows, 0.0) if self.time_dependent else kernel.Function(address, rows)
 
 
