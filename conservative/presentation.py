@@ -110,24 +110,19 @@ def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Lite
     drawn = np.unique(np.linspace(0, len(trajectory) - 1, MOST_DRAWN).astype(int))
     t = trajectory.t[drawn]
     data = pd.concat([pd.DataFrame({"t": t, "of": name, "value": values[drawn]}) for name, values in series.items()])
-    chart: altair.Chart = (
+    axis = alt.Axis(format=".0e" if scale == "log" else "")
+    tooltip = [alt.Tooltip("of:N", title="what"), alt.Tooltip("t:Q", title="time, s"), alt.Tooltip("value:Q", format=".6g")]
+    return (
         alt.Chart(data, width=_WIDTH, height=_HEIGHT)
         .mark_line()
         .encode(
             x=alt.X("t:Q", title="time, s"),
-            y=alt.Y(
-                "value:Q", title=quantity, axis=alt.Axis(format=".0e" if scale == "log" else ""), scale=alt.Scale(type=scale)
-            ),
+            y=alt.Y("value:Q", title=quantity, axis=axis, scale=alt.Scale(type=scale)),
             color=alt.Color("of:N", title=quantity, sort=list(series)),
-            tooltip=[
-                alt.Tooltip("of:N", title="what"),
-                alt.Tooltip("t:Q", title="time, s"),
-                alt.Tooltip("value:Q", format=".6g"),
-            ],
+            tooltip=tooltip,
         )
         .interactive(name=f"zoom_{scale}", bind_y=False)
     )
-    return chart
 
 
 def html_table(caption: str, rows: list[tuple[str, str]]) -> str:

@@ -54,8 +54,7 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
     rows = [first_row, draw_spread(ensemble.t[shown], quantiles), draw_drifts(ensemble.drifts)]
     failed = f", {len(ensemble.failures):,} failed" if ensemble.failures else ""
     title = alt.Title(ensemble.bodies.scene.name, subtitle=[f"{len(ensemble):,} bodies{failed}", ensemble.label])
-    chart: alt.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
-    return chart
+    return alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
 
 
 def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
@@ -72,8 +71,7 @@ def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
         y=alt.Y("middle:Q", scale=scale), tooltip=[alt.Tooltip(f"{each}:Q", format=".4g") for each in data.columns]
     )
     title = alt.Title("Spread of attitude", subtitle="line: median; band: 5 to 95 % of the bodies")
-    chart: alt.LayerChart = (band + line).properties(title=title)
-    return chart
+    return (band + line).properties(title=title)
 
 
 def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
@@ -91,12 +89,11 @@ def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
     x = alt.X("drift:Q", title="largest drift, relative", scale=alt.Scale(type="log", nice=False), axis=axis)
     y = alt.Y("bodies:Q", scale=alt.Scale(type="log", domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
     colour = alt.Color("of:N", title="drift of", sort=list(drifts), scale=alt.Scale(range=list(_COLOURS)))
-    chart: alt.Chart = (
+    return (
         alt.Chart(data, width=_WIDTH, height=_HEIGHT, title="Drifts over the run")
         .mark_line(interpolate="step-after", strokeWidth=1.8)
         .encode(x=x, y=y, color=colour, tooltip=["of:N", "bodies:Q"])
     )
-    return chart
 
 
 def _power_axis(low: float, high: float, form: str) -> Any:
