@@ -162,8 +162,7 @@ def _stream(seed: int, name: str, again: int = 0) -> np.random.Generator:
 
 def _draw_attitudes(scene: Scene, n: int, value: object, seed: int) -> Array:
     """Return attitudes (n, 3, 3), body to world."""
-    R_WB0 = np.empty((n, 3, 3))
-    R_WB0[:] = scene.R_WB0
+    R_WB0 = np.tile(scene.R_WB0, (n, 1, 1))
     if value is None:
         return R_WB0
     uniform, stream = _is_any(value), _stream(seed, "attitude")
