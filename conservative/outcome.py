@@ -62,12 +62,11 @@ class Outcome:
 
     def __str__(self) -> str:
         """Return the outcome as text, such as `not converged in step 3 at t = 0.02 s (residual 0.1)`."""
-        where = (f" in step {self.step}" if self.step is not None else "") + (
-            f" {'at' if self.step is not None else 'after'} t = {self.time:g} s" if self.time is not None else ""
-        )
+        step = "" if self.step is None else f" in step {self.step}"
+        time = "" if self.time is None else f" {'at' if step else 'after'} t = {self.time:g} s"
         residual = "" if self.residual is None else f"residual {self.residual:.3g}"
         why = "; ".join(filter(None, (self.reason, residual)))
-        return f"{self.kind}{where}" + (f" ({why})" if why else "")
+        return f"{self.kind}{step}{time}" + (f" ({why})" if why else "")
 
 
 OK = Outcome(OutcomeKind.OK)
