@@ -57,11 +57,16 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     MissingExtra
         cloudpickle, of the extra `report`, is not installed.
     """
-    by_value: list[str] = []
+    by_value, folder = list[str](), ""
+    with suppress(OSError):  # of a working directory that was removed
+        folder = os.getcwd()  # noqa: PTH109  # links are not resolved
     while True:
         kept = [_bytes_of(each, tuple(by_value)) for each in shared]
-        content = dump((sys.path, _find_folder(), kept, dump(work, shared, by_value)))
-        worker = process or _take_idle() or python_worker(show_output=True)
+        content = dump((sys.path, folder, kept, dump(work, shared, by_value)))
+        try:
+            worker = process or _idle.pop()
+        except IndexError:  # none is idle
+            worker = python_worker(show_output=True)
         with time_limit(limit):
             answer = worker.ask("call", adapter=__name__, function="do", content=np.frombuffer(content, np.uint8))
         if process is None:
@@ -88,23 +93,6 @@ def python_worker(variables: dict[str, str] | None = None, memory: int = 0, show
 @lru_cache(maxsize=MOST_SHARED)
 def _bytes_of(value: object, by_value: tuple[str, ...]) -> bytes:
     return dump(value, (), by_value)
-
-
-def _take_idle() -> Worker | None:
-    with suppress(IndexError):
-        while True:
-            worker = _idle.pop()
-            if worker.pid is not None:
-                return worker
-            worker.close()
-    return None
-
-
-def _find_folder() -> str:
-    """Return the working directory, or "" if it was removed."""
-    with suppress(OSError):
-        return os.getcwd()  # noqa: PTH109  # links are not resolved
-    return ""
 
 
 # ------------------------------------------------------------------------------------------------ in the other process
