@@ -28,23 +28,6 @@ def prepare(given):
     """Return a run of one body."""
     import dartpy as dart
 
-    world, joint, body = _build(dart, given)
-    start = joint.getPositions().copy(), joint.getVelocities().copy()
-    inertial = dart.dynamics.Frame.World()
-
-    def run():
-        world.reset()
-        joint.setPositions(start[0])
-        joint.setVelocities(start[1])
-        return sample(given, world.step, read)
-
-    def read():
-        return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}
-
-    return run
-
-
-def _build(dart, given):
     world = dart.simulation.World()
     world.setGravity([0, 0, -given.gravity])
     world.setTimeStep(given.dt)
@@ -59,4 +42,16 @@ def _build(dart, given):
     else:
         joint.setPositions(dart.dynamics.BallJoint.convertToPositions(given.R0))
     joint.setVelocities(np.concatenate([given.w0, np.zeros(3 * given.free)]))  # spatial velocity in body axes
-    return world, joint, body
+    start = joint.getPositions().copy(), joint.getVelocities().copy()
+    inertial = dart.dynamics.Frame.World()
+
+    def run():
+        world.reset()
+        joint.setPositions(start[0])
+        joint.setVelocities(start[1])
+        return sample(given, world.step, read)
+
+    def read():
+        return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}
+
+    return run

@@ -48,7 +48,15 @@ def prepare(given):
 
     if not getattr(gs, "_initialized", False):  # once per process
         gs.init(backend=gs.cpu, precision=given.precision[1:], logging_level="error")
-    scene = _scene(gs, given)
+    scene = gs.Scene(
+        sim_options=gs.options.SimOptions(dt=given.dt, gravity=(0, 0, 0)),
+        rigid_options=gs.options.RigidOptions(
+            integrator=getattr(gs.integrator, given.integrator),
+            enable_collision=given.as_installed,
+            disable_constraint=not given.as_installed,
+        ),
+        show_viewer=False,
+    )
     file = Path("body.xml").resolve()
     # Genesis requires a shape. This one has no contacts.
     file.write_text(write_mjcf(given, shape='<geom type="sphere" size="0.1" contype="0" conaffinity="0"/>'), encoding="utf-8")
@@ -68,15 +76,3 @@ def prepare(given):
         return {"q": body.get_quat().numpy().ravel(), "w_W": body.get_ang().numpy().ravel()}
 
     return run
-
-
-def _scene(gs, given):
-    return gs.Scene(
-        sim_options=gs.options.SimOptions(dt=given.dt, gravity=(0, 0, 0)),
-        rigid_options=gs.options.RigidOptions(
-            integrator=getattr(gs.integrator, given.integrator),
-            enable_collision=given.as_installed,
-            disable_constraint=not given.as_installed,
-        ),
-        show_viewer=False,
-    )

@@ -55,23 +55,6 @@ HEIGHT = 1e7
 
 def prepare(given):
     """Return a run of one body."""
-    flight = _build(given)
-    attitude = flight.get_propagate()
-
-    def run():
-        flight.run_ic()
-        samples = sample(given, flight.run, read)
-        T = samples["T"]
-        # The planet-fixed frame is inertial here. Its attitude in the world follows from the initial attitude.
-        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": samples["w"]}
-
-    def read():
-        return {"T": attitude.get_Tec2b(), "w": [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]}
-
-    return run
-
-
-def _build(given):
     import jsbsim
 
     jsbsim.FGJSBBase().debug_lvl = 0
@@ -90,4 +73,16 @@ def _build(given):
     flight["ic/h-sl-ft"] = HEIGHT
     for axis, rate in zip("pqr", given.w0.tolist(), strict=True):
         flight[f"ic/{axis}-rad_sec"] = rate
-    return flight
+    attitude = flight.get_propagate()
+
+    def run():
+        flight.run_ic()
+        samples = sample(given, flight.run, read)
+        T = samples["T"]
+        # The planet-fixed frame is inertial here. Its attitude in the world follows from the initial attitude.
+        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": samples["w"]}
+
+    def read():
+        return {"T": attitude.get_Tec2b(), "w": [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]}
+
+    return run

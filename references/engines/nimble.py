@@ -28,7 +28,16 @@ def prepare(given):
     """Return a run of one body."""
     import nimblephysics as nimble
 
-    world, skeleton, body = _build(nimble, given)
+    world = nimble.simulation.World()
+    world.setGravity([0, 0, -given.gravity])
+    world.setTimeStep(given.dt)
+    skeleton = nimble.dynamics.Skeleton()
+    _, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
+    body.setMass(given.mass)
+    body.setLocalCOM(given.com)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    body.setMomentOfInertia(xx, yy, zz, xy, xz, yz)
+    world.addSkeleton(skeleton)
     still = np.zeros(3 * given.free)
     place, rates = np.concatenate([_rotation_vector(given.q0), still]), np.concatenate([given.w0, still])
 
@@ -41,20 +50,6 @@ def prepare(given):
         return {"R": body.getWorldTransform().rotation(), "w_W": body.getAngularVelocity()}
 
     return run
-
-
-def _build(nimble, given):
-    world = nimble.simulation.World()
-    world.setGravity([0, 0, -given.gravity])
-    world.setTimeStep(given.dt)
-    skeleton = nimble.dynamics.Skeleton()
-    _, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
-    body.setMass(given.mass)
-    body.setLocalCOM(given.com)
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
-    body.setMomentOfInertia(xx, yy, zz, xy, xz, yz)
-    world.addSkeleton(skeleton)
-    return world, skeleton, body
 
 
 def _rotation_vector(q):

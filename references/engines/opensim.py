@@ -45,7 +45,20 @@ def prepare(given):
     import opensim
 
     opensim.Logger.setLevelString("off")
-    model, body, state = _build(opensim, given)
+    model = opensim.Model()
+    model.setGravity(opensim.Vec3(0, 0, -given.gravity))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    com = opensim.Vec3(*given.com.tolist())
+    body = opensim.Body("body", given.mass, com, opensim.Inertia(xx, yy, zz, xy, xz, yz))
+    joint = (opensim.FreeJoint if given.free else opensim.BallJoint)("joint", model.getGround(), body)
+    model.addBody(body)
+    model.addJoint(joint)
+    state, R = model.initSystem(), given.R0
+    # Angles about body-fixed axes x, y and z.
+    angles = math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
+    for i, (angle, rate) in enumerate(zip(angles, given.w0_W.tolist(), strict=True)):
+        joint.get_coordinates(i).setValue(state, angle, False)
+        joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
     times = (given.steps * given.dt).tolist()
 
     def run():
@@ -69,21 +82,3 @@ def prepare(given):
         return {"R": R, "w_W": w}
 
     return run
-
-
-def _build(opensim, given):
-    model = opensim.Model()
-    model.setGravity(opensim.Vec3(0, 0, -given.gravity))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
-    com = opensim.Vec3(*given.com.tolist())
-    body = opensim.Body("body", given.mass, com, opensim.Inertia(xx, yy, zz, xy, xz, yz))
-    joint = (opensim.FreeJoint if given.free else opensim.BallJoint)("joint", model.getGround(), body)
-    model.addBody(body)
-    model.addJoint(joint)
-    state, R = model.initSystem(), given.R0
-    # Angles about body-fixed axes x, y and z.
-    angles = math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
-    for i, (angle, rate) in enumerate(zip(angles, given.w0_W.tolist(), strict=True)):
-        joint.get_coordinates(i).setValue(state, angle, False)
-        joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
-    return model, body, state
