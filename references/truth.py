@@ -115,10 +115,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
 def solve(scene: Scene, grid: Grid) -> Trajectory:
     """Return the reference solution of a scene at the samples of a grid, without its check: faster than `reference`.
 
-    Raises
-    ------
-    MissingEngine
-        A package that it needs is not installed.
+    Raise `MissingEngine` if a package that it needs is not installed.
     """
     first = _pair(scene)[0]
     return (Precise(BITS) if isinstance(first, Precise) else first).solve(scene, grid)

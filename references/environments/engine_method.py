@@ -97,7 +97,7 @@ Result = TypeVar("Result")
 
 
 class WorkerRun(Generic[Result]):
-    """A run in a worker. `wall_time` excludes the communication with the worker."""
+    """A run in a worker. `wall_time` excludes the communication with the worker, and raises as `Worker.ask`."""
 
     def __init__(self, worker: Worker, given: Mapping[str, Any], read: Callable[[Answer], Result]) -> None:
         self._worker, self._given, self._read = worker, given, read
@@ -117,13 +117,7 @@ class WorkerRun(Generic[Result]):
         return SimpleNamespace(wall_time=lambda calls: float(self._ask("time", calls=calls)["seconds"]))
 
     def wall_time(self, calls: int) -> float:
-        """Return the wall time of calls in seconds: in the engine, and for the conversion to trajectories here.
-
-        Raises
-        ------
-        EngineCrashed, EngineTimeout
-            The engine failed.
-        """
+        """Return the wall time of calls in seconds: in the engine, and for the conversion to trajectories here."""
         answer = self._answer or self._ask("run")
         inside = self.own_loop.wall_time(calls)
         start = perf_counter_ns()
@@ -132,15 +126,7 @@ class WorkerRun(Generic[Result]):
         return inside + (perf_counter_ns() - start) * 1e-9
 
     def prepare(self) -> None:
-        """Prepare the run in the worker, again if its process has ended.
-
-        Raises
-        ------
-        EngineCrashed, EngineTimeout
-            The engine failed.
-        NotImplementedError
-            The engine does not support the run.
-        """
+        """Prepare the run in the worker, again if its process has ended. Raise as `Worker.ask`."""
         if self._start == 0 or self._start != self._worker.starts or self._worker.pid is None:
             self._number = self._worker.ask("prepare", **self._given)["run"]
             self._start = self._worker.starts

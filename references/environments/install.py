@@ -59,12 +59,8 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
     """Return the environment of `NAME` or `NAME==VERSION`, created if it does not exist.
 
     With `force` an existing environment is created again with the same packages, from its lock. The old one is replaced when
-    the new one is complete.
-
-    Raises
-    ------
-    BadInput
-        The engine or the version is unknown, has no wheel for a Python on this machine, or is not available here and now.
+    the new one is complete. Raise `BadInput` if the engine or the version is unknown, has no wheel for a Python on this
+    machine, or is not available here and now.
     """
     source = source or Source()
     engine, version = split_requirement(requirement)
@@ -87,12 +83,8 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
     """Return the environment of a build, a wheel or a folder of sources, created if it does not exist.
 
     Its version is that of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is never
-    mistaken for a release or for another build.
-
-    Raises
-    ------
-    BadInput
-        The path is neither a wheel of the engine nor a folder of sources, must not be built, or cannot be installed.
+    mistaken for a release or for another build. Raise `BadInput` if the path is neither a wheel of the engine nor a folder of
+    sources, must not be built, or cannot be installed.
     """
     if path.suffix == ".whl" and path.is_file():
         distribution = distribution_of(engine)
@@ -126,10 +118,7 @@ def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> P
 def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     """Return the newest versions with wheels that the engine's file supports, oldest first.
 
-    Raises
-    ------
-    BadInput
-        The engine is unknown, or the source does not list its versions.
+    Raise `BadInput` if the engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
     known = _KINDS[distribution.kind].list_versions(distribution.package, source)
@@ -143,13 +132,7 @@ def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
 def install_releases(
     engine: str, versions: Iterable[str], source: Source, report: Callable[[str], None]
 ) -> tuple[Environment, ...]:
-    """Return the environments of versions, in this order. `report` gets a line before each installation.
-
-    Raises
-    ------
-    BadInput
-        The engine or a version is unknown, or is not available here and now.
-    """
+    """Return the environments of versions, in this order. `report` gets a line before each installation. Raise as `install`."""
     names = [f"{engine}=={version}" for version in versions]
     for name in names:
         check(name)  # all of them, before the first takes minutes

@@ -74,12 +74,8 @@ def split_requirement(text: str) -> tuple[str, str]:
 def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
     """Return the lock of a version of an engine, by default the newest, with NumPy and its other requirements.
 
-    The first Python on this machine for which there are wheels is used, starting with the running one.
-
-    Raises
-    ------
-    BadInput
-        There is no such version, no wheel of it for a Python on this machine, or no network.
+    The first Python on this machine for which there are wheels is used, starting with the running one. Raise `BadInput` if
+    there is no such version, no wheel of it for a Python on this machine, or no network.
     """
     package = distribution.package
     pin = f"=={version}" if version else f">={distribution.oldest}" if distribution.oldest else ""

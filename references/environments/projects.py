@@ -45,21 +45,8 @@ _WHEEL = re.compile(r"([A-Za-z0-9_.]+)-[0-9][^-]*(-[^-]+){3,4}\.whl")
 def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> Environment:
     """Return the environment of a wheel from `keep_wheel`, created if it does not exist.
 
-    If the wheel does not require this package, or a version that the source does not have, the running version is added.
-
-    Parameters
-    ----------
-    wheel
-        The wheel.
-    requirements
-        Additional requirements.
-    source
-        Source of packages.
-
-    Raises
-    ------
-    BadInput
-        A package is not available, or `conservative` cannot be imported.
+    The requirements are additional ones. If the wheel does not require this package, or a version that the source does not
+    have, the running version is added. Raise `BadInput` if a package is not available, or `conservative` cannot be imported.
     """
     clear_leftovers()
     try:
@@ -108,10 +95,7 @@ def _running_version(source: Source) -> str:
 def keep_wheel(key: str, make_wheel: Callable[[Path], Path]) -> Path:
     """Return the wheel with a key, or the wheel that `make_wheel` creates in a folder; by default its hash is the key.
 
-    Raises
-    ------
-    BadInput
-        The file does not have the name of a wheel, or cannot be kept.
+    Raise `BadInput` if the file does not have the name of a wheel, or cannot be kept.
     """
     kept = folder_of_projects() / "wheels"
     if key and (existing := sorted((kept / key).glob("*.whl"))):
@@ -132,10 +116,7 @@ def keep_wheel(key: str, make_wheel: Callable[[Path], Path]) -> Path:
 def build_project(path: Path, source: Source, **variables: str) -> Callable[[Path], Path]:
     """Return a function that builds a folder of sources into a wheel in another folder, which runs code of the project.
 
-    Raises
-    ------
-    BadInput
-        There is nothing to build.
+    Raise `BadInput` if there is nothing to build.
     """
     if not any((path / name).is_file() for name in ("pyproject.toml", "setup.py")):
         raise BadInput("against", repr(str(path)), "a git ref, a wheel, or a folder with pyproject.toml or setup.py")

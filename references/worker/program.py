@@ -91,14 +91,9 @@ def pack(message: Message) -> bytes:
 
 
 def unpack(read: Callable[[int], bytes]) -> Message:
-    """Return the next message in binary framing; `read` returns a given number of bytes.
+    """Return the next message in binary framing; `read` returns a given number of bytes, or raises EOFError at the end.
 
-    Raises
-    ------
-    EOFError
-        There are no more messages.
-    Unreadable
-        The bytes are not a message.
+    Raise `Unreadable` if the bytes are not a message.
     """
     magic, header, size = PREFIX.unpack(read(PREFIX.size))
     if magic != MAGIC:
