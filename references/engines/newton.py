@@ -76,38 +76,30 @@ def prepare(given):
         before.clear_forces()
         solver.step(before, after, control, contacts, given.dt)
 
-    def renew():
-        for state in states:
-            _start(state, start)
-        if given.solver in WITH_MEMORY:
-            solver.reset(states[0], flags=0)  # which leaves the state
-
     steps = [partial(step, *states), partial(step, *reversed(states))]
     for each in steps:
         each()
     steps = steps if given.solver == NOT_RECORDED else [record_warp(each) for each in steps]
     # Views of the engine's own arrays: position and quaternion, scalar last; velocities in the world.
     views = [(state.body_q.numpy()[0], state.body_qd.numpy()[0]) for state in states]
-    return partial(_march, steps, views, renew, given.steps)
 
+    def run():  # steps alternate between two states
+        for state in states:
+            for name in ("body_q", "body_qd", "joint_q", "joint_qd"):
+                getattr(state, name).assign(getattr(start, name))
+        if given.solver in WITH_MEMORY:
+            solver.reset(states[0], flags=0)  # which leaves the state
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        done = 0
+        for sample, count in enumerate(given.steps.tolist()):
+            for number in range(done, count):
+                steps[number % 2]()
+            done = count
+            pose, velocity = views[done % 2]
+            q[sample], w[sample] = pose[[6, 3, 4, 5]], velocity[3:]
+        return {"q": q, "w_W": w}
 
-def _start(state, start):
-    for name in ("body_q", "body_qd", "joint_q", "joint_qd"):
-        getattr(state, name).assign(getattr(start, name))
-
-
-def _march(steps, views, renew, counts):
-    """Return samples of a run. Steps alternate between two states."""
-    renew()
-    q, w = np.empty((len(counts), 4)), np.empty((len(counts), 3))
-    done = 0
-    for sample, count in enumerate(counts.tolist()):
-        for number in range(done, count):
-            steps[number % 2]()
-        done = count
-        pose, velocity = views[done % 2]
-        q[sample], w[sample] = pose[[6, 3, 4, 5]], velocity[3:]
-    return {"q": q, "w_W": w}
+    return run
 
 
 def _model(newton, warp, given):

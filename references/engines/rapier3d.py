@@ -45,11 +45,10 @@ def prepare(given):
     com, moments, axes = ([float(number) for number in numbers] for numbers in (given.com, given.moments_com, given.q_com))
     mass = rp.MassProperties(tuple(com), float(given.mass), tuple(moments), rp.Rotation3(*axes))
 
-    def build():
+    def run():
         world = rp.PhysicsWorld(gravity=(0.0, 0.0, -float(given.gravity)))
         world.integration_parameters.dt = given.dt
-        if given.substeps:
-            world.integration_parameters.num_solver_iterations = given.substeps
+        world.integration_parameters.num_solver_iterations = given.substeps
         body = rp.RigidBody.dynamic(translation=(0, 0, 0), rotation=place).additional_mass_properties(mass).angvel(spin)
         body = body.gyroscopic_forces(True).linvel(drift)
         if not given.as_installed:
@@ -58,10 +57,7 @@ def prepare(given):
         if not given.free:
             support = world.add_body(rp.RigidBody.fixed().build())
             world.impulse_joints.insert(support, handle, rp.SphericalJoint.builder().build(), True)
-        return world, world.rigid_bodies[handle]
-
-    def run():
-        world, body = build()
+        body = world.rigid_bodies[handle]
 
         def read():
             turn, rate = body.rotation, body.angvel
