@@ -91,10 +91,10 @@ def non_spinning(scene: Scene) -> Formulation:
     """Return quaternion and momentum of the frame that turns at l/J1; the spin of a symmetric body has a closed form."""
     axes = symmetric_axes(scene)
     assert axes is not None  # checked by `Heyoka.unsupported`
-    u0, spin = _slow_rates(axes)
+    u0, constants = _slow_frame(axes, np.eye(3))
     form, parameters = forms.form_of(forms.non_spinning, [axes.moment[2] / axes.J[0], u0[2]])
     start = np.concatenate([axes.q0, u0[:2]])
-    return Formulation(axes, form, parameters, start, NON_SPINNING, _slow_constants(axes, spin, u0[2]), np.eye(3))
+    return Formulation(axes, form, parameters, start, NON_SPINNING, constants, np.eye(3))
 
 
 def lean(scene: Scene) -> Formulation:
@@ -132,14 +132,13 @@ def _free_rates_and_angle(scene: Scene) -> Formulation:
 
 
 def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
-    R0 = world @ axes.R_WF0
-    u0, spin = _slow_rates(axes)
-    u0, n0, k = world @ u0, R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
+    R0, (u0, constants) = world @ axes.R_WF0, _slow_frame(axes, world)
+    n0, k = R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
     form, parameters = forms.form_of(forms.axis_and_angle, [k, u0[2], u0 @ n0 + u0[2]])
     turned = _least(n0).T @ R0
     p0 = float(np.arctan2(turned[1, 0], turned[0, 0]))
     start = np.array([*n0, *u0[:2], p0])
-    return Formulation(axes, form, parameters, start, AXIS_AND_ANGLE, _slow_constants(axes, spin, u0[2]), world)
+    return Formulation(axes, form, parameters, start, AXIS_AND_ANGLE, constants, world)
 
 
 def _gyroscopic(axes: EngineAxes) -> list[float]:
@@ -147,16 +146,11 @@ def _gyroscopic(axes: EngineAxes) -> list[float]:
     return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
 
 
-def _slow_rates(axes: EngineAxes) -> tuple[Array, float]:
-    """Return the rates l/J1 of the slow frame, world axes, and the spin of the body in it."""
-    J1, _, J3 = axes.J.tolist()
-    return axes.R_WF0 @ (axes.J * axes.w0) / J1, (1 - J3 / J1) * float(axes.w0[2])
-
-
-def _slow_constants(axes: EngineAxes, spin: float, u3: float) -> list[float]:
-    """Return the constants of a state in the slow frame."""
+def _slow_frame(axes: EngineAxes, world: Array) -> tuple[Array, list[float]]:
+    """Return the rates l/J1 of the slow frame, world axes turned by `world`, and the constants of its states."""
     J1, J2, J3 = axes.J.tolist()
-    return [spin, u3, J1 / J2, J1 / J3]
+    u0 = world @ (axes.R_WF0 @ (axes.J * axes.w0) / J1)
+    return u0, [(1 - J3 / J1) * float(axes.w0[2]), u0[2], J1 / J2, J1 / J3]
 
 
 def _heights(axes: EngineAxes) -> tuple[float, float]:
