@@ -162,8 +162,7 @@ def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | No
     if spread > _SAME_POINT * max(1.0, float(np.abs(anchors - data.xpos[body]).max())):
         allowed = "a body whose ball joint or hinges go through one point"
         raise BadInput("name", f"{model.body(body).name!r}, whose joints turn about points {spread:.3g} m apart", allowed)
-    fixed_point: Array = anchors[0]
-    return fixed_point
+    return anchors[0]
 
 
 def read_urdf(path: str, name: str) -> MassDistribution:

@@ -114,8 +114,7 @@ def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]
     if "precision" not in data.settings:
         described["precision"] = data.precision
     settings = [(name, type(default), field(default=default)) for name, default in data.settings.items()]
-    made = make_dataclass(family.capitalize(), settings, bases=(base,), namespace=described, frozen=True)
-    return made
+    return make_dataclass(family.capitalize(), settings, bases=(base,), namespace=described, frozen=True)
 
 
 class AdapterMethod(Method):

@@ -42,9 +42,8 @@ class UvFailed(RuntimeError):
     @property
     def no_wheel(self) -> bool:
         """True if the version exists, but has no wheel for this Python and system."""
-        return self.says("no wheels with a matching", "has no usable wheels", "have no usable wheels", "Requires-Python") or (
-            re.search(r"depends on Python|does not satisfy Python", self.words) is not None
-        )
+        wheels = self.says("no wheels with a matching", "has no usable wheels", "have no usable wheels")
+        return wheels or self.says("Requires-Python", "depends on Python", "does not satisfy Python")
 
     @property
     def summary(self) -> str:

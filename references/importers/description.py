@@ -157,10 +157,6 @@ class _File:
     def refuse(self, what: str, allowed: str) -> BadInput:
         return BadInput("file", f"{str(self.path)!r} with {what}", allowed)
 
-    @property
-    def root(self) -> ElementTree.Element:
-        return ElementTree.fromstring(self.path.read_bytes())
-
     def pose(self, element: ElementTree.Element | None) -> Array:
         """Return the pose (4, 4) in an <origin> of URDF or a <pose> of SDF; without one the identity."""
         if element is None:
@@ -231,7 +227,8 @@ def _numbers(text: str | None) -> list[float]:
 
 def _read_xml(file: _File) -> list[Link]:
     """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
-    root, urdf = file.root, file.root.tag == "robot"
+    root = ElementTree.fromstring(file.path.read_bytes())
+    urdf = root.tag == "robot"
     models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
         raise file.refuse(f"{len(models)} models, or one within another", "one model without includes")

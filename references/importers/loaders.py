@@ -156,9 +156,8 @@ def _dart(path, kind):
     skeleton.setGravity([0, 0, 0])
     skeleton.setPositions(np.zeros(skeleton.getNumDofs()))
     body, joint = skeleton.getBodyNode(0), skeleton.getRootJoint()
-    joint.setTransformFromParentBodyNode(
-        dartpy.math.Isometry3()
-    )  # the body starts at the identity, wherever the file places it
+    # The body starts at the identity, wherever the file places it.
+    joint.setTransformFromParentBodyNode(dartpy.math.Isometry3())
     joint.setTransformFromChildBodyNode(dartpy.math.Isometry3())
 
     def accelerate(v, force):
