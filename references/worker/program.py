@@ -211,7 +211,10 @@ def answer(runs: Runs, do: str, forget: tuple[int, ...] = (), **values: Any) -> 
 
 def serve() -> None:
     """Answer requests until stdin closes."""
-    requests, answers = _take_pipes()
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    # From here on stdin is empty and stdout goes to stderr, as engines print.
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
     faulthandler.enable()
     greeting = requests.readline()
     receive: Callable[[], Message] = partial(unpack, partial(_read, requests))
@@ -236,14 +239,6 @@ def _read(stream: Any, count: int) -> bytes:
     if len(data) < count:
         raise EOFError
     return data
-
-
-def _take_pipes() -> tuple[Any, Any]:
-    """Return the pipes of stdin and stdout. Afterwards stdin is empty and stdout goes to stderr, as engines print."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)
-    return requests, answers
 
 
 def _end_with(life: int | None) -> bool:
