@@ -195,10 +195,8 @@ def _require_xml(path: str, root: str) -> None:
     allowed = f"a file of XML with the root element <{root}>"
     try:
         tag = ElementTree.fromstring(Path(path).read_bytes()).tag
-    except OSError as error:
-        raise _unusable(path, error.strerror or error, allowed) from None
-    except ElementTree.ParseError as error:
-        raise _unusable(path, error, allowed) from None
+    except (OSError, ElementTree.ParseError) as error:
+        raise _unusable(path, getattr(error, "strerror", None) or error, allowed) from None
     if tag != root:
         raise _unusable(path, f"root element <{tag}>", allowed)
 

@@ -261,6 +261,7 @@ class Program:
         """Return the answer of the engine for a file, whose links are given."""
         wanted = join_links(links)
         cases, flaw, answer = make_cases(wanted), wanted.flaw, partial(Finding, self.label, path.name)
+        folder = f"{path.resolve().parent}/"  # which the words of engines may contain
         try:
             with time_limit(LIMIT):
                 result = self._load(str(path.resolve()), kind_of(path), cases)
@@ -269,7 +270,7 @@ class Program:
         except (EngineCrashed, EngineTimeout) as failure:
             return answer("crashed", str(failure.outcome))
         if words := result.get("refused", ""):
-            return answer("right" if flaw else "refused", words.replace(f"{path.resolve().parent}/", ""))
+            return answer("right" if flaw else "refused", words.replace(folder, ""))
         measured = result["accelerations"]
         if not np.isfinite(measured).all():
             return answer("wrong", "accelerations that are not finite")
@@ -280,9 +281,7 @@ class Program:
         tolerance = 1e-2 if self.single else 1e-4
         if distance(wanted, seen) < tolerance and not flaw:
             return answer("right")
-        said = re.search(
-            r"[^.:]*(inertia|mass|moment)[^.]*", result["output"].replace(f"{path.resolve().parent}/", ""), re.IGNORECASE
-        )
+        said = re.search(r"[^.:]*(inertia|mass|moment)[^.]*", result["output"].replace(folder, ""), re.IGNORECASE)
         prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
         if flaw and said and not seen.flaw:
             return answer("right", f"it repairs the inertia{prints}")
