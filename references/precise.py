@@ -60,14 +60,13 @@ def uniform(q: Expressions, moment: Expressions) -> list[forms.Expression]:
 
 def spring(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
     """Return the torque of V = k/2 (d - d0)^2, parameters b (3), A (3), k, d0."""
-    b, anchor, (stiffness, rest_length) = parameters[:3], forms.to_body(q, parameters[3:6]), parameters[6:]
-    return _pull_torque(b, anchor, stiffness * (1 - rest_length / forms.heyoka().sqrt(_squared_distance(b, anchor))))
+    stiffness, rest_length = parameters[6:]
+    return _pull(q, parameters, lambda square: stiffness * (1 - rest_length / forms.heyoka().sqrt(square)))
 
 
 def attraction(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
     """Return the torque of V = -c/d, parameters b (3), A (3), c."""
-    b, anchor, strength = parameters[:3], forms.to_body(q, parameters[3:6]), parameters[6]
-    return _pull_torque(b, anchor, strength * _squared_distance(b, anchor) ** -1.5)
+    return _pull(q, parameters, lambda square: parameters[6] * square**-1.5)
 
 
 def gradient(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
@@ -76,12 +75,10 @@ def gradient(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
     return [parameters[0] * x for x in forms.cross(u, forms.product(parameters[1:10], u))]
 
 
-def _squared_distance(b: Expressions, anchor: Expressions) -> forms.Expression:
-    return sum((x - y) ** 2 for x, y in zip(b, anchor, strict=True))
-
-
-def _pull_torque(b: Expressions, anchor: Expressions, pull: forms.Expression) -> list[forms.Expression]:
-    """Return the torque b x (A - b) pull of a force along the line between the points, body axes."""
+def _pull(q: Expressions, parameters: Expressions, law: Callable[[forms.Expression], Any]) -> list[forms.Expression]:
+    """Return the torque b x (A - b) law(d^2) of a force along the line between the points, body axes."""
+    b, anchor = parameters[:3], forms.to_body(q, parameters[3:6])
+    pull = law(sum((x - y) ** 2 for x, y in zip(b, anchor, strict=True)))
     return [pull * x for x in forms.cross(b, anchor)]
 
 
