@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from conservative import files
 from conservative.errors import BadInput
@@ -53,18 +54,24 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
 
 
 def render(document: Document, folder: Path, png: bool) -> None:
-    """Write report.md with its pictures, as SVG and if `png` also as PNG, and the page."""
-    import vl_convert
-
-    from .charts.style import specification
+    """Write report.md with its pictures, and the page."""
     from .document import html, markdown
 
     def draw(figure: Figure) -> str:
-        picture, svg = specification(figure.picture), (folder / figure.name).with_suffix(".svg")
-        files.write_text(svg, vl_convert.vegalite_to_svg(picture), "out")
-        if png:
-            files.write_bytes(svg.with_suffix(".png"), vl_convert.vegalite_to_png(picture, scale=2), "out")
-        return svg.name
+        return save_picture(figure.picture, folder / figure.name, png)
 
     files.write_text(folder / "report.md", markdown.render(document, draw), "out")
     files.write_text(folder / "index.html", html.render(document), "out")
+
+
+def save_picture(chart: Any, path: Path, png: bool) -> str:
+    """Write a picture as SVG, and as PNG if `png`; return the name of the SVG."""
+    import vl_convert
+
+    from .charts.style import specification
+
+    picture, svg = specification(chart), path.with_suffix(".svg")
+    files.write_text(svg, vl_convert.vegalite_to_svg(picture), "out")
+    if png:
+        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(picture, scale=2), "out")
+    return svg.name
