@@ -16,6 +16,8 @@ from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart
 
+_NO_COUNTERS = Counters(0)
+
 
 def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, kernel: Any, model: Any, coefficients: Any) -> Run:
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
@@ -24,13 +26,13 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     and L, because calls of one run do not overlap. With loads, L has four more columns, for `Trajectory.supplied`.
     """
     n, n_steps, t = grid.n_samples, grid.n_steps, grid.t
-    loaded = scene.loaded
+    loaded, of_R, of_w = scene.loaded, (n, 3, 3), (n, 3)
     q, L = np.empty((n, 4)), np.empty((n, 7 if loaded else 3))
     bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
     enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
-    counters = Counters(0)
+    counters = _NO_COUNTERS
 
     def run() -> Trajectory:
         nonlocal counts, counters
@@ -39,10 +41,8 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
         if (done, stages, corrections, evaluations) != counts:
             counts = done, stages, corrections, evaluations
             counters = Counters(*counts)
-        n_good = n if done == n_steps else grid.count_samples(done)
-        R_WB, w_WB_B = np.empty((n_good, 3, 3)), np.empty((n_good, 3))
-        finite = to_body_axes(t, q, L, *turn, R_WB, w_WB_B)
-        if done == n_steps and finite == n:
+        R_WB, w_WB_B = np.empty(of_R), np.empty(of_w)
+        if done == n_steps and to_body_axes(t, q, L, *turn, R_WB, w_WB_B) == n:
             # The constructor takes three times as long.
             trajectory = object.__new__(Trajectory)
             trajectory.__dict__.update(
@@ -50,6 +50,9 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
                 supplied=L[:, 3:].copy() if loaded else None, frame=None,
             )  # fmt: skip
             return trajectory
+        n_good = n if done == n_steps else grid.count_samples(done)
+        R_WB, w_WB_B = np.empty((n_good, 3, 3)), np.empty((n_good, 3))
+        finite = to_body_axes(t, q, L, *turn, R_WB, w_WB_B)
         if finite < n_good:
             failure: IntegrationFailed = Diverged(float(t[max(finite - 1, 0)]))
         else:
