@@ -97,7 +97,8 @@ def list_drifts(bodies: Batch) -> tuple[str, ...]:
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
     """Return the largest drifts (n, k) by the names of `list_drifts`; nan if a body failed or does not have the invariant.
 
-    `measured` (n, 5) is from `measure_drifts`, whose samples are passed as well.
+    `measured` (n, 5) is from `measure_drifts`. The samples are attitudes (n, m, 3, 3), body to world, and rates (n, m, 3),
+    rad/s, body axes.
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]

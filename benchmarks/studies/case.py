@@ -36,10 +36,10 @@ NOT_DRAWN = Drawn()
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and a method on a grid, in a study (its name).
+    """A scene and a method on a grid.
 
-    `drawn` is the random body that the scene is. `bodies` and `way` are the number of bodies of a batch, and how they run, such
-    as "one at a time".
+    `study` is the name of the study, `drawn` the random body that the scene is. `bodies` and `way` are the number of bodies of
+    a batch, and how they run, such as "one at a time".
     """
 
     study: str

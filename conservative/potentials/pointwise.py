@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -18,7 +19,7 @@ GradientFunction = Callable[[Array], Array] | Callable[[Array, float], Array]
 
 
 @dataclass(frozen=True)
-class _OfAttitude:
+class _OfAttitude(ABC):
     """A function of a matrix (3, 3) and, if `in_time`, of a time, s. Subclasses have the shape of its values."""
 
     function: Callable[..., Any]
@@ -37,9 +38,9 @@ class _OfAttitude:
         except Exception as error:
             raise PotentialFailed(error) from error
 
+    @abstractmethod
     def _read(self, found: Any) -> Any:
-        """Return what the function gave as a float or an array of floats. Raise an exception if it is something else."""
-        raise NotImplementedError
+        """Check a value of the function, and return it as a float or an array of floats."""
 
     def __call__(self, R_WB: Array, *t: Array) -> Array:
         """Return the values, (...) or (..., 3, 3), in J at matrices (..., 3, 3), and times (...), s."""

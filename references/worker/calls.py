@@ -57,7 +57,8 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     MissingExtra
         cloudpickle, of the extra `report`, is not installed.
     """
-    by_value, folder = list[str](), ""
+    by_value: list[str] = []
+    folder = ""
     with suppress(OSError):  # of a working directory that was removed
         folder = os.getcwd()  # noqa: PTH109  # links are not resolved
     while True:

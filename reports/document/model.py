@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from conservative.trajectory import Trajectory
@@ -257,7 +257,10 @@ def walk(blocks: Iterable[Block]) -> Iterator[Block]:
             yield from walk(block.blocks)
 
 
-def filled(*blocks: Block | None) -> list[Block]:
+AnyBlock = TypeVar("AnyBlock", bound=Block)
+
+
+def filled(*blocks: AnyBlock | None) -> list[AnyBlock]:
     """Return blocks without those that are None, and without tables, lists and sections that are empty."""
     return [block for block in blocks if block is not None and _has_content(block)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import defaultdict
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
@@ -78,11 +78,14 @@ def compile_kernels(plan: Plan, step: Step) -> None:
             run_within(COMPILATION_LIMIT, take_steps)
 
     with ThreadPoolExecutor(min(COMPILERS, os.cpu_count() or 1)) as threads:
+        futures = [threads.submit(compile_one, kernel) for kernel in cases]
         try:
-            for i, _ in enumerate(threads.map(compile_one, cases), start=1):
+            for i, future in enumerate(as_completed(futures), start=1):
+                future.result()
                 step(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
         except BaseException:  # such as an interrupt, which does not reach the threads
-            kill_workers()
+            while wait(futures, 0.1).not_done:
+                kill_workers()  # again, because a thread may just be starting one
             raise
 
 

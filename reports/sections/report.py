@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
 
-from ..document.model import Document, Paragraph, Section
+from ..document.model import Document, Paragraph, Section, filled
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -57,7 +57,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         if name in plan.names:
             details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
     details += hard_cases.sections(rows)
-    details += [each for each in (paper.section(rows, measured.samples), failures.section(rows)) if each.blocks]
+    details += filled(paper.section(rows, measured.samples), failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
     blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]
     tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]

@@ -1,5 +1,7 @@
 """The first report with an empty cache compiles its kernels in other processes, and finds them there."""
 
+import pytest
+
 from ..environments import run_python
 
 TWICE = """
@@ -25,34 +27,46 @@ def test_kernels_are_compiled_once_before_the_studies(tmp_path):
 
 
 ELSEWHERE = """
-import os, signal, sys, time
+import os, signal, time
 from dataclasses import replace
 from threading import Timer
+from conservative.methods.gauss import Gauss
 from conservative.methods.moser_veselov import MoserVeselov
 from conservative.reports.run.measure import compile_kernels
 from conservative.reports.run.plan import plan_report
 here = os.getpid()
-class Elsewhere(MoserVeselov):
+class Ends(MoserVeselov):
     def prepare(self, scene, grid):
-        return does_there() if os.getpid() != here else super().prepare(scene, grid)
-plan = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
-plan = replace(plan, studies=tuple(replace(study, methods=(Elsewhere(order=2),)) for study in plan.studies))
+        return os._exit(3) if os.getpid() != here else super().prepare(scene, grid)
+class Sleeps(Gauss):
+    def prepare(self, scene, grid):
+        return time.sleep(1e6) if os.getpid() != here else super().prepare(scene, grid)
+def plan(*methods):
+    made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+    return replace(made, studies=tuple(replace(study, methods=methods) for study in made.studies))
 """
 
 
 def test_a_process_that_ends_leaves_the_compilation_to_the_studies(tmp_path):
-    what = "def does_there(): os._exit(3)\ncompile_kernels(plan, print)"
-    code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))
+    code, out, err = run_python(ELSEWHERE + "compile_kernels(plan(Ends(order=2)), print)", NUMBA_CACHE_DIR=str(tmp_path))
     assert (code, out) == (0, "0.0 compilation of kernels, for the first time: 1 of 1\n"), err
 
 
-def test_an_interrupt_does_not_wait_for_the_compilation(tmp_path):
-    """Without the kill the process waits for the sleeping one until the time limit of this test."""
-    what = """
-def does_there(): time.sleep(1e6)
+DURING_A_COMPILATION = """
 Timer(3, os.kill, (here, signal.SIGINT)).start()
-try: compile_kernels(plan, print)
+try: compile_kernels(plan(Sleeps()), print)
 except KeyboardInterrupt: print("interrupted")
 """
+BETWEEN_TWO = """
+os.cpu_count = lambda: 1
+def interrupted(share, what): raise KeyboardInterrupt
+try: compile_kernels(plan(Ends(order=2), Sleeps()), interrupted)
+except KeyboardInterrupt: print("interrupted")
+"""
+
+
+@pytest.mark.parametrize("what", [DURING_A_COMPILATION, BETWEEN_TWO])
+def test_an_interrupt_does_not_wait_for_a_compilation(what, tmp_path):
+    """Otherwise the process waits for the sleeping one until the time limit of this test."""
     code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))
     assert (code, out) == (0, "interrupted\n"), err
