@@ -51,7 +51,7 @@ def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int
     A method of first order has at most `most_first_order` step sizes.
     """
     grids = step_ladder.steps(scene, method)[: most_first_order if method.order == 1 else None]
-    tolerances = set(step_ladder.TOLERANCES[1::3] if study.quick else step_ladder.TOLERANCES)
+    tolerances = set(step_ladder.TOLERANCES)  # also if quick: an engine is fastest at one of them
     if setting := tolerance_setting(method):
         tolerances.add(getattr(method, setting))
     case = Case(study.name, scene, method, step_ladder.samples(scene, method))
