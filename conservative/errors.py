@@ -204,8 +204,8 @@ class LoadNotResolved(UserWarning):
         self.dt, self.step, self.interval = dt, step, interval
         super().__init__(
             f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: its "
-            f"integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at which the "
-            "function is not smooth: breaks=(...)"
+            f"integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at which "
+            "the function is not smooth: breaks=(...)"
         )
 
 
