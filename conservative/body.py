@@ -40,7 +40,7 @@ class RigidBody(PickledByFields):
     ------
     BadInput
         The inertia is not finite, not symmetric, not positive definite, or of another shape; or a tensor that is not diagonal
-        has moments with a ratio above `conservative.check.TENSOR_CONDITION`. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
+        has moments with a ratio above 1e13. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
         the equations hold for them, but some engines reject them. Or the rotor momentum is not three finite numbers.
 
     Attributes
