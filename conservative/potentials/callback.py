@@ -25,6 +25,9 @@ class Callback:
     def __init__(self, potential: Any) -> None:
         self.potential, self.last = potential, threading.local()
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return Callback, (self.potential,)  # without the last inputs and outputs, which belong to threads of this process
+
     def __call__(self, what: int, address: int) -> None:
         buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
