@@ -133,11 +133,12 @@ def integrate_many(
                 allowed = f"more steps between samples, or a path: {most:.3g} samples of {STORED_BYTES} bytes fit in memory"
                 raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
             names = list_drifts(bodies)
-            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {})
+            supplied = np.empty((n, m, 4)) if bodies.scene.loaded else None
+            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {}, supplied)
             with start_workers(client, threads, len(blocks)) as workers:
                 run_blocks(chosen, bodies, grid, workers, blocks, lambda i, _, part: whole.put(i, part), progress)
             drifts = dict(zip(names, whole.drifts.T, strict=True))
-            return Ensemble(bodies, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice)
+            return Ensemble(bodies, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice, supplied)
         stored = write_store(path, chosen.label, bodies, grid, resume)
         with start_workers(client, threads, len(blocks)) as workers, stored as store:
             left = [first for first in blocks if not store.is_whole(first)]
