@@ -14,8 +14,9 @@ import numpy as np
 from .attitude import Array
 from .batch import Batch
 from .deferred_imports import kernels
+from .flight import FlightInvariant
 from .grid import Grid
-from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, sizes
+from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, Invariant, sizes
 from .potentials.field import lengths
 from .potentials.potential import depends_on_time
 from .potentials.turning import Turning, static_part
@@ -100,7 +101,12 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
     """Return the names of drifts: orthonormality, and the invariants of the scene."""
-    return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
+    return (ORTHONORMALITY, *(each.name for each in _of_rotation(bodies.scene)))
+
+
+def _of_rotation(scene: Scene) -> list[Invariant]:
+    """Return the invariants of a scene without those of its free flight, which is exact."""
+    return [each for each in scene.invariants if not isinstance(each, FlightInvariant)]
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -111,7 +117,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]
-    for each in scene.invariants:
+    for each in _of_rotation(scene):
         if each in scene.extra_invariants:
             start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
             values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
 """Largest number of bodies in a block, and the approximate limit on the size of its samples, bytes."""
-SAMPLE_BYTES = 96
-"""Size of a sample: attitude and rates, bytes."""
+SAMPLE_BYTES, LOAD_BYTES = 96, 32
+"""Size of a sample, attitude and rates, and of what loads supplied up to it, bytes."""
 MOST_WAITING = 16
 """Largest number of blocks that wait for a worker of a cluster, in addition to those that run."""
 LONGEST_WAIT = 0.1
