@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from ..attitude import Array, rotation_about
 from ..body import RigidBody
-from ..check import finite_number, positive_number, rotation
+from ..check import finite_number, positive_number, replace_unchecked, rotation
 from ..errors import BadInput
+from ..potentials.load import Torque
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
@@ -17,7 +20,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
 
     Engines that limit rates need it: game engines stop at 100 rad/s, and the top of Krenk & Nielsen turns at 141. With f = slow
 
-        R'(f t) = R(t)     w' = w / f     weight' = weight / f^2     h' = h / f
+        R'(f t) = R(t)     w' = w / f     weight' = weight / f^2     h' = h / f     T'(f t) = T(t) / f^2     D'(f t) = D(t) / f
 
     If f is a power of two, both motions have the same digits. The result for f = 1 is the scene itself.
 
@@ -40,6 +43,8 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         f"{scene.name}:slow={factor:g}",
         body=RigidBody(scene.body.inertia, None if rotor is None else rotor / factor),
         w_WB_B0=scene.w_WB_B0 / factor,
+        torque=scene.torque and scene.torque.in_units(factor**2, 1 / factor),
+        damping=scene.damping and scene.damping.in_units(factor**2, 1 / factor),
         flight=flight and replace(flight, v_WB0=flight.v_WB0 / factor, g=flight.g / factor**2),
         t_end=scene.t_end * factor,
         potential=field,
@@ -51,7 +56,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
 def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
     """Return the same motion in a body frame turned by the rotation F (3, 3), which maps old body components to new ones.
 
-        J' = F J F'     R_WB' = R_WB F'     w' = F w     com' = F com     h' = F h
+        J' = F J F'     R_WB' = R_WB F'     w' = F w     com' = F com     h' = F h     T' = F T     D' = F D F'
 
     Engines have dropped this rotation or applied it twice. The result of a correct method satisfies R_WB' F = R_WB.
 
@@ -67,9 +72,32 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
     elif field is not None:
         raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
     flight = scene.flight and replace(scene.flight, com_B=F @ scene.flight.com_B)
-    start = {"R_WB0": scene.R_WB0 @ F.T, "w_WB_B0": F @ scene.w_WB_B0}
-    body = RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T))
-    return scene.rename(name, body=body, potential=field, flight=flight, **start)
+    return scene.rename(
+        name,
+        body=RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T)),
+        R_WB0=scene.R_WB0 @ F.T,
+        w_WB_B0=F @ scene.w_WB_B0,
+        potential=field,
+        torque=scene.torque and _turn_torque(scene.torque, F),
+        damping=scene.damping and replace_unchecked(scene.damping, matrix=F @ scene.damping.matrix @ F.T),
+        extra_invariants=tuple(replace(each, evaluate=_turn_back(each.evaluate, F)) for each in scene.extra_invariants),
+        flight=flight,
+    )
+
+
+def _turn_torque(torque: Torque, F: Array) -> Torque:
+    """Return a torque in a body frame turned by F (3, 3). Components in world axes do not change."""
+    value: Any = torque.value
+    if torque.frame == "world":
+        return torque
+    if callable(value):
+        return Torque(lambda t: F @ torque.at(t), breaks=torque.breaks)
+    return Torque((value[0], value[1] @ F.T) if isinstance(value, tuple) else F @ value)
+
+
+def _turn_back(evaluate: Callable[..., Array], F: Array) -> Callable[..., Array]:
+    """Return an invariant as a function of attitudes and rates in a body frame turned by F (3, 3)."""
+    return lambda R_WB, w_WB_B: evaluate(R_WB @ F, w_WB_B @ F)
 
 
 def turned(scene: Scene, angle: float, t_end: float | None, name: str) -> Scene:
