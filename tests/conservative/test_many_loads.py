@@ -175,3 +175,13 @@ def test_the_energy_of_a_body_with_a_large_rotor_has_all_digits():
     heavy = cv.Scene("heavy", cv.RigidBody((1.0, 1.5, 2.0), (0, 0, 1e7)), np.eye(3), (0.3, 0.1, 0.2), 1e-6)
     found = cv.integrate_many(heavy, w_WB_B0=np.array([[0.3, 0.1, 0.2], [0.1, 0.7, 0.3]]), dt=1e-8, method="reduced")
     assert found.drifts["energy"].max() < 1e-14  # measured 4e-16; 4e-10 from (J w + h) - h
+
+
+def test_workers_of_a_cluster_return_the_same(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(blocks, "MOST_BODIES", 2)
+    options = {"n_workers": 1, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        for name in ("tables", "functions, turning"):
+            for one, other in zip(run(name, client=client), run(name), strict=True):
+                require_same(one, other)
