@@ -14,9 +14,9 @@ import numpy as np
 from .attitude import Array
 from .batch import Batch
 from .deferred_imports import kernels
-from .flight import FlightInvariant
+from .flight import rotation_only
 from .grid import Grid
-from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, Invariant, sizes
+from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, sizes
 from .potentials.field import lengths
 from .potentials.potential import depends_on_time
 from .potentials.turning import Turning, static_part
@@ -44,6 +44,9 @@ def measure_drifts(
         if isinstance(potential, Turning):
             work = work - impulse @ (potential.orbit.rate * potential.orbit.normal_W)
         V = V - work if len(V) else -work
+        if (motor := bodies.scene.body.motor) is not None:  # a change of h counts as an impulse of the opposite sign
+            change = np.array([motor.at(each) for each in t.tolist()]) - motor.at(0.0)
+            impulse = impulse - (R_WB @ change[:, :, None])[..., 0]
     kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, drifts)
     if supplied is not None:
         drifts[np.isnan(supplied).any(axis=(1, 2)), 1:] = np.nan
@@ -65,7 +68,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
     L_B, kinetic, rotor = momenta_of(bodies), kinetic_energies(bodies), scene.body.rotor_momentum
-    scale = kinetic + energy_scales(bodies)
+    scale = energy_scales(bodies)
     scale[scale == 0] = 1.0
     largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
     momentum = lengths(L_B)
@@ -100,13 +103,8 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
-    """Return the names of drifts: orthonormality, and the invariants of the scene."""
-    return (ORTHONORMALITY, *(each.name for each in _of_rotation(bodies.scene)))
-
-
-def _of_rotation(scene: Scene) -> list[Invariant]:
-    """Return the invariants of a scene without those of its free flight, which is exact."""
-    return [each for each in scene.invariants if not isinstance(each, FlightInvariant)]
+    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
+    return (ORTHONORMALITY, *(each.name for each in rotation_only(bodies.scene).invariants))
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -117,7 +115,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]
-    for each in _of_rotation(scene):
+    for each in rotation_only(scene).invariants:
         if each in scene.extra_invariants:
             start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
             values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
@@ -145,13 +143,13 @@ def kinetic_energies(bodies: Batch) -> Array:
     return np.asarray(np.einsum("ni,ni->n", momenta_of(bodies, rotor=False), bodies.w_WB_B0) / 2)
 
 
-def energy_scales(bodies: Batch) -> Array | float:
-    """Return the magnitude of the potential and the work of the torque in 1 rad, J: (n,), or one number for all bodies."""
-    scene = bodies.scene
-    work = 0.0 if scene.torque is None else scene.torque.require(scene.t_end)
-    if scene.potential is None:
-        return work
-    return work + (bodies.varied.scales() if bodies.parameters else scene.potential.scale())
+def energy_scales(bodies: Batch) -> Array:
+    """Return the sums of all energies (n,), J, as `Scene.energies`."""
+    if bodies.scene.loaded:
+        return np.array([bodies.take(i).energies for i in range(len(bodies))])
+    if bodies.scene.potential is None:
+        return kinetic_energies(bodies)
+    return kinetic_energies(bodies) + (bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale())
 
 
 def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:

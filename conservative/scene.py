@@ -222,10 +222,11 @@ class Scene(PickledByFields):
 
         Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
-        return self._energies or 1.0
+        return self.energies or 1.0
 
     @cached_property
-    def _energies(self) -> float:
+    def energies(self) -> float:
+        """The sum of these energies, J, which is 0 for a body at rest without a field and a load."""
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
@@ -235,7 +236,7 @@ class Scene(PickledByFields):
     def magnitudes(self) -> tuple[int, int | None]:
         """Binary exponents of the largest moment, kg m^2, and of the rate that all energy allows, 1/s; None without energy."""
         moment = math.frexp(float(self.body.moments.max()))[1]
-        energy = self._energies
+        energy = self.energies
         return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
     @cached_property

@@ -82,7 +82,7 @@ def list_blocks(n: int, grid: Grid) -> range:
 def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     """Return the samples of a block. The outcome of each body is the same as from `Method.solve` for the body alone."""
     n, m, loaded = len(bodies), grid.n_samples, bodies.scene.loaded
-    run, reference = None if loaded else method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
+    run, reference = method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
     if run is None:
         samples = np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan)
         block = Block(*samples, np.zeros(n, dtype=bool), supplied=np.full((n, m, 4), np.nan) if loaded else None)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from ..attitude import Array, rotation_about
 from ..body import RigidBody
-from ..check import finite_number, positive_number, replace_unchecked, rotation
+from ..check import finite_number, positive_number, read_only, replace_unchecked, rotation
 from ..errors import BadInput
-from ..potentials.load import Torque
+from ..potentials.load import Damping, OfTime, Resistance
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+
+AnyLoad = TypeVar("AnyLoad", bound=OfTime)
 
 
 def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
@@ -30,9 +34,11 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         `slow` is not a finite number above 0, the field is not uniform gravity, or the scene has extra invariants, whose
         scaling is unknown.
     """
-    factor, field, flight, rotor = positive_number("slow", slow), scene.potential, scene.flight, scene.body.rotor_momentum
+    factor, field, flight = positive_number("slow", slow), scene.potential, scene.flight
+    rotor, motor = scene.body.rotor_momentum, scene.body.motor
     if factor == 1:
         return scene
+    rotor, motor = None if rotor is None else rotor / factor, motor and motor.in_units(factor, 1 / factor)
     if isinstance(field, UniformGravity):
         field = UniformGravity(field.weight / factor**2, field.com_B)
     elif field is not None:
@@ -41,7 +47,7 @@ def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
         raise BadInput("scene", "a scene with extra_invariants", "a scene without")
     return scene.rename(
         f"{scene.name}:slow={factor:g}",
-        body=RigidBody(scene.body.inertia, None if rotor is None else rotor / factor),
+        body=RigidBody(scene.body.inertia, rotor, motor),
         w_WB_B0=scene.w_WB_B0 / factor,
         torque=scene.torque and scene.torque.in_units(factor**2, 1 / factor),
         damping=scene.damping and scene.damping.in_units(factor**2, 1 / factor),
@@ -72,27 +78,47 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
     elif field is not None:
         raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
     flight = scene.flight and replace(scene.flight, com_B=F @ scene.flight.com_B)
+    motor, torque, damping = scene.body.motor, scene.torque, scene.damping
+
+    def turn(vectors: Array) -> Array:
+        return vectors @ F.T
+
     return scene.rename(
         name,
-        body=RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T)),
+        body=RigidBody(F @ scene.body.inertia @ F.T, scene.body.rotor_along(F.T), motor and _turn(motor, F, turn)),
         R_WB0=scene.R_WB0 @ F.T,
         w_WB_B0=F @ scene.w_WB_B0,
         potential=field,
-        torque=scene.torque and _turn_torque(scene.torque, F),
-        damping=scene.damping and replace_unchecked(scene.damping, matrix=F @ scene.damping.matrix @ F.T),
+        torque=torque and _turn(torque, F, turn if torque.frame == "body" else np.asarray),
+        damping=damping and _turn_damping(damping, F),
         extra_invariants=tuple(replace(each, evaluate=_turn_back(each.evaluate, F)) for each in scene.extra_invariants),
         flight=flight,
     )
 
 
-def _turn_torque(torque: Torque, F: Array) -> Torque:
-    """Return a torque in a body frame turned by F (3, 3). Components in world axes do not change."""
-    value: Any = torque.value
-    if torque.frame == "world":
-        return torque
-    if callable(value):
-        return Torque(lambda t: F @ torque.at(t), breaks=torque.breaks)
-    return Torque((value[0], value[1] @ F.T) if isinstance(value, tuple) else F @ value)
+def _turn(load: AnyLoad, F: Array, convert: Callable[[Array], Array]) -> AnyLoad:
+    """Return a load in a body frame turned by F (3, 3). `convert` returns the components of its values there."""
+    value: Any = load.value
+    if isinstance(value, tuple):
+        value = value[0], read_only(convert(value[1]))
+    elif not callable(value):
+        value = read_only(convert(value))
+    elif load.of_attitude:
+        value = lambda t, R_WB: convert(load.at(t, R_WB @ F))  # noqa: E731  # its arguments count
+    else:
+        value = lambda t: convert(load.at(t))  # noqa: E731
+    return replace_unchecked(load, value=value)
+
+
+def _turn_damping(damping: Damping, F: Array) -> Damping:
+    """Return a damping in a body frame turned by F (3, 3)."""
+
+    def turn(matrices: Array) -> Array:
+        return F @ matrices @ F.T
+
+    matrix, factor = damping.matrix, damping.factor
+    matrix = _turn(matrix, F, turn) if isinstance(matrix, Resistance) else read_only(turn(matrix))
+    return replace_unchecked(damping, matrix=matrix, factor=factor and _turn(factor, F, np.asarray))
 
 
 def _turn_back(evaluate: Callable[..., Array], F: Array) -> Callable[..., Array]:
