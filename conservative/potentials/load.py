@@ -197,7 +197,7 @@ class OfTime(PickledByFields):
         if isinstance(self.value, tuple):
             times, values = self.value
             i = int(np.searchsorted(times, inside, side="right"))
-            if not 0 < i < len(times):  # outside its times, which only the last step of a run is (`require_times`)
+            if not 0 < i < len(times):  # after the end of the run, for which `require_times` has been called
                 return np.asarray(values[0] if i == 0 else values[-1])
             return np.asarray(values[i - 1] + (t - times[i - 1]) / (times[i] - times[i - 1]) * (values[i] - values[i - 1]))
         try:
