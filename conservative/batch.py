@@ -68,10 +68,7 @@ class Batch:
         """Return the scene of body i."""
         body = self.scene.body if self.inertia is None else replace_unchecked(self.scene.body, inertia=self.inertia[i])
         potential = self.take_potential(i)
-        own = replace_unchecked(self.scene, body=body, potential=potential, R_WB0=self.R_WB0[i], w_WB_B0=self.w_WB_B0[i])
-        if self.scene.loaded and not any(load.of_attitude for load in self.scene.loads):
-            vars(own)["smoothness"] = self.scene.smoothness  # of functions of time, found once
-        return own
+        return replace_unchecked(self.scene, body=body, potential=potential, R_WB0=self.R_WB0[i], w_WB_B0=self.w_WB_B0[i])
 
     def take_potential(self, i: int) -> AnyPotential | None:
         """Return the potential of body number i."""

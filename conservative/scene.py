@@ -195,10 +195,9 @@ class Scene(PickledByFields):
     @cached_property
     def smoothness(self) -> Smoothness:
         """Jumps of functions without declared break points, and the step that resolves them (`potentials.smoothness`)."""
-        functions = [load for load in self.loads if callable(load.value) and not len(load.breaks)]
-        calls: Any = [(lambda t, f=f: f.value(t, self.R_WB0)) if f.of_attitude else f.value for f in functions]
+        functions = tuple(load for load in self.loads if callable(load.value) and not len(load.breaks))
         known = np.concatenate([np.empty(0), *(load.breaks for load in self.loads)])
-        return examine(calls, self.t_end, known)
+        return examine(functions, self.t_end, tuple(known.tolist()))
 
     @property
     def integrable(self) -> bool:

@@ -24,7 +24,7 @@ from .blocks import LOAD_BYTES, BlockResult, list_blocks, run_blocks, start_work
 from .blocks import SAMPLE_BYTES as STORED_BYTES
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
-from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support
+from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
 from .shared_choice import choose_for_all, pick_hardest
 from .store import write_store
 
@@ -118,6 +118,7 @@ def integrate_many(
             chosen = read_method(method, bodies.first)
             grid = grid_for(bodies.first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
             require_support(chosen, bodies.first)
+            warn_of_loads(bodies.first, chosen, grid.dt)
             if len(bodies) > 1:  # the run of a single body raises the error itself
                 _require_steps(chosen, bodies, grid)
         else:

@@ -10,6 +10,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
 from conservative.invariants import Invariant, momentum_W, sizes
+from conservative.needs import FIELDS, IN_TIME, Need
 from conservative.scenes.transforms import in_body_frame, slow_motion
 
 BODY = cv.RigidBody([[13, 0.5, 0.2], [0.5, 5, 0.3], [0.2, 0.3, 10]])
@@ -21,6 +22,16 @@ FLIGHT = cv.shapes.box((0.1, 0.2, 0.3), mass=2).about((0.1, 0, 0))
 
 def pulse(t):
     return (20.0, 0.0, -5.0) if 0.4 < t < 0.83 else (0.0, np.sin(t), 0.0)
+
+
+def magnetic(t, R_WB):
+    """Return a torque m x B of a body whose dipole m and whose field B are fixed, but for its growth."""
+    return np.cross((30.0, 0.0, 10.0), R_WB.T @ (0.0, 2.0 + t, 1.0))
+
+
+def eddy(t, R_WB):
+    field_B = R_WB.T @ (0.0, 2.0 + t, 1.0)
+    return field_B @ field_B * np.eye(3) - np.outer(field_B, field_B)
 
 
 def plain(**parts):
@@ -39,19 +50,39 @@ PARTS = {
     "damping": ({"damping": cv.Damping(MATRIX)}, "damping"),
     "damping, table": ({"damping": cv.Damping(MATRIX, (TIMES, [0, 2, 1, 1]))}, "damping"),
     "damping, function": ({"damping": cv.Damping(MATRIX, lambda t: float(t > 0.5), breaks=[0.5])}, "damping"),
+    "torque, jump": ({"torque": cv.Torque(([0, 0.5, 0.5, 2], [VALUES[1], VALUES[1], VALUES[2], VALUES[3]]))}, "torque"),
+    "torque, attitude": ({"torque": cv.Torque(magnetic)}, "torque"),
+    "torque, attitude, world": ({"torque": cv.Torque(lambda t, R: 20 * R[:, 0] + t, "world")}, "torque"),
+    "damping, matrices": ({"damping": cv.Damping((TIMES, np.multiply.outer([0, 2, 1, 1], MATRIX)))}, "damping"),
+    "damping, attitude": ({"damping": cv.Damping(eddy)}, "damping"),
+    "damping, factor of attitude": ({"damping": cv.Damping(MATRIX, lambda t, R: 1 + R[0, 1])}, "damping"),
+    "motor": ({"body": cv.RigidBody(BODY.inertia, (TIMES, VALUES))}, "rotor"),
+    "motor, function": ({"body": cv.RigidBody(BODY.inertia, lambda t: (30 * t, 0.0, 20 * np.cos(t)))}, "rotor"),
     "all": ({"potential": GRAVITY, "torque": cv.Torque((TIMES, VALUES)), "damping": cv.Damping(MATRIX)}, "torque"),
 }
+REFUSED = FIELDS - {Need.GRAVITY} | IN_TIME
 F = rotation_about((1, 2, 3), 0.7)
-METHOD = "reduced:order=4"
 
 
 def run(scene, steps=60):
-    return cv.integrate(scene, scene.t_end / steps, METHOD)
+    return cv.integrate(scene, scene.t_end / steps, "projected" if Need.ATTITUDE in scene.needs else "reduced:order=4")
 
 
 def without(scene, part):
     changes = {"body": cv.RigidBody(scene.body.inertia)} if part == "rotor" else {part: None}
     return scene.rename("without", **changes)
+
+
+def test_each_part_that_a_scene_can_need_is_carried_along_or_refused():
+    needed = frozenset().union(*(plain(**parts).needs for parts, _ in PARTS.values()))
+    assert needed | {Need.FLIGHT} | REFUSED == set(Need)
+    orbit = cv.Orbit(0.3, (0, 1, 0)).gravity_gradient(BODY.inertia, (1, 0, 0))
+    function = cv.FunctionPotential(lambda R: R[2, 0], lambda R: np.outer([0, 0, 1], [1, 0, 0]), 1.0)
+    for field in (orbit, function, cv.LinearSpring(3.0, (0.1, 0.2, 0.3), (1.0, 0.0, 0.5), 0.3)):
+        for transform in (lambda scene: in_body_frame(scene, F, "turned"), slow_motion):
+            with pytest.raises(cv.BadInput) as refused:
+                transform(plain(potential=field))
+            assert (refused.value.argument, refused.value.got) == ("scene", f"a scene with {field!r}")
 
 
 @pytest.mark.parametrize("name", PARTS)
