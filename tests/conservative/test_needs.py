@@ -210,8 +210,11 @@ def test_scenes_and_trajectories_can_be_pickled(need):
     assert not again.scene.R_WB0.flags.writeable
 
 
-def drifting(_t, values=iter(range(100))):
-    return (0.0, 0.0, float(next(values)))
+CALLS = iter(range(1000))
+
+
+def drifting(_t):
+    return (0.0, 0.0, float(next(CALLS)))
 
 
 @pytest.mark.parametrize(
