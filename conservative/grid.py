@@ -62,6 +62,11 @@ class Grid:
         steps[-1] = self.n_steps
         return steps
 
+    @property
+    def last(self) -> float:
+        """Time at which the last step starts, s."""
+        return (self.n_steps - 1) * self.dt
+
     @cached_property
     def _times(self) -> Array:
         return self.steps * self.dt

@@ -21,7 +21,7 @@ from .invariants import Invariant, InvariantInTime, axial_direction, balance_of,
 from .needs import LOADS, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
-from .potentials.smoothness import Smoothness, examine
+from .potentials.smoothness import SMOOTH, Smoothness, examine
 from .potentials.turning import Turning
 from .shapes import MassDistribution
 
@@ -184,19 +184,14 @@ class Scene(PickledByFields):
         parts = self.torque, self.damping and self.damping.of_time, self.body.motor
         return tuple(load for load in parts if load and not load.constant)
 
-    @cached_property
+    @property
     def breaks(self) -> Array:
-        """Times (n,) in the run at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
-        known = [load.breaks for load in self.loads]
-        times = np.unique(np.concatenate([np.empty(0), *known, self.smoothness.jumps]))
-        return times[times > 0]
+        """Times (n,) above 0 at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
+        return self.smoothness().breaks
 
-    @cached_property
-    def smoothness(self) -> Smoothness:
-        """Jumps of functions without declared break points, and the step that resolves them (`potentials.smoothness`)."""
-        functions = tuple(load for load in self.loads if callable(load.value) and not len(load.breaks))
-        known = np.concatenate([np.empty(0), *(load.breaks for load in self.loads)])
-        return examine(functions, self.t_end, tuple(known.tolist()))
+    def smoothness(self, t_end: float = 0.0) -> Smoothness:
+        """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
+        return examine(self.loads, max(t_end, self.t_end)) if self.loads else SMOOTH
 
     @property
     def integrable(self) -> bool:

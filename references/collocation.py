@@ -37,7 +37,7 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
     """
     c, b, A = _tableau()
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
-    bends = scene.breaks.astype(np.longdouble)
+    bends = scene.smoothness(grid.last).breaks.astype(np.longdouble)
     stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
     L = scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0 + wheel(scene, ends[:1])[:, 0]

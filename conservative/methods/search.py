@@ -168,7 +168,8 @@ def begin(method: Method, scene: Scene, error: float, t_end: float) -> Candidate
     duration = min(t_end, PROBE_RADIANS / rate)
     dt = min(duration / 2, method.card.longest / rate)
     if scene.loads:  # runs at two and four times the step have to differ everywhere (`conservative.methods.pieces`)
-        dt = min(dt, scene.smoothness.step, t_end / 4 / (1 + np.count_nonzero(scene.breaks < t_end)))
+        breaks, step, _ = scene.smoothness(t_end)
+        dt = min(dt, step, t_end / 4 / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
     return Candidate(method, error * min(1.0, 4 * duration / t_end), duration, rate, dt)

@@ -135,6 +135,7 @@ class OfTime(PickledByFields):
     name: ClassVar[str]
     shape: ClassVar[tuple[int, ...]]
     one: ClassVar[str]
+    may_jump: ClassVar[bool] = True
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
@@ -331,6 +332,7 @@ class RotorMomentum(OfTime):
     """The momentum of a rotor that a motor turns, without jumps."""
 
     name: ClassVar[str] = "rotor_momentum"
+    may_jump: ClassVar[bool] = False
     shape: ClassVar[tuple[int, ...]] = (3,)
     one: ClassVar[str] = "three finite numbers (3,), kg m^2/s"
 

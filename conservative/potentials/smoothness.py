@@ -16,6 +16,7 @@ import numpy as np
 
 from ..attitude import Array, rotation_about
 from ..check import read_only
+from ..errors import BadInput
 
 SCANNED = 2**16
 """Number of intervals of a scan."""
@@ -28,34 +29,42 @@ STEEP, MOST_JUMPS = 10.0, 1000
 
 
 class Smoothness(NamedTuple):
-    """Times (n,) of jumps, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
+    """Break points (n,) above 0, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
 
-    jumps: Array
+    breaks: Array
     step: float
     interval: tuple[float, float]
 
 
+SMOOTH = Smoothness(np.empty(0), math.inf, (0.0, math.inf))
+"""Smoothness of a scene without loads that depend on time."""
+
+
 @lru_cache(maxsize=64)
-def examine(loads: tuple[Any, ...], t_end: float, breaks: tuple[float, ...]) -> Smoothness:
-    """Return the smoothness of loads given as functions, from 0 to t_end, s, apart from known break points, s.
+def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
+    """Return the smoothness of loads (`conservative.potentials.load.OfTime`) from 0 to t_end, s.
 
     Functions of time and attitude are evaluated at `ATTITUDE`. So the result is the same for all scenes with these loads,
     such as the bodies of an ensemble, and found once.
     """
-    jumps, step, interval = [np.empty(0)], math.inf, (0.0, t_end)
+    step, interval = math.inf, (0.0, t_end)
+    breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
     for load in loads:
         function = partial(_at_attitude, load.value) if load.of_attitude else load.value
         try:
             values = np.array([function(t) for t in times.tolist()], dtype=float).reshape(SCANNED + 1, -1)
-        except Exception:  # the run reports a function that fails
+        except Exception:  # a table; or a function that fails, which the run reports
             continue
-        found = np.array(_find_jumps(function, times, values))
-        resolved, where = _resolve(times, values, np.concatenate([breaks, found]))
-        jumps.append(found)
+        found = _find_jumps(function, times, values)
+        found = [t for t in found if not np.isclose(t, breaks, rtol=1e-12, atol=1e-12 * t_end).any()]
+        if found and not load.may_jump:
+            raise BadInput(load.name, f"a function that jumps at t = {found[0]:g} s", "a function without jumps")
+        breaks = np.union1d(breaks, found)
+        resolved, where = _resolve(times, values, breaks)
         if resolved < step:
             step, interval = resolved, where
-    return Smoothness(np.unique(np.concatenate(jumps)), step, interval)
+    return Smoothness(read_only(breaks[breaks > 0]), step, interval)
 
 
 def _at_attitude(function: Callable[[float, Array], Array], t: float) -> Array:

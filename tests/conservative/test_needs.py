@@ -149,6 +149,13 @@ def test_break_points_are_those_of_own_units(size):
     assert np.abs(found.R_WB - right.R_WB).max() < 1e-13  # measured: 4e-15
 
 
+def test_jumps_after_the_end_of_the_scene_and_beside_declared_points_are_found():
+    step = cv.Torque(lambda t: (0, 0, float(t >= 0.5) + 2.0 * (1.5 <= t < 3)), breaks=(0.5,))
+    built = cv.Scene("longer", cv.RigidBody((1, 2, 2.5)), np.eye(3), (0, 0, 0.01), 2.0, torque=step)
+    found = cv.integrate(built, 0.8, "projected", t_end=4.0)
+    assert found.w_WB_B[-1, 2] == pytest.approx(0.01 + (3.5 + 2 * 1.5) / 2.5, rel=1e-12)
+
+
 def test_a_change_of_any_field_changes_the_key():
     for build in PARTS.values():
         built = build()
@@ -233,6 +240,7 @@ def drifting(_t):
         (lambda: cv.Damping(lambda t: np.eye(3), lambda t: 1.0), "factor"),
         (lambda: cv.RigidBody((1, 2, 3), ([0, 1, 1, 2], [[0, 0, 0], [0, 0, 1], [0, 0, 2], [0, 0, 0]])), "rotor_momentum"),
         (lambda: cv.RigidBody((1, 2, 3), lambda t: (0, 0)), "rotor_momentum"),
+        (lambda: scene(body=cv.RigidBody((1, 2, 3), lambda t: (0, 0, float(t > 1)))).breaks, "rotor_momentum"),
         (lambda: cv.integrate(PARTS[Need.TORQUE](), 0.1, t_end=3.0), "torque"),
         (lambda: cv.integrate(PARTS[Need.TORQUE](), error=1e-3, t_end=3.0), "torque"),
     ],
