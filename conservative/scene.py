@@ -121,12 +121,9 @@ class Scene(PickledByFields):
             raise BadInput("flight", describe(flight), "None, or the flight of a scene, and no potential")
         if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
             raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
-        if not isinstance(torque, Torque | None):
-            raise BadInput("torque", describe(torque), "None or a Torque, such as Torque((0, 0, 1.5))")
-        if not isinstance(damping, Damping | None):
-            raise BadInput("damping", describe(damping), "None or a Damping, such as Damping(0.1 * np.eye(3))")
-        if flight is not None and (torque is not None or damping is not None):
-            raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
+        for name_of_load, load, kind in (("torque", torque, Torque), ("damping", damping, Damping)):
+            if load is not None and (flight is not None or not isinstance(load, kind)):
+                raise BadInput(name_of_load, describe(load), f"None in free flight, otherwise None or a {kind.__name__}")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
         try:
@@ -154,8 +151,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
-        for load in self.loads:
-            load.require(end, self.R_WB0)  # for its exception
+        for varying in self.loads:
+            varying.require(end, self.R_WB0)  # for its exception
 
     @cached_property
     def needs(self) -> Needs:

@@ -188,6 +188,17 @@ def test_functions_are_the_same_if_all_that_they_use_is():
     def build(size, helper):
         return lambda t: helper(size * t)
 
+    def model(size):
+        class Model:
+            gain = size
+
+            def __call__(self, t):
+                return self.gain * t
+
+        return Model()
+
+    assert digest(model(1.0)) == digest(model(1.0))
+    assert digest(model(1.0)) != digest(model(2.0))
     assert digest(build(2.0, math.sin)) == digest(build(2.0, math.sin))
     assert digest(build(2.0, math.sin)) != digest(build(3.0, math.sin))
     assert digest(build(2.0, math.sin)) != digest(build(2.0, math.cos))
