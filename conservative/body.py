@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array, triple
-from .check import LARGEST, finite_array, read_only, set_fields
+from .check import LARGEST, PickledByFields, finite_array, read_only, set_fields
 from .errors import BadInput
+from .needs import Need, Needs
+from .potentials.load import Given, RotorMomentum
 
 TENSOR_CONDITION = 1e13
 """Largest ratio of the principal moments of a tensor that is not diagonal.
@@ -24,7 +26,7 @@ _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix 
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class RigidBody:
+class RigidBody(PickledByFields):
     """A rigid body that rotates about a fixed point.
 
     Parameters
@@ -33,10 +35,14 @@ class RigidBody:
         Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component has
         to be 1e-30 to 1e30 kg m^2.
     rotor_momentum
-        Constant momentum h (3,) of a rotor, kg m^2/s, body axes; None or zeros without one. The angular momentum is J w + h.
-        The kinetic energy is w'J w / 2, without the constant energy of the rotor itself. For a rotor with moment I about its
+        Momentum h (3,) of a rotor, kg m^2/s, body axes; None or zeros without one. The angular momentum is J w + h.
+        The kinetic energy is w'J w / 2, without the energy of the rotor itself. For a rotor with moment I about its
         axis n that is driven at a constant speed s relative to the body, J includes the rotor and h = I s n. For one
-        without a motor torque, J includes it without I n n', and h = I (s + n.w) n.
+        without a motor torque, J includes it without I n n', and h = I (s + n.w) n. With a motor that changes it, h is a
+        function of time, s, or a table (times (n,), values (n, 3)), as for `Torque`, without jumps. The motor's reaction on the
+        body is included, J w' = (J w + h) x w - h' + T; do not add it as a torque. The attribute then has h at t = 0.
+    breaks
+        Times (n,), s, at which a function h has a corner; see `Torque`.
 
     Raises
     ------
@@ -44,12 +50,25 @@ class RigidBody:
         The inertia is not finite, not symmetric, not positive definite, or of another shape; or a tensor that is not diagonal
         has moments with a ratio above `TENSOR_CONDITION`. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
         the equations hold for them, but some engines reject them. Or the rotor momentum is not three finite numbers.
+
+    Attributes
+    ----------
+    motor
+        h as a function of time or a table; None if it is constant.
     """
 
     inertia: Array
     rotor_momentum: Array | None = None
+    motor: RotorMomentum | None = None
 
-    def __init__(self, inertia: ArrayLike, rotor_momentum: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        inertia: ArrayLike,
+        rotor_momentum: Given | None = None,
+        motor: RotorMomentum | None = None,
+        *,
+        breaks: ArrayLike = (),
+    ) -> None:
         value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
         tensor = np.diag(value) if value.ndim == 1 else value
         asymmetry = np.abs(tensor - tensor.T).max()
@@ -62,10 +81,18 @@ class RigidBody:
         condition = LARGEST if is_diagonal else TENSOR_CONDITION
         if moments[-1] > condition * moments[0]:
             raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")
-        if rotor_momentum is not None:
-            rotor = finite_array("rotor_momentum", rotor_momentum, ((3,),), "three finite numbers (3,), kg m^2/s, or None")
-            rotor_momentum = rotor if rotor.any() else None
-        set_fields(self, inertia=read_only((tensor + tensor.T) / 2), rotor_momentum=rotor_momentum)
+        if motor is None and rotor_momentum is not None:
+            given = RotorMomentum(rotor_momentum, breaks)
+            motor, rotor_momentum = None if given.constant else given, given.at(0.0)
+        rotor = None if rotor_momentum is None else np.asarray(rotor_momentum, dtype=float)
+        rotor = None if rotor is None or not rotor.any() else read_only(rotor)
+        set_fields(self, inertia=read_only((tensor + tensor.T) / 2), rotor_momentum=rotor, motor=motor)
+
+    @property
+    def needs(self) -> Needs:
+        """What a scene with this body needs."""
+        rotor = set() if self.rotor_momentum is None and self.motor is None else {Need.ROTOR}
+        return frozenset(rotor if self.motor is None else {Need.MOTOR})
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
@@ -96,9 +123,14 @@ class RigidBody:
         """Inverse inertia (3, 3), 1/(kg m^2), body axes."""
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
-    def momentum(self, w_WB_B: ArrayLike) -> Array:
-        """Return the angular momentum (..., 3), kg m^2/s, with that of the rotor, for rates (..., 3), rad/s; body axes."""
+    def momentum(self, w_WB_B: ArrayLike, t: ArrayLike = 0.0) -> Array:
+        """Return the angular momentum (..., 3), kg m^2/s, with that of the rotor, for rates (..., 3), rad/s; body axes.
+
+        Times (...), s, matter if the rotor has a motor.
+        """
         of_body = np.asarray(w_WB_B, dtype=float) @ self.inertia
+        if self.motor is not None:
+            return of_body + np.array([self.motor.at(each) for each in np.ravel(t).tolist()]).reshape(*np.shape(t), 3)
         return of_body if self.rotor_momentum is None else of_body + self.rotor_momentum
 
     def rotor_along(self, R_BF: Array) -> tuple[float, float, float] | None:
@@ -122,4 +154,5 @@ class RigidBody:
     def __repr__(self) -> str:
         diagonal = np.array_equal(self.inertia, np.diag(np.diag(self.inertia)))
         rotor = "" if self.rotor_momentum is None else f", rotor_momentum={self.rotor_momentum.tolist()}"
+        rotor = rotor if self.motor is None else f", rotor_momentum={self.motor.value!r}"
         return f"RigidBody(inertia={(np.diag(self.inertia) if diagonal else self.inertia).tolist()}{rotor})"

@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from .check import describe, real_number
 from .errors import BadInput, nearest
+from .needs import FIELDS, Needs
 from .version import VERSION
 
 T = TypeVar("T")
@@ -110,14 +111,9 @@ class Card:
         Module in `conservative.kernels` whose function `enter` makes all steps of a run; "" if there is none.
     structure
         Returns the `Structure` of a setting; None if it is unknown.
-    time_dependent
-        True if potentials that depend on time are supported. If not, `Method.unsupported` reports them.
-    loads
-        True if a torque and damping are supported. If not, `Method.unsupported` reports them.
-    flight
-        True if an engine integrates the translation in free flight as well. If not, `Method.unsupported` reports it.
-    rotors
-        True if bodies with a rotor are supported. If not, `Method.unsupported` reports them.
+    takes
+        The parts of scenes that the method takes (`conservative.needs`); default: fields that depend on the attitude only. If a
+        scene needs more, `Method.unsupported` says so. Methods that integrate the rotation only take free flight.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -136,10 +132,7 @@ class Card:
     colour: str | None = None
     kernel: str = ""
     structure: Callable[[Any], Structure | None] = lambda method: None
-    time_dependent: bool = False
-    loads: bool = False
-    flight: bool = False
-    rotors: bool = False
+    takes: Needs = FIELDS
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

@@ -175,6 +175,20 @@ def set_fields(value: object, /, **values: Any) -> None:
     vars(value).update(values)
 
 
+class PickledByFields:
+    """Base of frozen dataclasses whose caches have values of one process: pickle takes the fields only."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        frozen: Any = self
+        return _restore, (type(self), {field.name: getattr(self, field.name) for field in fields(frozen)})
+
+
+def _restore(kind: type[T], values: dict[str, Any]) -> T:
+    return build_unchecked(
+        kind, **{name: read_only(each) if isinstance(each, np.ndarray) else each for name, each in values.items()}
+    )
+
+
 def replace_unchecked(value: T, /, **changes: Any) -> T:
     """Return a copy of a frozen dataclass with other fields, without the checks of its constructor and with an empty cache."""
     frozen: Any = value

@@ -11,7 +11,7 @@ Source: any mechanics textbook, such as Goldstein, Classical Mechanics, sections
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,8 @@ from .attitude import Array
 from .body import RigidBody
 from .check import describe, finite_array
 from .errors import BadInput
-from .invariants import MOMENTUM_UNIT, Invariant
+from .invariants import MOMENTUM_UNIT, InvariantInTime
+from .needs import Need, Needs
 from .potentials.uniform_gravity import UniformGravity
 from .shapes import MassDistribution
 
@@ -47,6 +48,7 @@ class Flight:
     g: float
     p_WB0: Array
     v_WB0: Array
+    needs: ClassVar[Needs] = frozenset({Need.FLIGHT})
 
     def centre(self, R_WB: Array, w_WB_B: Array, p_WB: Array, v_WB: Array) -> tuple[Array, Array]:
         """Return position (n, 3), m, and velocity (n, 3), m/s, of the centre of mass, world axes.
@@ -75,7 +77,7 @@ class Flight:
         arm, slope = self._arm(R_WB, w_WB_B)
         return centre[0] - arm, centre[1] - slope
 
-    def invariants(self, scene: Any) -> tuple[FlightInvariant, ...]:
+    def invariants(self, scene: Any) -> tuple[InvariantInTime, ...]:
         """Return linear momentum, angular momentum about the world's origin, and total energy.
 
         The first two are without the impulse of gravity, which is exact: m g t downwards, and its moment m g t about the
@@ -103,19 +105,15 @@ class Flight:
 
         whole = scene.kinetic_energy0 + m * (speed * speed / 2 + abs(self.g) * reach)
         return (
-            FlightInvariant("linear momentum", "kg m/s", m * speed or 1.0, linear),
-            FlightInvariant("momentum about the origin", MOMENTUM_UNIT, spin + m * speed * reach or 1.0, angular),
-            FlightInvariant("total energy", "J", whole or 1.0, energy),
+            InvariantInTime("linear momentum", "kg m/s", m * speed or 1.0, linear),
+            InvariantInTime("momentum about the origin", MOMENTUM_UNIT, spin + m * speed * reach or 1.0, angular),
+            InvariantInTime("total energy", "J", whole or 1.0, energy),
         )
 
 
 def rotation_only(scene: AnyScene) -> AnyScene:
     """Return the scene without free flight: the rotation about the centre of mass."""
     return scene if scene.flight is None else scene.rename(scene.name, flight=None)
-
-
-class FlightInvariant(Invariant):
-    """A conserved quantity of a free flight: `evaluate(R_WB, w_WB_B, p_WB, v_WB, t)`, with arrays of n states."""
 
 
 def read_flight(body: object, potential: object, p_WB0: ArrayLike | None, v_WB0: ArrayLike | None) -> tuple[RigidBody, Flight]:

@@ -58,6 +58,10 @@ class Invariant:
             raise BadInput("evaluate", describe(self.evaluate), "a function of attitudes (n, 3, 3) and rates (n, 3)")
 
 
+class InvariantInTime(Invariant):
+    """A conserved quantity that needs more: `evaluate(R_WB, w_WB_B, t)` or, in free flight, `evaluate(R, w, p_WB, v_WB, t)`."""
+
+
 def sizes(drift: Array) -> Array:
     """Return the magnitudes (n,) of relative values (n,) or (n, 3)."""
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
@@ -85,12 +89,12 @@ def largest_momentum(body: RigidBody, energy: float) -> float:
     return math.sqrt(2 * energy * float(body.moments.max())) + rotor
 
 
-def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
+def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array, t: Array | float = 0.0) -> Array:
     """Return the angular momentum (..., 3) about the fixed point, kg m^2/s, world axes.
 
-    Attitudes are (..., 3, 3), body to world, and rates (..., 3), rad/s, body axes.
+    Attitudes are (..., 3, 3), body to world, and rates (..., 3), rad/s, body axes; times (...), s, matter to a motor.
     """
-    return (R_WB @ body.momentum(w_WB_B)[..., None])[..., 0]
+    return (R_WB @ body.momentum(w_WB_B, t)[..., None])[..., 0]
 
 
 def invariants_of(
@@ -138,6 +142,17 @@ def balance_of(invariant: Invariant, potential: AnyPotential | None) -> Invarian
         return given[:, 1:] if line is None else np.asarray(given[:, 1:] @ line)
 
     return replace(invariant, name=f"{invariant.name} balance", supplied=supplied)
+
+
+def in_time(invariant: Invariant, body: RigidBody) -> Invariant:
+    """Return a component of the momentum, or all three, with the momentum of a rotor with a motor."""
+    start = body.motor.at(0.0) if body.motor else np.zeros(3)
+
+    def evaluate(R_WB: Array, w_WB_B: Array, t: Array) -> Array:
+        # A change of h in body axes acts as a change of J w does.
+        return invariant.evaluate(R_WB, np.linalg.solve(body.inertia, (body.momentum(w_WB_B, t) - start).T).T)
+
+    return InvariantInTime(invariant.name, invariant.unit, invariant.scale, evaluate, invariant.supplied)
 
 
 def with_balances(*names: str) -> frozenset[str]:

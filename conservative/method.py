@@ -13,30 +13,38 @@ import numpy as np
 from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
 from .card import Role as Role
 from .drifts import drifts_of
-from .errors import InvalidResult
+from .errors import InvalidResult, Unsupported
 from .grid import Grid, grid_for
+from .needs import Needs, lacking
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find_mistake
 
 Run = Callable[[], Trajectory]
 
 
-def _refuse_extras(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
-    """Extend `Method.unsupported` by the reasons for potentials that depend on time, loads, rotors, and engines in flight."""
+def _ask_needs(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
+    """Extend `Method.unsupported` by the comparison of what the scene needs and the method takes."""
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
-        if getattr(scene.potential, "time_dependent", False) and not method.card.time_dependent:
-            return "it is for fields that do not depend on time; integrate(scene, error=1e-9) chooses a method for others"
-        if scene.loaded and not method.card.loads:
-            return "it does not take a torque or damping; reduced, projected and scipy do"
-        if scene.flight and method.role == Role.ENGINE and not method.card.flight:
-            return "its adapter has no free flight; those of mujoco, pinocchio, drake and pybullet have"
-        if scene.body.rotor_momentum is not None and not method.card.rotors:
-            return "it is for bodies without a rotor; Reduced(), Gauss(), Taylor() and Splitting() take one"
-        return unsupported(method, scene)
+        return lacking(method.takes, scene.needs) or unsupported(method, scene)
 
     return reason
+
+
+def _refuse(prepare: Callable[[Any, Scene, Grid], Run]) -> Callable[[Any, Scene, Grid], Run]:
+    """Extend `Method.prepare` by its checks of the scene: nothing is computed with a part left out."""
+
+    @wraps(prepare)
+    def checked(method: Method, scene: Scene, grid: Grid) -> Run:
+        if reason := method.unsupported(scene):
+            got = f"{method.name} for the scene {scene.name!r}"
+            raise Unsupported("method", got, f"a scene that it supports ({reason})")
+        for load in scene.loads:
+            load.require_times((grid.n_steps - 1) * grid.dt)
+        return prepare(method, scene, grid)
+
+    return checked
 
 
 class Method(ABC):
@@ -62,8 +70,9 @@ class Method(ABC):
         for name in ("colour", "variants", "suite", "rank", "candidates"):
             if name in vars(cls):  # these were class attributes in earlier versions
                 raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
-        if "unsupported" in vars(cls):
-            cls.unsupported = _refuse_extras(cls.unsupported)  # type: ignore[method-assign]
+        for name, extend in (("unsupported", _ask_needs), ("prepare", _refuse)):
+            if name in vars(cls):
+                setattr(cls, name, extend(vars(cls)[name]))
 
     @property
     def name(self) -> str:
@@ -76,6 +85,11 @@ class Method(ABC):
         """Maker and setting, such as `mujoco==4.0.0/RK4`. For our methods, maker and name."""
         setting = "" if self.role in (Role.OURS, Role.BASELINE) else self.setting()
         return f"{self.maker}/{setting or self.name}"
+
+    @property
+    def takes(self) -> Needs:
+        """Parts of scenes that it takes; default: those of its card."""
+        return self.card.takes
 
     @property
     def maker(self) -> Maker:
@@ -110,9 +124,12 @@ class Method(ABC):
         """
         return Bounds(drift=1e-3, orthonormality=0.1, energy=math.inf if self.role == Role.ENGINE else 1.0)
 
-    @_refuse_extras
+    @_ask_needs
     def unsupported(self, scene: Scene) -> str | None:
-        """Return the reason why the scene is not supported, or None."""
+        """Return the reason why the scene is not supported, or None.
+
+        What the scene needs and `takes` lacks is reported before an override is asked: that is for numbers, such as a symmetry.
+        """
         return None
 
     def program(self, scene: Scene) -> object:
@@ -128,7 +145,9 @@ class Method(ABC):
         """Convert the scene, compile, and return a function without arguments that makes a run and returns the trajectory.
 
         Work that is needed once per scene belongs here and not in the run, which is timed. The run is not checked; use
-        `check(scene, grid, run())`. It can be called repeatedly and starts from the initial state each time. Runs of separate
+        `check(scene, grid, run())`. Every override raises `Unsupported` for a scene that is not supported.
+
+        It can be called repeatedly and starts from the initial state each time. Runs of separate
         calls of `prepare` can execute in parallel threads; the same run cannot. It can have an attribute `own_loop`, a
         function that integrates and does not convert the samples.
         """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 
@@ -13,12 +13,15 @@ from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation, set_fields
+from .check import SMALLEST, PickledByFields, describe, finite_array, positive_number, printable_text, rotation, set_fields
 from .errors import BadInput
-from .flight import Flight, FlightInvariant, read_flight
-from .invariants import Invariant, axial_direction, balance_of, invariants_of
-from .potentials.load import Damping, Torque
+from .flight import Flight, read_flight
+from .identity import NOT_OF_MOTION, digest
+from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
+from .needs import LOADS, Needs, needs_of
+from .potentials.load import Damping, OfTime, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
+from .potentials.smoothness import Smoothness, examine
 from .potentials.turning import Turning
 from .shapes import MassDistribution
 
@@ -33,7 +36,7 @@ MOST_DERIVATIONS = 64
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Scene:
+class Scene(PickledByFields):
     """A rigid body that rotates about a fixed point, or flies freely: body, potential, initial state and duration.
 
     Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component. In that range our
@@ -75,18 +78,18 @@ class Scene:
         An argument is not finite, out of range, not a rotation, or has the wrong shape.
     """
 
-    name: str
+    name: str = field(metadata=NOT_OF_MOTION)
     body: RigidBody
     R_WB0: Array
     w_WB_B0: Array
     t_end: float
     potential: AnyPotential | None
-    dt: float
+    dt: float = field(metadata=NOT_OF_MOTION)
     torque: Torque | None = None
     damping: Damping | None = None
     extra_invariants: tuple[Invariant, ...] = ()
-    group: str = "your own"
-    source: str = ""
+    group: str = field(default="your own", metadata=NOT_OF_MOTION)
+    source: str = field(default="", metadata=NOT_OF_MOTION)
     flight: Flight | None = None
 
     def __init__(
@@ -126,7 +129,9 @@ class Scene:
             raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        [load.require(end) for load in (torque, damping.factor if damping else None) if load]  # for its exception
+        attitude = rotation("R_WB0", R_WB0)
+        for load in filter(None, (torque, damping and damping.of_time, body.motor)):
+            load.require(end, attitude)  # for its exception
         try:
             given: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
@@ -140,7 +145,7 @@ class Scene:
             self,
             name=name,
             body=body,
-            R_WB0=rotation("R_WB0", R_WB0),
+            R_WB0=attitude,
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
@@ -153,15 +158,47 @@ class Scene:
             flight=flight,
         )
 
-    @property
-    def free(self) -> bool:
-        """True if there is no potential."""
-        return self.potential is None
+    @cached_property
+    def needs(self) -> Needs:
+        """What a method has to take: the union of the needs of its parts (`conservative.needs`)."""
+        parts = self.body, self.potential, self.torque, self.damping, self.flight
+        return frozenset().union(*map(needs_of, parts))
+
+    @cached_property
+    def key(self) -> str:
+        """A text that is equal for scenes with the same motion: a digest of all fields except name, dt, group and source."""
+        return digest(self)
 
     @property
+    def free(self) -> bool:
+        """True if neither a potential nor a torque, damping or motor acts."""
+        return self.potential is None and not self.loaded
+
+    @cached_property
     def loaded(self) -> bool:
-        """True if a torque or damping acts beside the potential."""
-        return self.torque is not None or self.damping is not None
+        """True if a torque, a damping or the motor of a rotor acts beside the potential."""
+        return bool(self.needs & LOADS)
+
+    @property
+    def loads(self) -> tuple[OfTime, ...]:
+        """The torque, the damping and the momentum of the rotor, as far as they are not constant."""
+        parts = self.torque, self.damping and self.damping.of_time, self.body.motor
+        return tuple(load for load in parts if load and not load.constant)
+
+    @cached_property
+    def breaks(self) -> Array:
+        """Times (n,) in the run at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
+        known = [load.breaks for load in self.loads]
+        times = np.unique(np.concatenate([np.empty(0), *known, self.smoothness.jumps]))
+        return times[times > 0]
+
+    @cached_property
+    def smoothness(self) -> Smoothness:
+        """Jumps of functions without declared break points, and the step that resolves them (`potentials.smoothness`)."""
+        functions = [load for load in self.loads if callable(load.value) and not len(load.breaks)]
+        calls: Any = [(lambda t, f=f: f.value(t, self.R_WB0)) if f.of_attitude else f.value for f in functions]
+        known = np.concatenate([np.empty(0), *(load.breaks for load in self.loads)])
+        return examine(calls, self.t_end, known)
 
     @property
     def integrable(self) -> bool:
@@ -180,7 +217,8 @@ class Scene:
 
     @cached_property
     def energy_scale(self) -> float:
-        """Reference scale of energy drifts, J: initial kinetic energy, magnitude of the potential, work of the torque in 1 rad.
+        """Reference scale of energy drifts, J: initial kinetic energy, magnitude of the potential, work of the torque in 1 rad,
+        and the energy that a motor can give to the body.
 
         Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
@@ -189,7 +227,9 @@ class Scene:
     @cached_property
     def _energies(self) -> float:
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
-        return size if self.torque is None else size + self.torque.require(self.t_end)
+        if self.body.motor is not None:
+            size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
+        return size if self.torque is None else size + self.torque.require(self.t_end, self.R_WB0)
 
     @cached_property
     def magnitudes(self) -> tuple[int, int | None]:
@@ -207,14 +247,15 @@ class Scene:
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
         if self.loaded:
             own = tuple(balance_of(each, self.potential) for each in own)
+        if self.body.motor is not None:  # its work is not part of the motion of the body
+            own = tuple(in_time(each, self.body) for each in own if each.unit != "J")
         return (*own, *self.extra_invariants, *(self.flight.invariants(self) if self.flight else ()))
 
     def initial_value(self, invariant: Invariant) -> Array:
         """Return the value of an invariant in the initial state, (1,) or (1, 3)."""
-        flight, place = self.flight, tuple[Array, ...]()
-        if flight and isinstance(invariant, FlightInvariant):
-            place = flight.p_WB0[None], flight.v_WB0[None], np.zeros(1)
-        return invariant.evaluate(self.R_WB0[None], self.w_WB_B0[None], *place)
+        place = (self.flight.p_WB0[None], self.flight.v_WB0[None]) if self.flight else ()
+        more = (*place, np.zeros(1)) if isinstance(invariant, InvariantInTime) else ()
+        return invariant.evaluate(self.R_WB0[None], self.w_WB_B0[None], *more)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
         """Return attitudes (n, 3, 3) at times (n,), s, relative to the axes in which the field is fixed."""

@@ -15,7 +15,6 @@ from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
-from .flight import FlightInvariant
 from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
@@ -107,7 +106,7 @@ class Trajectory:
     @cached_property
     def momentum_W(self) -> Array:
         """Angular momentum about the fixed point, or a free body's centre of mass (n, 3), kg m^2/s, world axes."""
-        return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
+        return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B, self.t)
 
     @property
     def quaternion_wxyz(self) -> Array:
@@ -136,7 +135,7 @@ class Trajectory:
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
-        place = (*self.place, self.t) if isinstance(invariant, FlightInvariant) else ()
+        place = (*self.place, self.t) if isinstance(invariant, invariants.InvariantInTime) else ()
         R = self.scene.in_field_axes(self.R_WB, self.t)
         change = invariant.evaluate(R, self.w_WB_B, *place) - self.scene.initial_value(invariant)
         if invariant.supplied is not None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from conservative.arithmetic import in_body
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.grid import Grid
+from conservative.needs import Need
 from conservative.potentials.turning import Turning
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -32,15 +33,15 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
     """Return the motion of a scene at the samples of a grid, with `parts` steps between two samples.
 
     The field is one that kernels know. A step that is too long to converge gives a wrong result, or one that is not finite.
-    Steps also end where a torque is not smooth (`OfTime.breaks`).
+    Steps also end where a load is not smooth (`Scene.breaks`). With a motor the momentum in the state includes the rotor's.
     """
     c, b, A = _tableau()
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
-    loads = scene.torque, scene.damping.factor if scene.damping else None
-    bends = np.concatenate([ends[:0], *(each.breaks for each in loads if each is not None)])
+    bends = scene.breaks.astype(np.longdouble)
     stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
-    y = np.concatenate([q / np.sqrt(q @ q), scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0])
+    L = scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0 + wheel(scene, ends[:1])[:, 0]
+    y = np.concatenate([q / np.sqrt(q @ q), L])
     samples = [y]
     with np.errstate(all="ignore"):
         for i in range((len(stops) - 1) * parts):
@@ -57,35 +58,45 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
                 samples.append(y)
         found = np.array(samples)
         R_WB = from_quaternion((found[:, :4] / np.sqrt((found[:, :4] ** 2).sum(axis=1, keepdims=True))).astype(float))
-        w_WB_B = (found[:, 4:] @ _inverse(scene).T).astype(float)
+        w_WB_B = ((found[:, 4:] - wheel(scene, ends).T) @ _inverse(scene).T).astype(float)
     return Trajectory(scene, grid.t, R_WB, w_WB_B, f"collocation of order {2 * STAGES}, extended precision")
 
 
 def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
     """Return the derivative of quaternion and body momentum (7, n) at times (n,)."""
     J_inverse, potential = _inverse(scene), scene.potential
-    h1, h2, h3 = scene.body.rotor_along(np.eye(3)) or (0.0, 0.0, 0.0)
+    h1, h2, h3 = (0.0, 0.0, 0.0) if scene.body.motor else scene.body.rotor_along(np.eye(3)) or (0.0, 0.0, 0.0)
     # In double precision a field's products would be rounded, which some bodies amplify by 1,000.
     fixed: Any = None if potential is None else potential.kernel_field(np.eye(3, dtype=np.longdouble))
 
     def slope(t: Reals, y: Reals) -> Reals:
-        (a, b, c, d, L1, L2, L3), (x, y_, z), field = y, J_inverse @ y[4:], fixed
+        (a, b, c, d, L1, L2, L3), (x, y_, z), field = y, J_inverse @ (y[4:] - wheel(scene, t)), fixed
         if isinstance(potential, Turning):  # its own `at_time` is for single times in double precision
             half = fixed.rate / np.longdouble(2) * t
             field = fixed._replace(back=(np.cos(half), *(-np.sin(half) * n for n in fixed.normal)))
         T = np.zeros_like(y[4:]) if field is None else np.array(field.body_torque((a, b, c, d)))
         turn = -b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x
+        R = from_quaternion(np.array([a, b, c, d]).T.astype(float)) if Need.ATTITUDE in scene.needs else [None] * len(t)
         if scene.damping is not None:
-            factor = 1 if scene.damping.factor is None else np.array([scene.damping.factor.at(float(each)) for each in t])
-            T = T - factor * (scene.damping.matrix @ np.array([x, y_, z]))
+            D = np.array([scene.damping.at(*state) for state in zip(t.astype(float).tolist(), R, strict=True)])
+            T = T - np.einsum("nij,jn->in", D, np.array([x, y_, z]))
         if scene.torque is not None:
-            given = np.array([scene.torque.at(float(each)) for each in t], dtype=np.longdouble).T
+            given = [scene.torque.at(*state) for state in zip(t.astype(float).tolist(), R, strict=True)]
+            given = np.array(given, dtype=np.longdouble).T
             T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
         L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
         spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
         return np.array([*(rate / 2 for rate in turn), *spin])
 
     return slope
+
+
+def wheel(scene: Scene, t: Reals) -> Reals:
+    """Return the momentum (3, n) of a rotor with a motor at times (n,), s; 0 without a motor."""
+    motor = scene.body.motor
+    if motor is None:
+        return np.zeros((3, len(t)), dtype=np.longdouble)
+    return np.array([motor.at(float(each)) for each in t], dtype=np.longdouble).T
 
 
 def _inverse(scene: Scene) -> Reals:

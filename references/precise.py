@@ -24,6 +24,7 @@ from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
+from conservative.needs import ROTATION, Need
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
@@ -147,7 +148,9 @@ class Precise(Method):
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
     order = None
-    card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True, rotors=True)
+    card: ClassVar[Card] = Card(
+        report=(), colour="grey", takes=ROTATION - {Need.FIELD, Need.FUNCTION} | {Need.TURNING, Need.ROTOR}
+    )
 
     def __post_init__(self) -> None:
         allowed = "an integer from 53 (double precision) to 4096"

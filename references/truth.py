@@ -14,6 +14,7 @@ and more if a motion amplifies errors. For random bodies it is below 1.1e-15 rad
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ import numpy as np
 from conservative.attitude import angle_between
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.potentials.python_function import FunctionPotential
+from conservative.needs import Need
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -92,7 +93,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     MissingEngine
         A package that a solution needs is not installed.
     """
-    if scene.loaded and not isinstance(scene.potential, FunctionPotential):
+    if scene.loaded and Need.FUNCTION not in scene.needs:
         return _confirm_loads(scene, grid)
     first, second, allowed = _pair(scene)
     trajectory = first.solve(scene, grid)
@@ -143,7 +144,9 @@ def confirm(scene: Scene, grid: Grid) -> Truth:
 def _confirm_loads(scene: Scene, grid: Grid) -> Truth:
     """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, checked by SciPy."""
     second, allowed = SciPy("DOP853", TIGHTEST), 1e-8
-    trajectory, parts, change = collocate(scene, grid, 1), 1, np.inf
+    gaps = np.diff(np.union1d(grid.t, scene.breaks[scene.breaks < grid.t[-1]]))
+    parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / scene.smoothness.step))) if scene.loads else 1
+    trajectory, change = collocate(scene, grid, parts), np.inf
     while change > CONFIRMED and parts < MOST_PARTS:
         parts, coarse = 2 * parts, trajectory
         trajectory = collocate(scene, grid, parts)

@@ -5,13 +5,10 @@ A digest shows whether two scenes are the same, but a scene cannot be restored f
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from functools import partial
 from importlib import import_module
-from types import CodeType, FunctionType, MethodType
 from typing import Any
 
 import numpy as np
@@ -19,10 +16,11 @@ import numpy as np
 from ..check import build_unchecked, describe, read_only
 from ..errors import BadInput
 from ..flight import rotation_only
+from ..identity import digest, fields_of_motion
 from ..scene import Scene
 
 _PACKAGE = __name__.partition(".")[0]
-_NOT_OF_MOTION = ("t_end", "dt", "group", "source")
+_NOT_OF_MOTION = {field.name for field in fields(Scene)} - {"name", *fields_of_motion(Scene)} | {"t_end"}
 """Fields of a scene that do not change the motion of its bodies on a given grid."""
 
 
@@ -72,7 +70,7 @@ def record_scene(value: Any) -> Any:
         given = ((field, getattr(value, field.name)) for field in fields(value))
         named = {field.name: record_scene(each) for field, each in given if each is not None or field.default is not None}
         return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
-    return {"digest": hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()[:16]}
+    return {"digest": digest(value)[:16]}
 
 
 def _restore(record: Any) -> Any:
@@ -92,41 +90,3 @@ def _restore(record: Any) -> Any:
     if not names - optional <= record["fields"].keys() <= names:
         raise TypeError(f"not the fields of {record['type']}")
     return build_unchecked(kind, **{field: _restore(value) for field, value in record["fields"].items()})
-
-
-def _list_parts(value: Any, above: list[object]) -> Any:
-    """Return nested lists with the same `repr` in every process for values with the same behaviour.
-
-    A function is represented by its code and the values that it uses, because pickle's bytes of equal functions differ between
-    processes. `above` are the values that contain this one, to end cycles.
-    """
-    value = getattr(value, "py_func", value)  # a function that numba has compiled
-    kind, inner = f"{type(value).__module__}.{type(value).__qualname__}", [*above, value]
-    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
-        return [kind, repr(value)]
-    if isinstance(value, np.ndarray | np.generic):
-        return [kind, value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
-    if any(each is value for each in above):
-        return [kind]
-    if isinstance(value, CodeType):
-        parts: list[Any] = [value.co_code, value.co_names, value.co_varnames, value.co_consts]
-    elif isinstance(value, FunctionType):
-        plain, known = (bool, int, float, complex, str, bytes, np.ndarray), value.__globals__
-        used = {name: known[name] for name in value.__code__.co_names if isinstance(known.get(name), plain)}
-        cells = [cell.cell_contents for cell in value.__closure__ or ()]
-        parts = [value.__code__, value.__defaults__, value.__kwdefaults__, used, cells]
-    elif isinstance(value, MethodType):
-        parts = [value.__func__, value.__self__]
-    elif isinstance(value, partial):
-        parts = [value.func, value.args, value.keywords]
-    elif isinstance(value, Mapping):
-        parts = [[key, value[key]] for key in sorted(value, key=repr)]
-    elif isinstance(value, set | frozenset):
-        parts = sorted(value, key=repr)
-    elif isinstance(value, list | tuple):
-        parts = list(value)
-    elif is_dataclass(value) and not isinstance(value, type):
-        parts = [[field.name, getattr(value, field.name)] for field in fields(value)]
-    else:  # a class, a function of C, or an object
-        parts = [getattr(value, "__qualname__", ""), {} if isinstance(value, type) else dict(getattr(value, "__dict__", {}))]
-    return [kind, [_list_parts(part, inner) for part in parts]]

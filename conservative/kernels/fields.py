@@ -62,6 +62,47 @@ def at_step(field, t, h):
 
 
 @trace
+def rotor_at(field, rotor, t):
+    """Return the momentum of the rotor at a time t, s: `rotor`, or that of the field's motor."""
+    return field.wheel(t) if hasattr(field, "wheel") and field.motor else rotor
+
+
+@trace
+def step_rotor(field, rotor, t, h):
+    """Return the momentum of the rotor during a step of length h from t, s, the mean of its ends, and half of its change.
+
+    The latter is () without a motor. With the mean r, L + r0 - r and L + r1 - r take the places of L at both ends.
+    """
+    if not (hasattr(field, "wheel") and field.motor):
+        return rotor, ()
+    r0, r1 = field.wheel(t), field.wheel(t + h)
+    return tuple(0.5 * (a + b) for a, b in zip(r0, r1, strict=True)), tuple(0.5 * (b - a) for a, b in zip(r0, r1, strict=True))
+
+
+@trace
+def react(L, carry, half):
+    """Return the momentum L, a compensated sum, after the reaction of a motor in half a step; unchanged without one."""
+    if not half:
+        return L, carry
+    pairs = [accumulate(a, c, -b) for a, c, b in zip(L, carry, half, strict=True)]
+    return tuple(x for x, _ in pairs), tuple(c for _, c in pairs)
+
+
+@trace
+def body_momentum(field, whole_momentum, t):
+    """Return the momentum without that of a rotor with a motor at a time t, s; unchanged without one."""
+    if not (hasattr(field, "wheel") and field.motor):
+        return whole_momentum
+    return subtract(whole_momentum, field.wheel(t))
+
+
+@trace
+def with_motor(field, L, t):
+    """Return the momentum with that of a rotor with a motor at a time t, s; unchanged without one."""
+    return add(L, field.wheel(t)) if hasattr(field, "wheel") and field.motor else L
+
+
+@trace
 def no_supply(field):
     """Return the sums of work and impulse of the loads (4), and their rounding errors (4), as zeros; () without loads."""
     return (0.0,) * 8 if hasattr(field, "load") else ()

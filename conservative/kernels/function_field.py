@@ -22,7 +22,7 @@ if COMPILED:
 
     from .traced import DOUBLE, INDEX, INTEGER, Symbol
 
-BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES, DAMPING = range(6)
+BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES, DAMPING, WHEEL = range(7)
 
 
 def evaluate(field, what, *state):
@@ -30,8 +30,8 @@ def evaluate(field, what, *state):
 
     The inputs are R_BP (9) and the state (18). BODY_TORQUE: q, and t if the field depends on time, to T. FINITE_TORQUE: q, a to
     T and its derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q
-    to V. TORQUES: t to the torques in body and world axes. DAMPING: t, with a matrix instead of R_BP, to the
-    rows of the matrix times the factor.
+    to V. The last three take t, the window (`conservative.potentials.load`), and q if they depend on the attitude. TORQUES: to
+    the torques in body and world axes. DAMPING: to the rows of the matrix. WHEEL: to the momentum of the rotor.
     """
     inputs = [x for row in field.rows for x in row] + [x for part in state for x in part]
     inputs += [0.0] * (N_INPUTS - len(inputs))
@@ -92,22 +92,51 @@ class Torques(NamedTuple):
     address: Any
     rows: Any
 
-    def at(self, t):
-        """Return the torques in body and in world axes, N m, at a time t, s."""
-        v = evaluate(self, TORQUES, (t,))
+    def at(self, t, first, last, *q):
+        """Return the torques in body and in world axes, N m, at a time, s, in a window."""
+        v = evaluate(self, TORQUES, (t, first, last), *q)
         return tuple(v[:3]), tuple(v[3:6])
 
 
 class DampingInTime(NamedTuple):
-    """Address of the Python object that is called for the factor of a damping, and the rows of its matrix, principal axes."""
+    """Address of the Python object that is called for a damping, and the rows of R_BP."""
 
     address: Any
     rows: Any
 
-    def at(self, t):
-        """Return the rows of the matrix, N m s, at a time t, s."""
-        v = evaluate(self, DAMPING, (t,))
+    def at(self, t, first, last, *q):
+        """Return the rows of the matrix, N m s, at a time, s, in a window."""
+        v = evaluate(self, DAMPING, (t, first, last), *q)
         return tuple(v[:3]), tuple(v[3:6]), tuple(v[6:9])
+
+
+class TorquesOfAttitude(NamedTuple):
+    """As `Torques`, for a function of time and attitude; `now` has the time and its window, s."""
+
+    address: Any
+    rows: Any
+    now: Any = (0.0, 0.0, 0.0)
+    at = Torques.at
+
+
+class DampingOfAttitude(NamedTuple):
+    """As `DampingInTime`, for a function of time and attitude; `now` has the time and its window, s."""
+
+    address: Any
+    rows: Any
+    now: Any = (0.0, 0.0, 0.0)
+    at = DampingInTime.at
+
+
+class Wheel(NamedTuple):
+    """Address of the Python object that is called for the momentum of a rotor with a motor, and the rows of R_BP."""
+
+    address: Any
+    rows: Any
+
+    def at(self, t, first, last):
+        """Return the momentum, kg m^2/s, at a time, s, in a window."""
+        return tuple(evaluate(self, WHEEL, (t, first, last))[:3])
 
 
 class FunctionInTime(NamedTuple):

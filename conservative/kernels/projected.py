@@ -21,7 +21,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .fields import add_supply, at_time, body_torque, energy, no_supply, shift_invariants, supply_rate, torque, whole
+from .fields import (
+    add_supply,
+    at_time,
+    body_momentum,
+    body_torque,
+    energy,
+    no_supply,
+    rotor_at,
+    shift_invariants,
+    supply_rate,
+    torque,
+    whole,
+    with_motor,
+)
 from .lanes import FOUR, join, lane_of, load, load_rows, save, save_rows, splat
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
@@ -73,9 +86,12 @@ class Coefficients(NamedTuple):
 
 
 @small
-def rates(J_inverse, rotor, field, q, L, slopes, at, supply_at):
-    """Write (q', L', 0) to slopes[at : at + 8], and with loads their power and torque to slopes[supply_at : supply_at + 4]."""
-    w = times(J_inverse, L)
+def rates(J_inverse, rotor, field, t, q, L, slopes, at, supply_at):
+    """Write (q', L', 0) to slopes[at : at + 8], and with loads their power and torque to slopes[supply_at : supply_at + 4].
+
+    With a motor L is the whole momentum, of which the rotor has its part at a time t, s; there is no other rotor then.
+    """
+    w = times(J_inverse, body_momentum(field, L, t))
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
     n = cross(whole(rotor, L), w)
     T = torque(field, q, w)
@@ -106,6 +122,7 @@ def combine(q, L, weights, columns, first, last, slopes):
 @small
 def take_step(h, t, J_inverse, rotor, field, weights, columns, starts, nodes, q, L, slopes):
     """Return the state after a step from t, s. Stage i begins at starts[i] in weights and columns; the step is last."""
+    L = with_motor(field, L, t)
     q0, L0 = join(q[0], q[1], q[2], q[3]), join(L[0], L[1], L[2], 0.0)
     stages = len(starts) - 2
     for stage in range(stages):
@@ -114,13 +131,13 @@ def take_step(h, t, J_inverse, rotor, field, weights, columns, starts, nodes, q,
             (lane_of(qs, 0), lane_of(qs, 1), lane_of(qs, 2), lane_of(qs, 3)),
             (lane_of(Ls, 0), lane_of(Ls, 1), lane_of(Ls, 2)),
         )
-        rates(
-            J_inverse, rotor, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage, FOUR * (2 * stages + stage)
-        )
+        ts = t + nodes[stage] * h
+        rates(J_inverse, rotor, at_time(field, ts), ts, q, L, slopes, 2 * FOUR * stage, FOUR * (2 * stages + stage))
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
     dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
     q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
-    return (lane_of(q1, 0), lane_of(q1, 1), lane_of(q1, 2), lane_of(q1, 3)), (lane_of(L1, 0), lane_of(L1, 1), lane_of(L1, 2))
+    L = lane_of(L1, 0), lane_of(L1, 1), lane_of(L1, 2)
+    return (lane_of(q1, 0), lane_of(q1, 1), lane_of(q1, 2), lane_of(q1, 3)), body_momentum(field, L, t + h)
 
 
 @small
@@ -218,7 +235,7 @@ def march(model, coefficients, workspace):
     supplied = no_supply(field)
     record(0, q, L, q_out, L_out)
     record_supply(0, supplied, L_out)
-    kept = values(J_inverse, rotor, field, axis, turn, q, L)
+    kept = values(J_inverse, rotor_at(field, rotor, 0.0), at_time(field, 0.0), axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done = 0
     while done < n_steps:
@@ -227,7 +244,8 @@ def march(model, coefficients, workspace):
             q, L = take_step(h, (step - 1) * h, J_inverse, rotor, field, weights, columns, starts, nodes, q, L, slopes)
             supplied = sum_supply(h, weights, columns, starts, slopes, supplied)
             now, aim = at_time(field, step * h), shift_invariants(kept, axis, turn, supplied)
-            q, L, more, defect = project(J_inverse, rotor, now, axis, turn, aim, scales, q, L)
+            wheel = rotor_at(field, rotor, step * h)
+            q, L, more, defect = project(J_inverse, wheel, now, axis, turn, aim, scales, q, L)
             corrections += more
             if not defect < LEFT:
                 work = (step - 1) * stages

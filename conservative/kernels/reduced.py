@@ -7,6 +7,8 @@ The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principa
     L1 = Cay(2a)' (L0 + h T) = 2 J w* - L0
 
 L is J w, without the momentum r of a rotor, which adds a x (h/2) r on the left of the first equation. L1 = 2 J w* - L0 remains.
+With a motor, r is the mean of r0 and r1, and L0 + r0 - r and L1 + r1 - r are in the places of L0 and L1, so that
+Q1 (L1 + r1) = Q0 (L0 + r0) without a torque, and w* is unchanged.
 
 Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
 constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
@@ -31,7 +33,7 @@ from typing import Any, NamedTuple
 
 from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .fields import at_step, finite_torque, no_supply, supply, torque, whole
+from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
 from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 from .signals import call_handlers, end_of_block
@@ -307,14 +309,17 @@ def march(model, coefficients, workspace):
             return Result(n_steps, n_steps * len(lengths), corrections, None, size, False)
         if step <= last:
             q, q_carry, L, L_carry, supplied = state
-            h = lengths[stage]
-            now = at_step(field, find_start(lengths, step, stage), h)
-            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, rotor, q, L, L_carry, tolerance)
+            h, t = lengths[stage], find_start(lengths, step, stage)
+            now = at_step(field, t, h)
+            mean, half = step_rotor(field, rotor, t, h)
+            L, L_carry = react(L, L_carry, half)
+            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
             corrections += more
             if not found:
-                elsewhere = find_solution(h, J, J_inverse, now, rotor, q, L)
+                elsewhere = find_solution(h, J, J_inverse, now, mean, q, L)
                 return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
             L, L_carry = add_momentum(L, L_carry, gain)
+            L, L_carry = react(L, L_carry, half)
             supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
             at, state, history = (step, stage + 1), (q, q_carry, L, L_carry, supplied), no_history()
@@ -348,10 +353,12 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
     known, past = history
     for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
-            h = lengths[stage]
-            now = at_step(field, find_start(lengths, step, stage), h)
-            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, rotor, q, L)
-            a, gain, iterations, size, trusted = newton_solve(h, J, now, rotor, q, L, L_carry, a, NEAR, tolerance)
+            h, t = lengths[stage], find_start(lengths, step, stage)
+            now = at_step(field, t, h)
+            mean, half = step_rotor(field, rotor, t, h)
+            M, M_carry = react(L, L_carry, half)
+            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
+            a, gain, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
@@ -359,7 +366,8 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
-            L, L_carry = add_momentum(L, L_carry, gain)
+            L, L_carry = add_momentum(M, M_carry, gain)
+            L, L_carry = react(L, L_carry, half)
             supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
         first = 0

@@ -154,7 +154,20 @@ def move(
     field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
     table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
-    moved = kernels("between").move(start.J_inverse, start.rotor, field, *table, *limits, times, gaps[far] / units.time, q, L)
+    now, left, edges = times.copy(), gaps[far] / units.time, np.concatenate([[-math.inf], scene.breaks, [math.inf]])
+    moved, waiting = len(far), np.arange(len(far))
+    while len(waiting):  # once, or once more for each break point in a gap
+        place = np.searchsorted(edges, now[waiting] * (1 + SAME), side="right")
+        for i in np.unique(place).tolist():
+            some = waiting[place == i]
+            if scene.loaded:
+                field = field._replace(clock=(0.0, float(edges[i - 1]), float(edges[i])))
+            gap, of_q, of_L = np.minimum(left[some], edges[i] - now[some]), q[some], L[some]
+            good = kernels("between").move(start.J_inverse, start.rotor, field, *table, *limits, now[some], gap, of_q, of_L)
+            of_L[:, 3:] += L[some, 3:]
+            q[some], L[some], now[some], left[some] = of_q, of_L, now[some] + gap, left[some] - gap
+            moved = moved if good == len(some) else min(moved, int(some[good]))
+        waiting = waiting[left[waiting] > 0]
     moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
     kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)
     R[far[:moved]], w[far[:moved]] = moved_R, moved_w / units.time

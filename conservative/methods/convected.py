@@ -16,6 +16,7 @@ from ..deferred_imports import kernels
 from ..errors import NotConverged
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import ROTATION
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
 from .bounds import bounds_of
@@ -49,7 +50,10 @@ class Convected(Method):
     order = 2
     conserves = frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
     card: ClassVar[Card] = Card(
-        pictures=("",), colour="sky", structure=lambda method: Structure(symmetric=True, symplectic=False)
+        pictures=("",),
+        colour="sky",
+        structure=lambda method: Structure(symmetric=True, symplectic=False),
+        takes=ROTATION,
     )
 
     def __post_init__(self) -> None:

@@ -16,7 +16,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..potentials.uniform_gravity import UniformGravity
+from ..needs import Need
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
@@ -71,7 +71,7 @@ class Gauss(Method):
         colour="indigo",
         kernel="gauss",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
-        rotors=True,
+        takes=frozenset({Need.GRAVITY, Need.ROTOR, Need.FLIGHT}),
     )
 
     def __post_init__(self) -> None:
@@ -87,8 +87,6 @@ class Gauss(Method):
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        if not isinstance(scene.potential, UniformGravity | None):
-            return "it supports only free bodies and uniform gravity, whose energy and momenta are quadratic"
         return frame_unsupported(self.frame, scene)
 
     @in_own_units

@@ -43,8 +43,8 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import Need
 from ..potentials.field import into_axes
-from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, in_gravity_or_free, moments_of_gravity, take_pieces, turn_samples
@@ -81,13 +81,12 @@ class Lame(Method):
         colour="olive",
         kernel="lame",
         structure=lambda method: Structure(symmetric=True, symplectic=True),  # the exact flow
+        takes=frozenset({Need.GRAVITY, Need.FLIGHT}),
     )
 
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        if not isinstance(scene.potential, UniformGravity | None):
-            return "needs uniform gravity"
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
     def longest_step(self, scene: Scene) -> float:

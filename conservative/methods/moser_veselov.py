@@ -16,6 +16,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import Need
 from ..scene import Scene
 from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, take_pieces
@@ -78,6 +79,7 @@ class MoserVeselov(Method):
         colour="wine",
         kernel="moser_veselov",
         structure=lambda method: Structure(symmetric=True, symplectic=method.order in (None, 2)),  # see DERIVATION.md, 8
+        takes=frozenset({Need.FLIGHT}),
     )
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
@@ -86,9 +88,6 @@ class MoserVeselov(Method):
         set_fields(self, order=None if order == "exact" else order)
 
     bounds = within_round_off
-
-    def unsupported(self, scene: Scene) -> str | None:
-        return None if scene.free else "it is for free bodies"
 
     def longest_step(self, scene: Scene) -> float:
         return 0.99 * step_limit(scene, exact=self.order is None)

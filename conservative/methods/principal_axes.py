@@ -39,7 +39,7 @@ class PrincipalStart:
     field
         Parameters of the potential in the kernel's axes; None for a free body.
     rotor
-        Momentum of the rotor, kg m^2/s; None without one. `L` does not contain it.
+        Momentum of the rotor, kg m^2/s; None without one, or if `field` has it with its motor. `L` does not contain it.
     spin
         In the non-spinning frame, the omitted rate about the third axis, rad/s, and 1/J3; otherwise None.
     """
@@ -87,9 +87,10 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     L = (scene.w_WB_B0 @ R_BP) * moments
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
     if scene.loaded:
-        field = load_field(field, scene.torque, scene.damping, R_BP)
+        field = load_field(field, scene.torque, scene.damping, R_BP, scene.body.motor)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
-    rotor, q = scene.body.rotor_along(R_BP), quadruple(scene.R_WB0 @ R_BP)
+    rotor = None if scene.body.motor else scene.body.rotor_along(R_BP)
+    q = quadruple(scene.R_WB0 @ R_BP)
     return PrincipalStart(triple(moments), triple(1 / moments), q, triple(L), turned, field, rotor)
 
 
@@ -112,6 +113,6 @@ def invariant_scales(scene: Scene) -> tuple[float, float]:
     """
     energy, potential = scene.energy_scale, scene.potential
     momentum = largest_momentum(scene.body, energy)
-    if isinstance(potential, Turning):
+    if isinstance(potential, Turning) and not scene.body.motor:
         return jacobi_scale(scene.body, potential, energy), momentum
-    return math.inf if depends_on_time(potential) else energy, momentum
+    return math.inf if depends_on_time(potential) or scene.body.motor else energy, momentum

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, with_balances
 from ..method import Method, Role, Run
+from ..needs import Need
 from ..potentials.turning import Turning
 from ..scene import Scene
 from .bounds import within_round_off
@@ -49,9 +51,7 @@ class Projected(Method):
         colour="teal",
         kernel="projected",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
-        time_dependent=True,
-        loads=True,
-        rotors=True,
+        takes=frozenset(Need),
     )
 
     bounds = within_round_off
@@ -62,8 +62,8 @@ class Projected(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c), grid.dt)
-        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        find = partial(kernel.Coefficients, *DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
+        return prepare_run(scene, grid, label, start, kernel, model, find(grid.dt), find)
 
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:

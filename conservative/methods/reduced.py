@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import with_balances
 from ..method import Method, Role, Run
+from ..needs import LOADS, ROTATION, Need
 from ..potentials.field import into_axes
 from ..scene import Scene
 from ..trajectory import Bounds
@@ -96,8 +97,7 @@ class Reduced(Method):
         colour="blue",
         kernel="reduced",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
-        loads=True,
-        rotors=True,
+        takes=ROTATION | LOADS | {Need.ROTOR},
     )
 
     def __post_init__(self) -> None:
@@ -123,8 +123,8 @@ class Reduced(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
-        coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)
-        return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
+        find = partial(find_coefficients, self.order, self.composition, self.tol)
+        return prepare_run(scene, grid, label, start, kernels("reduced"), model, find(grid.dt), find)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Return the run of free bodies, or bodies in uniform gravity, in lanes; None for others."""

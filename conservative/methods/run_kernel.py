@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from threading import get_ident, main_thread
 from typing import Any
@@ -14,13 +15,25 @@ from ..grid import Grid
 from ..method import Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
+from .pieces import list_pieces, march_pieces
 from .principal_axes import PrincipalStart
 
 _NO_COUNTERS = Counters(0)
 
 
-def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, kernel: Any, model: Any, coefficients: Any) -> Run:
+def prepare_run(
+    scene: Scene,
+    grid: Grid,
+    label: str,
+    start: PrincipalStart,
+    kernel: Any,
+    model: Any,
+    coefficients: Any,
+    find_coefficients: Callable[[float], Any] | None = None,
+) -> Run:
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
+
+    Where a load is not smooth, steps are divided: `find_coefficients` returns the coefficients of a part of a step, s.
 
     `start` turns the samples from principal to body axes. Everything that all calls share is made here, including the arrays q
     and L, because calls of one run do not overlap. With loads, L has four more columns, for `Trajectory.supplied`.
@@ -30,6 +43,8 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     q, L = np.empty((n, 4)), np.empty((n, 7 if loaded else 3))
     bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
     enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
+    if scene.loaded and find_coefficients and len(scene.breaks):
+        enter = partial(march_pieces, list_pieces(grid, scene.breaks.tolist()), kernel, model, find_coefficients, grid)
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
     counters = _NO_COUNTERS

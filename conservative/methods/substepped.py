@@ -11,6 +11,7 @@ from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import Need
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 
@@ -44,9 +45,7 @@ class Substepped(Method):
     card: ClassVar[Card] = Card(
         report=(),
         structure=lambda method: method.inner.card.structure(method.inner),
-        time_dependent=True,  # `unsupported` asks the other method
-        loads=True,
-        rotors=True,
+        takes=frozenset(Need),  # `unsupported` asks the other method
     )
 
     def __post_init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -15,6 +15,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import IN_TIME, ROTATION, Need
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.splittings import SEQUENCES, Lengths, lengths_of
@@ -60,8 +61,7 @@ class Splitting(Method):
         suite=(),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
-        time_dependent=True,
-        rotors=True,
+        takes=ROTATION | IN_TIME | {Need.ROTOR},
     )
     kind: ClassVar[str] = "EXACT"
 
@@ -83,8 +83,6 @@ class Splitting(Method):
     def unsupported(self, scene: Scene) -> str | None:
         if scene.body.rotor_momentum is None:
             return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
-        if self.kind in ("ENDS", "MIDDLE"):
-            return "it is for bodies without a rotor; Splitting() and NoSquish() take one and are symplectic as well"
         return "its sequence needs exact free rotations, which a rotor has not" if self.composition in SEQUENCES else None
 
     @in_own_units
@@ -128,6 +126,7 @@ class Rattle(Splitting):
 
     order: int = 2
 
+    card: ClassVar[Card] = replace(Splitting.card, takes=Splitting.card.takes - {Need.ROTOR})
     family: ClassVar[str] = "rattle"
     kind: ClassVar[str] = "ENDS"
 

@@ -19,6 +19,7 @@ from ..errors import BadInput, IntegrationFailed, NotConverged
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, momentum_W
 from ..method import Method, Role, Run
+from ..needs import ROTATION, Need
 from ..potentials.field import FieldPotential, into_axes, to_tuples
 from ..potentials.turning import Orbit, Turning, static_part
 from ..potentials.uniform_gravity import UniformField
@@ -113,8 +114,7 @@ class Taylor(Method):
         colour="#7B61FF",
         kernel="taylor",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
-        time_dependent=True,
-        rotors=True,
+        takes=ROTATION - {Need.FUNCTION} | {Need.TURNING, Need.ROTOR},
     )
 
     def __init__(self, order: int | None = None, tolerance: float | None = None) -> None:

@@ -13,6 +13,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
+from ..needs import IN_TIME, ROTATION
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4
@@ -68,7 +69,7 @@ class Textbook(Method):
         suite=(),
         kernel="textbook",
         structure=lambda method: Structure(method.scheme == "generalized_alpha" and method.rho == 1, symplectic=False),
-        time_dependent=True,
+        takes=ROTATION | IN_TIME,
     )
 
     def __post_init__(self) -> None:

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import monotonic
-from typing import Any
 
 import numpy as np
 
@@ -74,7 +73,7 @@ Observe = Callable[[Method, Grid], None]
 class Trials:
     """Trial runs of a scene.
 
-    `known` are the estimates so far, shared by all scenes of the same content. `observe` is called before each run.
+    `known` are the estimates so far, shared by all scenes with the same key. `observe` is called before each run.
     """
 
     scene: Scene
@@ -106,31 +105,13 @@ class Trials:
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
     """Return the trial runs of a scene, including cached ones; `progress` is called as `integrate` describes."""
-    try:
-        known = recall(content_of(scene))
-    except TypeError:  # a field that cannot be hashed
-        known = recall(scene)
-    return Trials(scene, known, (lambda method, grid: None) if progress is None else throttle(progress))
+    return Trials(scene, recall(scene.key), (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)
-def recall(content: object) -> Known:
-    """Return the estimates for a scene's content: the same dictionary each time."""
+def recall(key: str) -> Known:
+    """Return the estimates for scenes with a key (`Scene.key`): the same dictionary each time."""
     return {}
-
-
-def content_of(scene: Scene) -> tuple[Any, ...]:
-    """Return everything that trial runs of a scene depend on, as a hashable value."""
-    return tuple(map(hashable, (scene.body, scene.R_WB0, scene.w_WB_B0, scene.potential, scene.dt)))
-
-
-def hashable(value: Any) -> Any:
-    """Return an array or a frozen dataclass as a tuple of numbers, and anything else unchanged."""
-    if isinstance(value, np.ndarray):
-        return value.shape, value.dtype.str, value.tobytes()
-    if is_dataclass(value) and not isinstance(value, type) and type(value).__dataclass_params__.frozen:  # type: ignore[attr-defined]
-        return type(value), *(hashable(getattr(value, field.name)) for field in fields(value))
-    return value
 
 
 def throttle(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:

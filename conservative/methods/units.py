@@ -24,6 +24,7 @@ from ..check import read_only, replace_unchecked
 from ..grid import Grid
 from ..method import Method, Run
 from ..potentials.potential import depends_on_time
+from ..potentials.smoothness import Smoothness
 from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -54,15 +55,17 @@ class Units:
         energy, potential = self.moment / self.time / self.time, cast(Any, scene.potential)
         if potential is not None:
             potential = potential.in_units(energy, self.time) if depends_on_time(potential) else potential.in_units(energy)
-        rotor, flight = scene.body.rotor_momentum, scene.flight
+        rotor, motor, flight = scene.body.rotor_momentum, scene.body.motor, scene.flight
         if flight is not None:
             mass, g, v_WB0 = flight.mass / self.moment, flight.g * self.time**2, read_only(flight.v_WB0 * self.time)
             flight = replace_unchecked(flight, mass=mass, g=g, v_WB0=v_WB0)
         if rotor is not None:
             rotor = read_only(rotor / self.moment * self.time)
-        return replace_unchecked(
+        motor = motor and motor.in_units(self.moment / self.time, self.time)
+        inertia = read_only(scene.body.inertia / self.moment)
+        converted = replace_unchecked(
             scene,
-            body=replace_unchecked(scene.body, inertia=read_only(scene.body.inertia / self.moment), rotor_momentum=rotor),
+            body=replace_unchecked(scene.body, inertia=inertia, rotor_momentum=rotor, motor=motor),
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
             t_end=scene.t_end / self.time,
             potential=potential,
@@ -72,6 +75,11 @@ class Units:
             extra_invariants=(),
             flight=flight,
         )
+        if scene.loads:  # found once
+            jumps, step, interval = scene.smoothness
+            known = Smoothness(jumps / self.time, step / self.time, (interval[0] / self.time, interval[1] / self.time))
+            vars(converted)["smoothness"] = known
+        return converted
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""

@@ -25,12 +25,15 @@ class Callback:
     def __init__(self, potential: Any) -> None:
         self.potential, self.last = potential, threading.local()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Callback, (self.potential,)
+
     def __call__(self, what: int, address: int) -> None:
         buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         known, outputs = getattr(self.last, "pair", (b"", buffer))
         if inputs != known:  # residual and tangent of one iteration need the same
-            functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping)
+            functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping, _wheel)
             with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
                 outputs = functions[what](self.potential, buffer[:9].reshape(3, 3).copy(), buffer[9:N_INPUTS].copy())
             self.last.pair = inputs, outputs  # at once: an interrupt may come anywhere
@@ -49,12 +52,22 @@ def _energy(potential: Any, R_BP: Array, state: Array) -> Array:
 
 def _torques(torque: Any, R_BP: Array, state: Array) -> Array:
     """Return the torque in body and in world axes, one of which is 0."""
-    found = torque.at(float(state[0]))
+    found = _value(torque, R_BP, state)
     return np.concatenate([found @ R_BP, np.zeros(3)] if torque.frame == "body" else [np.zeros(3), found])
 
 
-def _damping(factor: Any, matrix: Array, state: Array) -> Array:
-    return factor.at(float(state[0])) * matrix.ravel()
+def _damping(damping: Any, R_BP: Array, state: Array) -> Array:
+    return (R_BP.T @ _value(damping, R_BP, state) @ R_BP).ravel()
+
+
+def _wheel(rotor: Any, R_BP: Array, state: Array) -> Array:
+    return np.asarray(_value(rotor, R_BP, state) @ R_BP)
+
+
+def _value(load: Any, R_BP: Array, state: Array) -> Any:
+    """Return the value of a load at the time, in the window and at the attitude of a state; the latter may be absent."""
+    t, first, last = state[:3].tolist()
+    return load.at(t, _attitude(R_BP, state[3:]) if state[3:7].any() else None, (first, last))
 
 
 def _body_torque(potential: Any, R_BP: Array, state: Array) -> Array:

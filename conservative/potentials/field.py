@@ -31,6 +31,7 @@ import numpy as np
 
 from ..arithmetic import times
 from ..attitude import Array
+from ..needs import Need, Needs
 from .varied import Varied
 
 
@@ -39,6 +40,8 @@ class FieldPotential(ABC):
 
     NUMBERS: ClassVar[tuple[str, ...]]
     """Names of the attributes that `build_field` takes."""
+    needs: ClassVar[Needs] = frozenset({Need.FIELD})
+    """What a scene with it needs from a method."""
 
     @staticmethod
     @abstractmethod

@@ -12,6 +12,7 @@ from ..arithmetic import add, apply, cross, dot, fuse, halfway, in_body, scale, 
 from ..attitude import Array
 from ..body import RigidBody
 from ..check import positive_number, replace_unchecked, set_fields, unit_vector
+from ..needs import Need, Needs
 from .field import FieldPotential
 
 
@@ -135,6 +136,7 @@ class GravityGradient(FieldPotential):
         """Return 3 rate^2, 1/s^2: the factor of u x J u."""
         return 3 * self.rate**2
 
+    needs: ClassVar[Needs] = frozenset({Need.GRADIENT})
     NUMBERS: ClassVar[tuple[str, ...]] = ("rate", "inertia", "direction_W")
 
     @staticmethod

@@ -15,6 +15,7 @@ from ..arithmetic import cosine, product, scale, sine
 from ..attitude import Array, from_quaternion, triple
 from ..check import describe, positive_number, replace_unchecked, set_fields, unit_vector
 from ..errors import BadInput
+from ..needs import Need, Needs, needs_of
 from .gravity_gradient import GravityGradient
 from .potential import Potential, depends_on_time
 
@@ -143,6 +144,11 @@ class Turning:
         if not isinstance(orbit, Orbit):
             raise BadInput("orbit", describe(orbit), "an Orbit")
         set_fields(self, potential=potential, orbit=orbit)
+
+    @property
+    def needs(self) -> Needs:
+        """What a scene with it needs."""
+        return needs_of(self.potential) | {Need.TURNING}
 
     def in_orbit(self, R_WB: Array, t: Array) -> Array:
         """Return R_OB, (..., 3, 3), of attitudes (..., 3, 3) at times (...), s."""

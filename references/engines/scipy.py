@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -16,7 +18,8 @@ from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.units import in_own_units
-from conservative.potentials.load import load_field
+from conservative.needs import Need
+from conservative.potentials.load import Window, load_field
 from conservative.potentials.potential import torque_W
 from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
@@ -68,9 +71,7 @@ class SciPy(Method):
         report=("",),
         suite=("rtol=1e-9",),
         colour="orange",
-        time_dependent=True,
-        loads=True,
-        rotors=True,
+        takes=frozenset(Need) - {Need.FLIGHT},
     )
 
     def __post_init__(self) -> None:
@@ -90,30 +91,83 @@ class SciPy(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
-        axes, derivative = principal_axes(scene), state_derivative(scene)
-        start = np.concatenate([axes.q0, axes.w0])
+        axes = principal_axes(scene)
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         atol = self.rtol * np.repeat([1.0, rate_scale], [4, 3])
-        span = (0.0, float(grid.t[-1]))
-
         solver = _count_steps(getattr(integrate, self.integrator))
+        pieces = list_derivatives(scene, float(grid.t[-1]))
 
         def run() -> Trajectory:
             solver.steps = 0
-            if not np.isfinite(derivative(0.0, start)).all():  # SciPy would look for a first step for ever
-                return finish(start[None], Counters(0))
-            try:
-                with np.errstate(all="ignore"):  # a diverging run is reported by its status
-                    solution = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
-            except (ArithmeticError, ValueError) as error:  # implicit solvers refuse matrices that are not finite or singular
-                return finish(start[None], Counters(solver.steps), str(error))
-            y = np.reshape(solution.y, (7, -1))  # SciPy returns an empty list if the first step failed
-            return finish(y.T, Counters(solver.steps, evaluations=int(solution.nfev)), solution.message)
-
-        def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
-            return axes.trajectory(grid, self.label, States(QUATERNION, y[None]), work, *reason)
+            with np.errstate(all="ignore"):  # a diverging run is reported by its status
+                y, evaluations, reason = solve_pieces(scene, pieces, grid.t, solver, self.rtol, atol)
+            work = Counters(solver.steps, evaluations=evaluations)
+            return axes.trajectory(grid, self.label, States(QUATERNION, y[None]), work, *([reason] if reason else []))
 
         return run
+
+
+Pieces = list[tuple[float, float, Derivative]]
+
+
+def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0) -> Pieces:
+    """Return the times, s, between which a scene is smooth, from its start to its end, and the derivative between each two."""
+    inner = scene.breaks[(scene.breaks > t_start) & (scene.breaks < t_end)].tolist()
+    ends = [t_start, *inner, t_end]
+    edges = [-math.inf, *scene.breaks.tolist(), math.inf]
+    first = int(np.searchsorted(scene.breaks, t_start, side="right"))
+    windows = list(pairwise(edges))[first:]
+    return [(a, b, state_derivative(scene, window)) for (a, b), window in zip(pairwise(ends), windows, strict=False)]
+
+
+def solve_pieces(
+    scene: Scene,
+    pieces: Pieces,
+    t: Array,
+    solver: Any = "DOP853",
+    rtol: float = _SMALLEST_RTOL,
+    atol: Any = _SMALLEST_RTOL,
+) -> tuple[Array, int, str]:
+    """Return states (n, 7), a quaternion and rates in principal axes, at increasing times t (n,), s, from SciPy's `solve_ivp`.
+
+    `pieces` are those of `list_derivatives`: the solver starts again in each. The integrated rates are J^-1 (J w + h): a motor
+    changes h, but not the sum. Return also the number of evaluations, and the reason if the states end early.
+    """
+    solve_ivp = load("scipy.integrate", "scipy", "SciPy").solve_ivp
+    axes, found, evaluations, reason = principal_axes(scene), [], 0, ""
+    wheel = wheel_rates(scene)
+    y = np.concatenate([axes.q0, axes.w0 + wheel(pieces[0][0])])
+    longest = scene.smoothness.step if scene.loads else math.inf
+    for a, b, derivative in pieces:
+        last = b == pieces[-1][1]
+        some = t[(t >= a) & ((t < b) | last)]
+        if not np.isfinite(derivative(a, y)).all():  # SciPy would look for a first step for ever
+            found.append(y[None][: len(some)])
+            break
+        at = some if last else np.append(some, b)
+        try:
+            solution = solve_ivp(derivative, (a, b), y, solver, at, rtol=rtol, atol=atol, max_step=longest)
+        except (ArithmeticError, ValueError) as error:  # implicit solvers refuse matrices that are not finite or singular
+            found.append(y[None][: len(some)])
+            reason = str(error)
+            break
+        states = np.reshape(solution.y, (7, -1)).T  # SciPy returns an empty list if the first step failed
+        evaluations += int(solution.nfev)
+        found.append(states[: len(some)])
+        if len(states) < len(at):
+            reason = solution.message
+            break
+        y = states[-1]
+    states = np.concatenate(found)
+    if scene.body.motor is not None:
+        states[:, 4:] -= np.array([wheel(each) for each in t[: len(states)].tolist()]).reshape(-1, 3)
+    return states, evaluations, reason
+
+
+def wheel_rates(scene: Scene, window: Window = (-math.inf, math.inf)) -> Callable[[float], Array]:
+    """Return J^-1 h, rad/s, principal axes, as a function of time, s, for a rotor with a motor; 0 without a motor."""
+    axes, motor = principal_axes(scene), scene.body.motor
+    return (lambda t: np.zeros(3)) if motor is None else lambda t: (motor.at(t, None, window) @ axes.R_BF) / axes.J
 
 
 def _count_steps(solver: Any) -> Any:
@@ -131,10 +185,11 @@ def _count_steps(solver: Any) -> Any:
     return counting
 
 
-def state_derivative(scene: Scene) -> Derivative:
-    """Return the derivative of the state, a quaternion, scalar first, and rates in principal axes.
+def state_derivative(scene: Scene, window: Window = (-math.inf, math.inf)) -> Derivative:
+    """Return the derivative of the state between two break points, s: a quaternion, scalar first, and rates in principal axes.
 
-    numba compiles it, apart from the torques of a rotor, of loads and of potentials of Python functions.
+    numba compiles it, apart from the torques of a rotor, of loads and of potentials of Python functions. With a motor the rates
+    of the state are J^-1 (J w + h).
     """
     axes, potential, compiled = principal_axes(scene), scene.potential, compile_derivative()
     field, static = SimpleNamespace(**describe_field(axes)), static_part(potential)
@@ -151,15 +206,18 @@ def state_derivative(scene: Scene) -> Derivative:
         out[4:] += torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J  # type: ignore[arg-type]
         return out
 
-    loads = load_field(None, scene.torque, scene.damping, axes.R_BF)
     of_field = derivative if potential is None or type(static) in FIELDS else through_gradient
-    gyroscopic = hat(axes.rotor) / axes.J[:, None]
+    gyroscopic, wheel = hat(axes.rotor) / axes.J[:, None], wheel_rates(scene, window)
+    if not scene.loaded:
+        return of_field if not gyroscopic.any() else lambda t, y: of_field(t, y) + np.append(np.zeros(4), gyroscopic @ y[4:])
+    loads = load_field(None, scene.torque, scene.damping, axes.R_BF)._replace(clock=(0.0, *window))
 
-    def with_more(t: float, y: Array) -> Array:
-        out = of_field(t, y)
-        out[4:] += gyroscopic @ y[4:]
-        if scene.loaded:
-            out[4:] += np.array(loads.at_time(t).load(y[:4], y[4:])) / axes.J
+    def with_loads(t: float, y: Array) -> Array:
+        turning = wheel(t)
+        w = y[4:] - turning
+        out = of_field(t, np.concatenate([y[:4], w]))
+        momentum = axes.J * turning if scene.body.motor is not None else axes.rotor
+        out[4:] += (np.cross(momentum, w) + np.array(loads.at_time(t).load(y[:4], w))) / axes.J
         return out
 
-    return with_more if scene.loaded or gyroscopic.any() else of_field
+    return with_loads

@@ -22,13 +22,14 @@ from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import RunMany
 from conservative.methods.units import in_own_units
+from conservative.needs import Need
 from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
 from ..engine import EngineRun, load, principal_axes, unsupported_reason, version
 from .environment import Distribution
-from .plain_numbers import FIELDS, describe, read_many, read_one, take_axes
+from .plain_numbers import FIELDS, NEEDS, describe, read_many, read_one, take_axes
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ class EngineData(Distribution):
     prefix
         Text before the first setting in labels.
     card
-        The engine's `conservative.card.Card`, as a dictionary.
+        The engine's `conservative.card.Card`, as a dictionary; "flight" and "rotors" instead of `takes`: True if it integrates
+        the translation in free flight, and bodies with a rotor.
     """
 
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -109,7 +111,11 @@ def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]
     """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
     data = EngineData(**module.ENGINE)
     family = module.__name__.rpartition(".")[2]
-    described = {"family": family, "data": data, "adapter": module, "card": Card(**data.card, time_dependent=True)}
+    words = {"flight": Need.FLIGHT, "rotors": Need.ROTOR}
+    takes = {need for kind in FIELDS if kind.__name__ in data.fields for need in NEEDS[kind]}
+    takes |= {need for word, need in words.items() if data.card.get(word)}
+    card = Card(**{name: value for name, value in data.card.items() if name not in words}, takes=frozenset(takes))
+    described = {"family": family, "data": data, "adapter": module, "card": card}
     described |= {"__module__": module.__name__, "__doc__": module.__doc__}
     if "precision" not in data.settings:
         described["precision"] = data.precision

@@ -13,6 +13,7 @@ from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.methods.many import Block
 from conservative.methods.units import SI, find_units
+from conservative.needs import Need, Needs
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction
 from conservative.potentials.turning import Turning, static_part
@@ -35,6 +36,9 @@ FIELDS: dict[type, tuple[str, ...]] = {
     GravityGradient: ("gradient", "direction"),
 }
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
+
+NEEDS: dict[type, Needs] = {kind: frozenset({Need.TURNING}) if kind is Turning else kind.needs for kind in FIELDS}
+"""What these fields need."""
 
 
 def describe_field(axes: EngineAxes) -> dict[str, Any]:

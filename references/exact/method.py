@@ -22,6 +22,7 @@ from conservative.grid import Grid
 from conservative.invariants import axial_direction
 from conservative.method import Method, Role, Run
 from conservative.methods.bounds import within_round_off
+from conservative.needs import Need
 from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
@@ -129,7 +130,7 @@ class Exact(Method):
     role: ClassVar[Role] = Role.TRUTH
     order = None
     conserves = frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
-    card: ClassVar[Card] = Card(report=(), colour="black")
+    card: ClassVar[Card] = Card(report=(), colour="black", takes=frozenset({Need.GRAVITY, Need.FLIGHT}))
 
     bounds = within_round_off
 

@@ -1,0 +1,70 @@
+"""What a scene needs from a method, an engine, a closed form or a command, and which of it they take.
+
+Each part of a scene declares its members of `Need` in its attribute `needs`, and `Scene.needs` collects them. A method declares
+in `Card.takes` what it takes. `lacking` compares the two: nothing is computed with a part left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+from functools import lru_cache
+from typing import Any
+
+
+class Need(StrEnum):
+    """A part of a scene that changes its equations of motion; its value names it in messages."""
+
+    GRAVITY = "uniform gravity"
+    SPRING = "a spring"
+    ATTRACTION = "a point attraction"
+    GRADIENT = "a gravity gradient"
+    FIELD = "a compiled field of a user"
+    FUNCTION = "a potential of Python functions"
+    TURNING = "a turning field"
+    TIME = "a potential that depends on time"
+    ROTOR = "a rotor"
+    MOTOR = "a rotor with a motor"
+    TORQUE = "a torque"
+    DAMPING = "a damping"
+    ATTITUDE = "a torque or damping that depends on the attitude"
+    FLIGHT = "free flight"
+
+
+Needs = frozenset[Need]
+FIELDS: Needs = frozenset({Need.GRAVITY, Need.SPRING, Need.ATTRACTION, Need.GRADIENT, Need.FIELD, Need.FUNCTION})
+"""All potentials that depend on the attitude only."""
+IN_TIME: Needs = frozenset({Need.TURNING, Need.TIME})
+LOADS: Needs = frozenset({Need.TORQUE, Need.DAMPING, Need.MOTOR})
+"""Parts that act beside the potential and may depend on time."""
+ROTATION: Needs = FIELDS | {Need.FLIGHT}
+"""What a method takes that integrates the rotation in any field: in free flight the position follows from it."""
+
+
+def needs_of(part: Any) -> Needs:
+    """Return what a part of a scene needs; a user's potential without the attribute `needs` is of Python functions."""
+    if part is None:
+        return frozenset()
+    own: Needs = getattr(part, "needs", frozenset({Need.FUNCTION}))
+    return own | {Need.TIME} if getattr(part, "time_dependent", False) and Need.TURNING not in own else own
+
+
+def lacking(takes: Needs, needs: Needs) -> str | None:
+    """Return the reason why a scene with these needs is not supported, with the methods and engines that do; None if it is."""
+    missing = needs - takes
+    return _reason(missing, needs) if missing else None
+
+
+@lru_cache(maxsize=256)
+def _reason(missing: Needs, needs: Needs) -> str:
+    from . import registry  # the list of methods imports this module
+
+    able = [name for name, card in registry.list_cards().items() if needs <= card.takes]
+    advice = f"these take the whole scene: {join(able)}" if able else "no method or engine takes the whole scene"
+    return f"it does not take {join([each.value for each in Need if each in missing])}; {advice}"
+
+
+def join(names: Iterable[str]) -> str:
+    """Return names as a list in a sentence."""
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last

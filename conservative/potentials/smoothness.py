@@ -1,0 +1,85 @@
+"""Where functions of time are not smooth, and which steps resolve them.
+
+The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps between two of them are found by bisection;
+steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the sum over all
+times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be missed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..attitude import Array
+
+SCANNED = 2**16
+"""Number of intervals of a scan."""
+AGREED = 1e-3
+"""Largest difference of both integrals, relative to the integral of the magnitude."""
+STEEP, MOST_JUMPS = 10.0, 1000
+"""An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
+
+
+class Smoothness(NamedTuple):
+    """Times (n,) of jumps, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
+
+    jumps: Array
+    step: float
+    interval: tuple[float, float]
+
+
+def examine(functions: Sequence[Callable[[float], Array]], t_end: float, breaks: Array) -> Smoothness:
+    """Return the smoothness of functions from 0 to t_end, s, apart from their known break points (n,), s."""
+    jumps, step, interval = [breaks[:0]], math.inf, (0.0, t_end)
+    times = np.linspace(0.0, t_end, SCANNED + 1)
+    for function in functions:
+        try:
+            values = np.array([function(t) for t in times.tolist()], dtype=float).reshape(SCANNED + 1, -1)
+        except Exception:  # the run reports a function that fails
+            continue
+        found = np.array(_find_jumps(function, times, values))
+        resolved, where = _resolve(times, values, np.concatenate([breaks, found]))
+        jumps.append(found)
+        if resolved < step:
+            step, interval = resolved, where
+    return Smoothness(np.unique(np.concatenate(jumps)), step, interval)
+
+
+def _find_jumps(function: Callable[[float], Array], times: Array, values: Array) -> list[float]:
+    change = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    around = np.minimum(np.append(change[1], change[:-1]), np.append(change[1:], change[-2]))
+    steep = np.flatnonzero(change > STEEP * around + 1e-9 * np.abs(values).max())
+    jumps = []
+    for i in steep.tolist() if len(steep) <= MOST_JUMPS else ():
+        a, b, low, high = times[i], times[i + 1], values[i], values[i + 1]
+        while (middle := (a + b) / 2) not in (a, b):
+            value = np.ravel(function(float(middle)))
+            if np.linalg.norm(value - low) > np.linalg.norm(high - value):
+                b, high = middle, value
+            else:
+                a, low = middle, value
+        if np.linalg.norm(high - low) > change[i] / 4:
+            jumps.append(float(b))
+    return jumps
+
+
+def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[float, float]]:
+    """Return the longest block that Simpson's rule integrates, s, and the block with the largest difference of the next one."""
+    total, step = float(np.abs(values).mean(axis=0).max()), float(times[1])
+    size, result = 2, (step, (0.0, float(times[-1])))
+    while size <= SCANNED:
+        blocks = values[:-1].reshape(-1, size, values.shape[1])
+        ends = np.concatenate([blocks[1:, 0], values[-1:]])
+        dense = blocks.mean(axis=1) + (ends - blocks[:, 0]) / (2 * size)
+        rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
+        off = np.abs(rule - dense).max(axis=1)
+        for side in ("left", "right"):  # a break point between two blocks is part of both
+            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0  # type: ignore[call-overload]
+        if off.mean() > AGREED * total:
+            worst = int(off.argmax())
+            return result[0], (float(times[worst * size]), float(times[(worst + 1) * size]))
+        result, size = (size * step, result[1]), 2 * size
+    return math.inf, result[1]
