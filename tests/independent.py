@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,20 +75,37 @@ def potential_of(kind: str, *numbers: Any, turning: tuple[float, Any] | None = N
     """Return a field of the package."""
     made: Any
     if kind == "quartic":
-        size, b, a, share, rate = (np.asarray(each, dtype=float) for each in numbers)
-
-        def strength(*t: float) -> Any:
-            return size * (1.0 + share * np.sin(rate * t[0])) if t else size
-
-        made = cv.FunctionPotential(
-            lambda R, *t: strength(*t) * (a @ R @ b) ** 4 / 4,
-            lambda R, *t: strength(*t) * (a @ R @ b) ** 3 * np.outer(a, b),
-            time_dependent=bool(share),
-        )
+        size, point, direction, *wave = numbers
+        law = Quartic(size, np.asarray(point), np.asarray(direction), *wave)
+        made = cv.FunctionPotential(law.energy, law.gradient, time_dependent=bool(law.share))
     else:
         kinds = {"gravity": cv.UniformGravity, "spring": cv.LinearSpring, "attraction": cv.PointAttraction}
         made = {**kinds, "gradient": cv.GravityGradient}[kind](*numbers)
     return made if turning is None else cv.Turning(made, cv.Orbit(*turning))
+
+
+@dataclass(frozen=True, eq=False)
+class Quartic:
+    """Functions of a potential of the package, which can be pickled."""
+
+    size: float
+    point: Any
+    direction: Any
+    share: float = 0.0
+    rate: float = 0.0
+
+    def strength(self, *t: float) -> float:
+        """Return s, J/m^4."""
+        return self.size * (1.0 + self.share * float(np.sin(self.rate * t[0]))) if t else self.size
+
+    def energy(self, R: Any, *t: float) -> Any:
+        """Return V, J."""
+        return self.strength(*t) * (self.direction @ R @ self.point) ** 4 / 4
+
+    def gradient(self, R: Any, *t: float) -> Any:
+        """Return dV/dR, J."""
+        x = self.direction @ R @ self.point
+        return self.strength(*t) * x**3 * np.outer(self.direction, self.point)
 
 
 def cross(a: Any, b: Any) -> Any:
@@ -176,11 +194,11 @@ def load_torque(case: Case, t: Any, R: Any, w: Any, middle: float) -> Any:
     return T
 
 
-def smooth_ends(case: Case) -> list[float]:
-    """Return the times at which a part is not smooth."""
+def smooth_ends(case: Case, until: float) -> list[float]:
+    """Return the times at which a part is not smooth; a table is held after its end."""
     given = (case.rotor, case.torque, case.factor)
     tables = [np.asarray(each[0], dtype=float) for each in given if is_table(each)]
-    return sorted({float(t) for t in np.concatenate([*tables, case.breaks]) if 0 < t < case.t_end})
+    return sorted({float(t) for t in np.concatenate([*tables, case.breaks]) if 0 < t < until})
 
 
 def inverse_of(J: Any) -> Any:
@@ -219,11 +237,12 @@ def motion(case: Case, times: ArrayLike, solver: Solver | None = None) -> tuple[
 
         return slope
 
-    ends = [0.0, *smooth_ends(case), case.t_end]
+    until = max(case.t_end, at[-1])
+    ends = [0.0, *smooth_ends(case, until), until]
     w0 = np.asarray(case.w0, dtype=number)
     y = np.concatenate([quaternion_of(R0), J @ w0 + rotor(number(0), R0, ends[1] / 2)])
     found: list[tuple[Any, Any]] = []
-    for start, end in zip(ends, [*ends[1:-1], max(case.t_end, at[-1])], strict=False):
+    for start, end in pairwise(ends):
         inside = at[(at >= start) & (at < end)] if end < at[-1] else at[(at >= start) & (at <= end)]
         with np.errstate(over="ignore", invalid="ignore"):
             states = solve(slope_in(start, end), start, y, [*inside, end])

@@ -6,7 +6,7 @@ initial motion: a torque changes it within a radian or so. A `THEME` is what a s
 table       torques with corners, jumps and short pulses
 stiff       damping that stops the body in a thousandth to a thirtieth of the run, and a torque that drives it
 rotor       a rotor whose momentum is up to 300 times that of the body
-motor table, motor function      a rotor that is accelerated
+motor table, motor function      a rotor that is accelerated; no motor makes a jump of its momentum
 needle      moments up to 1e5 apart
 units       masses of 1e-18 to 1e18 and times of 1e-6 to 1e6
 turning     a field that turns
@@ -76,9 +76,9 @@ class Draw:
             times += [start, start, start + width, start + width]
         return np.sort([*times, t_end * (1 if self.chance(0.5) else self.random.uniform(1, 2))])
 
-    def table(self, t_end: float, start: Any, size: float) -> Any:
-        """Return a table of vectors, and sometimes 0 between two jumps."""
-        times = self.times(t_end)
+    def table(self, t_end: float, start: Any, size: float, jumps: bool = True) -> Any:
+        """Return a table of vectors about `start`, and sometimes equal to it."""
+        times = self.times(t_end) if jumps else np.unique(self.times(t_end))
         values = start + size * self.random.normal(size=(len(times), 3))
         values[self.random.random(size=len(times)) < 0.2] = start
         return times, values
@@ -148,7 +148,7 @@ def add_rotor(draw: Draw, case: Case, theme: str, size: float, rate: float) -> C
     start = draw.vector(size)
     kind = theme if theme.startswith("motor") else ("", "", "motor table", "motor function")[draw.random.integers(4)]
     if kind == "motor table":
-        return replace(case, rotor=draw.table(case.t_end, start, 0.5 * size))
+        return replace(case, rotor=draw.table(case.t_end, start, 0.5 * size, jumps=False))
     if kind == "motor function":
         return replace(case, rotor=draw.wave(start, draw.vector(0.7 * size), rate * draw.between(0.2, 2)))
     return replace(case, rotor=start)
