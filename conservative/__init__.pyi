@@ -9,6 +9,7 @@ from .errors import BadInput as BadInput
 from .errors import Diverged as Diverged
 from .errors import IntegrationFailed as IntegrationFailed
 from .errors import InvalidResult as InvalidResult
+from .errors import LoadNotResolved as LoadNotResolved
 from .errors import MissingEngine as MissingEngine
 from .errors import MissingExtra as MissingExtra
 from .errors import NotConserved as NotConserved
@@ -41,6 +42,7 @@ from .methods.symplectic import Rattle as Rattle
 from .methods.symplectic import Splitting as Splitting
 from .methods.taylor import Taylor as Taylor
 from .methods.textbook import Textbook as Textbook
+from .needs import Need as Need
 from .outcome import Outcome as Outcome
 from .outcome import OutcomeKind as OutcomeKind
 from .potentials.gravity_gradient import GravityGradient as GravityGradient

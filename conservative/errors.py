@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
@@ -183,13 +184,28 @@ class TorqueFailed(_Error, RuntimeError):
 
 
 class AccuracyNotReached(UserWarning):
-    """Round-off prevents the requested error. Attributes: `error` and `estimate`, rad."""
+    """A requested error is not reached. Attributes: `error`, `estimate` and `rounding`, the effect of round-off alone, rad."""
 
-    def __init__(self, error: float, estimate: float) -> None:
-        self.error, self.estimate = error, estimate
+    def __init__(self, error: float, estimate: float, rounding: float = math.nan) -> None:
+        self.error, self.estimate, self.rounding = error, estimate, rounding
+        cause = "Shorter steps were not tried or did not help"
+        if rounding >= error / 2:
+            cause = f"Rounding the numbers of the scene alone changes this motion by {rounding:.2g} rad"
         super().__init__(
-            f"The error of {error:g} rad is not reached; {estimate:.2g} rad is estimated. Round-off alone causes an error of "
-            "that size on this motion. Ask for a larger error or a shorter t_end"
+            f"The error of {error:g} rad is not reached; {estimate:.2g} rad is estimated. {cause}. "
+            "Ask for a larger error or a shorter t_end"
+        )
+
+
+class LoadNotResolved(UserWarning):
+    """Steps are too long for a function of time. Attributes: `dt`, the longest step, `step`, and the `interval`, all s."""
+
+    def __init__(self, dt: float, step: float, interval: tuple[float, float]) -> None:
+        self.dt, self.step, self.interval = dt, step, interval
+        super().__init__(
+            f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: its "
+            f"integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at which "
+            "the function is not smooth: breaks=(...)"
         )
 
 

@@ -40,8 +40,6 @@ def _refuse(prepare: Callable[[Any, Scene, Grid], Run]) -> Callable[[Any, Scene,
         if reason := method.unsupported(scene):
             got = f"{method.name} for the scene {scene.name!r}"
             raise Unsupported("method", got, f"a scene that it supports ({reason})")
-        for load in scene.loads:
-            load.require_times((grid.n_steps - 1) * grid.dt)
         return prepare(method, scene, grid)
 
     return checked

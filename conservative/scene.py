@@ -129,9 +129,6 @@ class Scene(PickledByFields):
             raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        attitude = rotation("R_WB0", R_WB0)
-        for load in filter(None, (torque, damping and damping.of_time, body.motor)):
-            load.require(end, attitude)  # for its exception
         try:
             given: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
@@ -145,7 +142,7 @@ class Scene(PickledByFields):
             self,
             name=name,
             body=body,
-            R_WB0=attitude,
+            R_WB0=rotation("R_WB0", R_WB0),
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
@@ -157,6 +154,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
+        for load in self.loads:
+            load.require(end, self.R_WB0)  # for its exception
 
     @cached_property
     def needs(self) -> Needs:

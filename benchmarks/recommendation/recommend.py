@@ -81,6 +81,8 @@ def ask(
     """
     positive_number("error", error, "a finite attitude error above 0, rad")
     end = scene.t_end if duration is None else positive_number("duration", duration, "a finite duration above 0, s")
+    for load in scene.loads:
+        load.require_times(end)
     positive_number("cost_limit", cost_limit, "a finite wall time per simulated second above 0, s/s")
     positive_number("time_limit", time_limit, "a finite duration above 0, s")
     engines = list_engines(engine_names)
@@ -320,7 +322,7 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Ou
         probe = None if isinstance(refinement, Outcome) else refinement.best(conditions.target)
         if probe is None or not probe.outcome.ok:
             continue
-        length = RUN_TIME / probe.cost
+        length = min(RUN_TIME / probe.cost, conditions.duration if conditions.scene.loads else math.inf)
         n = max(1, round(length / probe.dt))
         adaptive = tolerance_setting(probe.method) is not None
         grid = Grid(length, 1) if adaptive else Grid(probe.dt, n, n)

@@ -101,7 +101,7 @@ def project_on_sphere(trajectory: Trajectory) -> Array:
     """Return the points (n, 3) of a curve, in units of the sphere's radius at the start."""
     scene = trajectory.scene
     if scene.free:
-        momentum = trajectory.w_WB_B @ scene.body.inertia  # symmetric
+        momentum = scene.body.momentum(trajectory.w_WB_B)
         return np.asarray(momentum @ np.linalg.eigh(scene.body.inertia)[1] / np.linalg.norm(momentum[0]))
     # The traced axis points to the centre of mass; without one it is the third body axis.
     com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)

@@ -13,6 +13,7 @@ import numpy as np
 
 from conservative.attitude import rotation_about
 from conservative.grid import Grid, grid_for
+from conservative.identity import digest
 from conservative.method import Method, Role
 from conservative.potentials.potential import depends_on_time, energy_at
 from conservative.scene import Scene
@@ -94,7 +95,8 @@ class Point:
 
 def define_scene(scene: Scene) -> str:
     """Return a hash of a scene: name, motion, steps and invariants."""
-    return _hash([[scene.name, *(invariant.name for invariant in scene.invariants)], motion_numbers(scene)])
+    loads = [digest(part) for part in (scene.torque, scene.damping, scene.body.motor) if part is not None]
+    return _hash([[scene.name, *(invariant.name for invariant in scene.invariants), *loads], motion_numbers(scene)])
 
 
 def define(words: list[str], values: Iterable[object]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Literal
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
-from ..errors import BadInput, Unsupported
+from ..errors import BadInput, LoadNotResolved, Unsupported
 from ..grid import MOST_STEPS, grid_for
 from ..method import Method
 from ..methods.automatic import integrate_to_error
@@ -30,6 +31,12 @@ def require_support(method: Method, scene: Scene) -> None:
     reason = method.unsupported(scene)
     if reason:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
+
+
+def warn_of_loads(scene: Scene, method: Method, dt: float) -> None:
+    """Warn if fixed steps, s, are too long for a function of time; adaptive methods are told the longest step."""
+    if scene.loads and method.order is not None and dt > scene.smoothness.step:
+        warnings.warn(LoadNotResolved(dt, *scene.smoothness[1:]), stacklevel=3)
 
 
 _REDUCED = Reduced()
@@ -99,6 +106,8 @@ def integrate(
         The method needs an engine that is not installed.
     Unsupported
         The method does not support the scene.
+    LoadNotResolved
+        A warning: the steps are too long for a torque, damping or motor that is a function of time without `breaks`.
     NotConverged
         The equations of a step could not be solved.
     Diverged
@@ -127,6 +136,7 @@ def integrate(
             method = read_method(method, scene)
             grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
+            warn_of_loads(scene, method, grid.dt)
             if at is None:
                 trajectory = method.solve(scene, grid)
             else:
@@ -149,7 +159,10 @@ def interrupt_of(failure: SystemError) -> BaseException:
 
 def read_end(scene: Scene, t_end: float | None) -> float:
     """Return the duration of a run, s; the scene's if t_end is None."""
-    return scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    for load in scene.loads:
+        load.require_times(end)
+    return end
 
 
 def read_target(

@@ -21,8 +21,9 @@ from .vector import add, apply, cross, dot, in_body, inverse, product, scale, su
 FAILURE = "no solution within 100 corrections"  # of generalised-alpha
 PAUSE = 2**13  # steps between two calls of handlers of signals
 MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC = range(5)
-ROUND_OFF, REST = 1e-30, 1e-4
-"""Squared correction, relative to squared accelerations and REST, that counts as none."""
+ROUND_OFF, NEARLY, REST = 1e-30, 1e-20, 1e-4
+"""The solver stops at the first squared correction, relative to squared accelerations and REST, or where corrections below the
+second no longer shrink. Round-off is larger for long and thin bodies: it grows with the ratio of their moments."""
 
 
 class Coefficients(NamedTuple):
@@ -90,18 +91,18 @@ def alpha_step(alpha, h, t, J, field, q, w, rate, a):
     The unknown is w' at the end. Newton's tangent contains the gyroscopic torque only: the field's part is smaller by h.
     """
     alpha_m, alpha_f, beta, gamma = alpha
-    share, x, corrections, size = (1.0 - alpha_f) / (1.0 - alpha_m), rate, 0, math.inf
+    share, x, corrections, last, size = (1.0 - alpha_f) / (1.0 - alpha_m), rate, 0, math.inf, math.inf
     while True:
         a1 = add(scale(share, x), scale(1.0 / (1.0 - alpha_m), subtract(scale(alpha_f, rate), scale(alpha_m, a))))
         w1 = add(w, scale(h, add(scale(1.0 - gamma, a), scale(gamma, a1))))
         q1 = product(q, exponential(scale(h, add(w, scale(h, add(scale(0.5 - beta, a), scale(beta, a1)))))))
-        if size <= ROUND_OFF or corrections == 100:
+        if size <= ROUND_OFF or (last <= NEARLY and size >= last) or corrections == 100:
             return q1, w1, x, a1, corrections, size
         corrections += 1
         L1 = times(J, w1)
         defect = subtract(times(J, x), add(cross(L1, w1), torque(field, t + h, q1)))
         correction = apply(inverse(gyroscopic_tangent(J, gamma * h * share, w1, L1)), defect)
-        x = subtract(x, correction)
+        x, last = subtract(x, correction), size
         size = dot(correction, correction) / (dot(x, x) + dot(w1, w1) * dot(w1, w1) + REST)
 
 
@@ -143,7 +144,7 @@ def march(model, coefficients, workspace):
             elif scheme == GENERALIZED_ALPHA:
                 q, w, rate, a, more, size = alpha_step(alpha, h, t, J, field, q, w, rate, a)
                 L, corrections = times(J, w), corrections + more
-                if not size <= ROUND_OFF:
+                if not size <= NEARLY:
                     return Result(step - 1, step - 1, corrections, None, math.sqrt(size), False)
             elif scheme == BUSS:
                 q, L = buss_step(h, t, J_inverse, field, q, L)

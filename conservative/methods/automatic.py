@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..trajectory import Choice, Trajectory
 from .between import SampleTimes, divide_step, sample_between, spread
 from .search import even_grid, find_cheapest, step_factor, stops_falling
-from .trials import ASYMPTOTIC, Estimate, trials_of
+from .trials import ASYMPTOTIC, Estimate, parts_for, trials_of
 
 ATTEMPTS = 12
 MOST_STEPS = 10**10
@@ -41,25 +41,27 @@ def integrate_to_error(
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
-    best: tuple[float, Grid, Trajectory | None] | None = None  # smallest error, its grid, and its trajectory unless remembered
+    best: tuple[Estimate, Grid, Trajectory | None] | None = (
+        None  # smallest error, its grid, and its trajectory unless remembered
+    )
 
     def estimate(grid: Grid) -> Estimate:
         nonlocal best
         known, trajectory = trials.estimate(method, grid, sensitivity=True)
-        if best is None or known.total <= best[0]:
-            best = known.total, grid, trajectory
+        if best is None or known.total <= best[0].total:
+            best = known, grid, trajectory
         return known
 
     dt = dt if samples.at is None else divide_step(scene, method, dt)
-    attempts = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples), estimate)
+    attempts = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples, parts_for(scene)), estimate)
     assert best is not None  # `cut_step` has estimated a run
-    total, grid, trajectory = best
-    choice = Choice(method, grid.dt, error, total, attempts)
+    estimated, grid, trajectory = best
+    choice = Choice(method, grid.dt, error, estimated.total, attempts)
     trajectory = method.solve(scene, grid) if trajectory is None else trajectory
     if samples.at is not None:
         trajectory = sample_between(trajectory, method, grid, samples.at)
     if trajectory.ok and not choice.reached:
-        warnings.warn(AccuracyNotReached(error, total), stacklevel=3)
+        warnings.warn(AccuracyNotReached(error, estimated.total, estimated.sensitivity or 0.0), stacklevel=3)
     return replace(trajectory, choice=choice)
 
 
@@ -89,19 +91,19 @@ def cut_step(
             return attempts
 
 
-def grid_of(dt: float, t_end: float, samples: SampleTimes) -> Grid:
-    """Return a grid of an even number of steps of at most dt to t_end, both in s, that contains the samples.
+def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Grid:
+    """Return a grid of a multiple of `parts` steps of at most dt to t_end, both in s, that contains the samples.
 
     Raise `BadInput` if there are more than `MOST_STEPS` steps, or the samples do not fit in memory.
     """
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"one that takes {t_end / dt:.3g} steps", f"one that takes at most {MOST_STEPS:g} steps")
     if samples.at is not None:
-        return even_grid(t_end, dt, spread(int(t_end / dt)))
+        return even_grid(t_end, dt, spread(int(t_end / dt)), parts)
     if samples.spacing is None:
         require_memory("sample_every", math.ceil(t_end / dt), samples.every)
-        return even_grid(t_end, dt, samples.every)
-    each = 2 * max(1, math.ceil(samples.spacing / dt / 2 * (1 - 1e-9)))
+        return even_grid(t_end, dt, samples.every, parts)
+    each = parts * max(1, math.ceil(samples.spacing / dt / parts * (1 - 1e-9)))
     n = each * math.ceil(t_end / samples.spacing * (1 - 1e-9))
     require_memory("sample_every", n, min(each * samples.every, n))
     return Grid(samples.spacing / each, n, min(each * samples.every, n))

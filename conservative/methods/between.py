@@ -151,7 +151,7 @@ def move(
     q = np.ascontiguousarray(to_quaternion(R[far] @ body.R_BP))
     L = np.zeros((len(far), 7 if scene.loaded else 3))
     L[:, :3] = (w[far] * units.time @ body.R_BP) * body.moments
-    field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
+    field: Any = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
     table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
     now, left, edges = times.copy(), gaps[far] / units.time, np.concatenate([[-math.inf], scene.breaks, [math.inf]])

@@ -23,7 +23,7 @@ from ..errors import MissingEngine
 from ..grid import Grid
 from ..method import Method, Role
 from ..scene import Scene
-from .trials import Trials
+from .trials import Trials, parts_for
 from .units import bound_rate
 
 SAFETY = 0.5
@@ -100,7 +100,8 @@ class Candidate:
 
     def advance(self, trials: Trials) -> Candidate:
         """Return the candidate after a trial run at its next step."""
-        grid = even_grid(self.duration, self.dt, max(1, int(self.duration / self.dt / MOST_COMPARED)))
+        every = max(1, int(self.duration / self.dt / MOST_COMPARED))
+        grid = even_grid(self.duration, self.dt, every, parts_for(trials.scene))
         # The runs differ completely even at short steps. Check if rounding is the reason.
         lost = bool(self.attempts) and self.attempts[-1][1] == math.inf and self.rate * grid.dt < RESOLVED
         trial, _ = trials.estimate(self.method, grid, sensitivity=lost)
@@ -164,6 +165,8 @@ def begin(method: Method, scene: Scene, error: float, t_end: float) -> Candidate
     rate = bound_rate(scene)
     duration = min(t_end, PROBE_RADIANS / rate)
     dt = min(duration / 2, method.card.longest / rate)
+    if scene.loads:
+        dt = min(dt, scene.smoothness.step)
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
     return Candidate(method, error * min(1.0, 4 * duration / t_end), duration, rate, dt)
@@ -207,9 +210,9 @@ def _settings_of(family: type[Method]) -> tuple[Method, ...]:
     return family.settings_for("candidates")
 
 
-def even_grid(t_end: float, dt: float, sample_every: int) -> Grid:
-    """Return a grid of an even number of steps of at most dt up to t_end, both in s."""
-    n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
+def even_grid(t_end: float, dt: float, sample_every: int, parts: int = 2) -> Grid:
+    """Return a grid of a multiple of `parts` steps of at most dt up to t_end, both in s, for runs at twice the step."""
+    n = parts * max(1, math.ceil(t_end / dt / parts * (1 - 1e-9)))
     return Grid(t_end / n, n, min(sample_every, n))
 
 

@@ -25,7 +25,6 @@ from ..deferred_imports import kernels
 from ..errors import BadInput, TorqueFailed
 from ..needs import Need, Needs
 from .callback import find_address
-from .uniform_gravity import UniformField
 
 FRAMES = ("body", "world")
 _TIMES = "two or more times (n,), s, that do not decrease; two equal ones are a jump"
@@ -197,7 +196,7 @@ class OfTime(PickledByFields):
         if isinstance(self.value, tuple):
             times, values = self.value
             i = int(np.searchsorted(times, inside, side="right"))
-            if not 0 < i < len(times):  # outside its times, which only the last step of a run is (`require_times`)
+            if not 0 < i < len(times):  # after the end of the run, for which `require_times` has been called
                 return np.asarray(values[0] if i == 0 else values[-1])
             return np.asarray(values[i - 1] + (t - times[i - 1]) / (times[i] - times[i - 1]) * (values[i] - values[i - 1]))
         try:
@@ -410,15 +409,15 @@ def load_field(
     kernel, rows, zero = kernels("function_field"), tuple(triple(row) for row in R_BP), (0.0, 0.0, 0.0)
     body = world = zero
     call: Any = ()
+    matrix: Any = (zero, zero, zero)
+    resistance: Any = ()
     if torque is not None and torque.constant:
         body, world = (triple(torque.at(0.0) @ R_BP), zero) if torque.frame == "body" else (zero, triple(torque.at(0.0)))
     elif torque is not None:
         call = (kernel.TorquesOfAttitude if torque.of_attitude else kernel.Torques)(find_address(torque), rows)
-    matrix, resistance = (zero, zero, zero), ()
-    if damping is not None and (varying := damping.of_time) is None:
-        matrix = tuple(triple(row) for row in R_BP.T @ damping.at(0.0) @ R_BP)
-    elif damping is not None:
+    if damping is not None and (varying := damping.of_time):
         resistance = (kernel.DampingOfAttitude if varying.of_attitude else kernel.DampingInTime)(find_address(damping), rows)
+    elif damping is not None:
+        matrix = tuple(triple(row) for row in R_BP.T @ damping.at(0.0) @ R_BP)
     wheel = () if motor is None else kernel.Wheel(find_address(motor), rows)
-    beside = UniformField(0.0, 0.0, 0.0) if field is None else field
-    return Loaded(beside, call, body, world, matrix, 0.0, resistance, wheel)
+    return Loaded(field, call, body, world, matrix, 0.0, resistance, wheel)

@@ -77,7 +77,7 @@ def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[f
         rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
         off = np.abs(rule - dense).max(axis=1)
         for side in ("left", "right"):  # a break point between two blocks is part of both
-            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0  # type: ignore[call-overload]
+            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0
         if off.mean() > AGREED * total:
             worst = int(off.argmax())
             return result[0], (float(times[worst * size]), float(times[(worst + 1) * size]))

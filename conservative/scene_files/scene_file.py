@@ -81,10 +81,11 @@ def load(path: str | Path) -> Scene:
     body, mass = _body(top.table("body", "inertia, a shape or another file; `conservative new` shows them"))
     potential = _field(top, body, mass)
     if "rotor" in top:
-        table = top.table("rotor", "momentum (3,), kg m^2/s, body axes")
-        table.only(("momentum",))
+        table = top.table("rotor", "momentum (3,), kg m^2/s, body axes, or times, s, and values")
+        build = _motor if "times" in table else _rotor
+        table.only(keys_of(build))
         with table.blame(rotor_momentum="momentum"):
-            body = RigidBody(body.inertia, table.value("momentum", "three finite numbers (3,), kg m^2/s, body axes"))
+            body = RigidBody(body.inertia, table.call(build))
     R_WB0, w_WB_B0, flight = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
@@ -167,6 +168,14 @@ def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None)
         return table.call(GravityGradient, inertia=body.inertia)
     table.only(known)
     return table.call(_POTENTIALS[kind])
+
+
+def _rotor(momentum: ArrayLike) -> ArrayLike:
+    return momentum
+
+
+def _motor(times: ArrayLike, values: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+    return times, values
 
 
 def _torque_table(times: ArrayLike, values: ArrayLike, frame: str = "body") -> Torque:

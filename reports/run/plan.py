@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, many_runs, price, random, selection, studies, throughput
@@ -28,6 +28,7 @@ class Plan:
     """The plan of a report: what is compared, and the studies in the order of measurement.
 
     Engines have studies and a section of their own. `bodies` is the number of random bodies in each field, `seed` their seed.
+    `arguments` are the texts from which commands make the scenes, such as their files, by the names of the scenes.
     """
 
     scenes: tuple[Scene, ...]
@@ -40,6 +41,7 @@ class Plan:
     time_limit: float | None = None
     bodies: int = 0
     seed: int = 0
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def locks(self) -> tuple[LockedEngine, ...]:
@@ -124,4 +126,5 @@ def plan_report(
     if full and bodies and not quick and (many := many_runs.family_settings((*compared, *named))):
         more = {"skip_missing": skip_missing, "time_limit": time_limit, "processes": processes}
         made.append(throughput.throughput_study(many, quick=True, seed=seed, **more))
-    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed)
+    arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
+    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed, arguments)

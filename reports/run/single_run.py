@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import shlex
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
@@ -21,6 +22,7 @@ from conservative.grid import Grid, grid_for
 from conservative.integration.one import integrate, read_method, require_support
 from conservative.invariants import sizes
 from conservative.method import Method
+from conservative.methods.search import candidates
 from conservative.presentation import header
 from conservative.presentation import samples as samples_of
 from conservative.references.exact.method import Exact
@@ -42,6 +44,10 @@ COMPARED = 200
 """Largest number of samples that are compared with the reference solution, evenly chosen."""
 TURNS = 1000.0
 """Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
+LARGE = 0.1
+"""Attitude error, rad, above which a run is called inaccurate and another method or step is looked for."""
+PARTS, MOST_TRIED = (1, 10, 100), 10**6
+"""Parts into which steps are divided in the search for an accurate run, and the largest number of steps of a run there."""
 
 
 def run_once(
@@ -75,14 +81,17 @@ def run_once(
             writer.writerows(samples_of(trajectory).tolist())
         if binary is not None:
             binary.write(trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False))
-    return summarize(trajectory, method, grid.dt) | {"error": find_errors(trajectory, grid, truth)}
+    return summarize(trajectory, method, grid.dt) | {"error": find_errors(trajectory, grid, truth, scene_name, t_end)}
 
 
-def find_errors(trajectory: Trajectory, grid: Grid, wanted: bool | None) -> dict[str, Any]:
+def find_errors(
+    trajectory: Trajectory, grid: Grid, wanted: bool | None, scene_name: str, t_end: float | None
+) -> dict[str, Any]:
     """Return the largest errors against the reference solution, or the reason why there are none.
 
     At most `COMPARED` samples are compared. `attitude` is in rad and `rate` in rad/s. `wanted` None leaves out long runs
-    without closed form (`TURNS`).
+    without closed form (`TURNS`). If the attitude error is above `LARGE`, `better` is the result of `find_better`.
+    `scene_name` and `t_end` are those of the command.
     """
     scene = trajectory.scene
     if wanted is False:
@@ -101,7 +110,46 @@ def find_errors(trajectory: Trajectory, grid: Grid, wanted: bool | None) -> dict
     compared = np.unique([*range(0, len(trajectory), stride), len(trajectory) - 1])
     attitude = angle_between(truth.R_WB, trajectory.R_WB[compared])
     rate = np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[compared], axis=1)
-    return {"attitude": float(attitude.max()), "rate": float(rate.max()), "samples": len(compared), "truth": truth.label}
+    errors = {"attitude": float(attitude.max()), "rate": float(rate.max()), "samples": len(compared), "truth": truth.label}
+    better = {} if attitude.max() <= LARGE else {"better": find_better(truth, grid, stride, scene_name, t_end)}
+    return errors | better
+
+
+def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_end: float | None) -> dict[str, Any] | None:
+    """Return the most accurate run by a candidate of the automatic choice, at the same step, or else at a part of it.
+
+    Candidates are run and compared with the reference solution `truth`, which has every `stride`-th sample of the grid. The
+    result has the `command` and its `attitude` error. If all runs become inaccurate, it is the one that does so last, up to
+    that time; None if all do so at once.
+    """
+    scene, n, best, ranks = truth.scene, len(truth.t), None, [(1, 0.0)]
+    for parts in PARTS:
+        finer = Grid(grid.dt / parts, grid.n_steps * parts, grid.every * stride * parts)
+        for method in candidates(scene) if finer.n_steps <= MOST_TRIED else ():
+            try:
+                found = method.solve(scene, finer)
+            except (BadInput, MissingEngine):  # such as a step that is too long for the method
+                continue
+            errors = angle_between(truth.R_WB[: len(found)], found.R_WB)
+            good = int(np.argmax([*~(errors <= LARGE), True]))  # samples before the first with a large error
+            rank = good, -float(errors[:good].max(initial=0.0))
+            if rank > max(ranks):
+                end = t_end if good == n else float(found.t[good - 1])
+                words = ["conservative", "run", scene_name, "-m", method.name, "--dt", f"{finer.dt:.10g}"]
+                command = shlex.join(words + ([] if end is None else ["--t-end", f"{end:.10g}"]))
+                best = {"command": command, "attitude": -rank[1], "shorter": good < n}
+            ranks.append(rank)
+        if best is not None and max(ranks)[0] == n:
+            break
+    return best
+
+
+def status_of(summary: dict[str, Any]) -> str:
+    """Return the status of a run in words: its outcome, or that it is inaccurate."""
+    attitude = summary["error"].get("attitude", 0.0)
+    if summary["outcome"].ok and not attitude <= LARGE:
+        return f"inaccurate: the attitude error is {attitude:.1e} rad"
+    return str(summary["outcome"])
 
 
 def compare(
@@ -131,7 +179,7 @@ def compare(
             start = perf_counter()
             trajectory = run_on(scene, method, grid)
             wall_time = min(wall_time, perf_counter() - start)
-        errors = find_errors(trajectory, grid, truth)
+        errors = find_errors(trajectory, grid, truth, scene_name, t_end)
         summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, "wall_time": wall_time})
     return summaries
 

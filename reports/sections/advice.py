@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from statistics import mode
+import shlex
+from collections import Counter
 
 from conservative.benchmarks.contest import costs, credit
 
@@ -40,12 +41,18 @@ def section(measured: Measured) -> Section:
                     best = line.sort_values("time").iloc[0]
                     found.append((scene.name, str(best["family"])))
                     engine, cost = each.theirs.name if each.theirs else DASH, numeric(1e6 * each.ours.time)
-                    command = f"conservative run {scene.name} -m {best['method']} --dt {best['dt']:.10g}"
+                    argument = shlex.quote(measured.plan.arguments[scene.name])
+                    command = f"conservative run {argument} -m {best['method']} --dt {best['dt']:.10g}"
                     rows.append([scene.name, tolerance(each.error), each.ours.name, cost, engine, contest_cell(each), command])
     general, closed = families.values()
     parts = []
     if general:
-        parts.append(f"Take `{mode(family for _, family in general)}` for any body; ✗ in the table: another is faster.")
+        usual, won = Counter(family for _, family in general).most_common(1)[0]
+        methods = [method for method in measured.plan.methods if method.family == usual]
+        refused = [scene.name for scene in measured.plan.scenes if any(method.unsupported(scene) for method in methods)]
+        but = f", which does not support {', '.join(refused)}" if refused else ""
+        first = f"Take `{usual}`{but}: of our general integrators, it is the fastest in {won} of {len(general)} rows"
+        parts.append(f"{first}; ✗ in the table: another is faster.")
     if closed:
         names = " and ".join(f"`{family}` ({scene})" for scene, family in closed)
         parts.append(f"Closed forms are exact to round-off, but each solves only some motions: {names}.")

@@ -6,25 +6,29 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..document.cells import DASH
-from ..document.model import Block, Document, Facts, Table
-
-LARGE = 0.1
-"""Attitude error, rad, above which a run is followed by advice."""
+from ..document.model import Block, Document, Facts, Items, Table
+from ..run.single_run import status_of
 
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:
     """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
     first = summaries[0]
     title = f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s"
-    block: Block = Facts(list(_facts(first))) if len(summaries) == 1 else _table(summaries, title)
+    data = [summary | {"status": status_of(summary)} for summary in summaries]
+    blocks: list[Block] = [Facts(list(_facts(first)))]
+    if len(summaries) > 1:
+        advice = dict.fromkeys(f"More accurate: {_advice(each['error'])}" for each in summaries if "better" in each["error"])
+        blocks = [_table(summaries, title), *([Items.of(list(advice))] if advice else [])]
     failed = [f"{each['label']} on {each['scene']}: {each['outcome']}" for each in summaries if not each["outcome"].ok]
-    return Document("conservative run", title, [block], data=first if len(summaries) == 1 else summaries, failures=failed)
+    return Document("conservative run", title, blocks, data=data[0] if len(data) == 1 else data, failures=failed)
 
 
 def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "scene", summary["scene"]
     yield "method", summary["label"]
-    yield "status", str(summary["outcome"])
+    yield "status", status_of(summary)
+    if "better" in summary["error"]:
+        yield "more accurate", _advice(summary["error"])
     yield "run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"
     yield "work", ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
     error = summary["error"]
@@ -32,8 +36,6 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"{name} error", error.get("reason") or f"{error[name]:.1e} {unit}"
     if "truth" in error:
         yield "error against", f"{error['truth']}, largest of {error['samples']} samples"
-    if error.get("attitude", 0.0) > LARGE:
-        yield "more accurate", "a shorter --dt, -m taylor, or what `conservative recommend` finds"
     for name, value in summary["drift"].items():
         yield f"drift of {name}", f"{value:.2e} (relative)"
     yield "orthonormality", f"{summary['orthonormality']:.2e}"
@@ -41,6 +43,13 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"at t = {last['t']:g} s", ""
         yield from ((f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1))
         yield "w_WB_B, rad/s", _numbers(last["w_WB_B"])
+
+
+def _advice(error: dict[str, Any]) -> str:
+    if error["better"] is None:
+        return "no accurate run was found; use a shorter --dt or a shorter --t-end"
+    end = ", and no run that was tried is accurate for longer" if error["better"]["shorter"] else ""
+    return f"{error['better']['command']} (attitude error {error['better']['attitude']:.1e} rad{end})"
 
 
 def _numbers(values: Iterable[float]) -> str:
@@ -61,7 +70,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
     rows = [
         [
             summary["method"],
-            str(summary["outcome"]),
+            status_of(summary).partition(":")[0] if summary["outcome"].ok else str(summary["outcome"]),
             *(f"{summary['drift'][name]:.1e}" for name in drifts),
             *(f"{summary['error'][name]:.1e}" if name in summary["error"] else DASH for name in ("attitude", "rate")),
             f"{summary['counters']['steps']:,}",

@@ -19,7 +19,7 @@ from .one_body import BODY, TURN, body_in_axes
 
 POINT, ANCHOR = np.array((0.3, -0.2, 0.4)), np.array((1.0, 0.5, -0.8))
 GRAVITY, ON_AXIS = cv.UniformGravity(4.0, POINT), cv.UniformGravity(4.0, 0.5 * TURN[:, 2])
-TOP = body_in_axes(TURN, 1.1, 1.1, 0.6)
+TOP, ACROSS = body_in_axes(TURN, 1.1, 1.1, 0.6), body_in_axes(TURN, 1.1, 0.6, 1.1)
 
 
 def rotations(n: int, seed: int) -> np.ndarray:
@@ -136,6 +136,9 @@ CASES = [
     (cv.Taylor(18), tops(11), 0.03),
     (cv.Taylor(18), tops(11, None), 0.03),
     (cv.Taylor(14), batch(TOP, 11, ON_AXIS, PARTLY_SYMMETRIC), 0.1),
+    # The first is symmetric together with its field; the others have a point off the axis, or another axis.
+    (cv.Taylor(14), tops(5, com_B=0.5 * TURN[:, 2] + np.outer(np.arange(5) / 10, TURN[:, 0])), 0.1),
+    (cv.Taylor(14), batch(TOP, 5, ON_AXIS, np.where(np.arange(5)[:, None, None], ACROSS.inertia, TOP.inertia)), 0.1),
 ]
 
 

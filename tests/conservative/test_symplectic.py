@@ -91,6 +91,20 @@ def test_free_rotation_is_exact():
     assert np.abs(free_step(np.array((1, 1.4, 2)), (0.0, 0.0, 0.0), 1.0)[1]).max() == 0
 
 
+@pytest.mark.parametrize("J", [(0.005, 1.0, 1.003), (0.04, 1.0, 1.02), (1.0, 1.4, 2.0)], ids=str)
+def test_rotations_of_any_length_are_exact(J):
+    # Spins about the long axis, where parts have to be short compared with the nutation, which is as fast as the rotation.
+    scene, worst = cv.Scene("long axis", cv.RigidBody(J), np.eye(3), (1.0, 0.03, -0.04), 1.0), 0.0
+    _, _, model = convert(scene, cv.Splitting())
+    start, L0 = (model.q, (0.0,) * 4), (model.L, (0.0,) * 3)
+    for h in np.linspace(0.1, 3.0, 30):
+        q, *_, found = symplectic.rotate(symplectic.EXACT, h, 0.0, model.J, model.J_inverse, None, None, *start, *L0)
+        assert found, h
+        truth = cv.MoserVeselov().solve(scene, cv.Grid(h / 12, 12, 12)).R_WB[-1]
+        worst = max(worst, np.abs(Rotation.from_quat(q, scalar_first=True).as_matrix() - truth).max())
+    assert worst < 1e-14  # measured 2.7e-15; 1.8e-11 if parts are twice as long
+
+
 def test_long_rotations_are_made_in_parts_and_too_long_ones_are_reported():
     # A field so weak that it does nothing: the motion is that of the free body.
     scene = free((1, 1.4, 2), (3.0, -20.0, 10.0))

@@ -1,5 +1,6 @@
 import csv
 import json
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from conservative import registry
 from conservative.reports.cli.main import main
 
 
@@ -73,7 +75,7 @@ def test_a_table_shows_the_methods_that_fail_and_exits_with_1():
     done = conservative("run", "lagrange_top", "-m", "reduced", "-m", "convected:1e-29", "--t-end", "0.1")
     assert done.exit_code == 1
     assert "not converged in step" in done.stdout
-    assert any(line.split()[:2] == ["reduced", "ok"] for line in done.stdout.splitlines())
+    assert any(line.split()[:2] == ["reduced", "inaccurate"] for line in done.stdout.splitlines())  # 1.8 rad
 
 
 def test_run_writes_samples(tmp_path):
@@ -113,6 +115,76 @@ def test_a_long_run_without_closed_form_is_compared_when_asked():
     long = ("run", "kovalevskaya_top", "-m", "taylor", "--t-end", "450", "--dt", "0.05", "--json")  # 1,030 rad
     assert "--truth" in json.loads(conservative(*long).stdout)["error"]["reason"]
     assert json.loads(conservative(*long, "--truth").stdout)["error"]["attitude"] < 1e-8  # measured 2.5e-10
+
+
+LOADED = """t_end = 20.0
+body.inertia = [1.0, 2.0, 2.5]
+start.w_WB_B = [0.5, 3.0, 0.2]
+torque.value = [0.0, 0.3, 0.1]
+damping.matrix = [[0.01, 0, 0], [0, 0.02, 0], [0, 0, 0.03]]
+"""
+WITH_ROTOR = """t_end = 20.0
+body.inertia = [1.0, 2.0, 2.5]
+start.w_WB_B = [0.5, 3.0, 0.2]
+rotor.momentum = [0.3, -0.2, 0.5]
+"""
+CHAOTIC = """t_end = 80.0
+body.inertia = [[0.856, -0.140, 0.260], [-0.140, 0.864, 0.253], [0.260, 0.253, 0.531]]
+start = {w_WB_B = [0.341, -1.569, -1.021], R_WB = {axis = [1.081, 0.432, 2.067], angle = 2.372}}
+potential = {kind = "point_attraction", strength = 0.52, point_B = [0.137, -0.093, -0.689], anchor_W = [-0.520, -0.566, 0.153]}
+"""
+NAMED = ["brick_flip:disturbance=1e-6", "tumbling_satellite"]
+
+
+def run_as_json(*arguments):
+    done = conservative("run", *arguments, "--json")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    "scene", ["new", LOADED, WITH_ROTOR, CHAOTIC, *NAMED], ids=["new", "loads", "rotor", "chaotic", *NAMED]
+)
+def test_the_advice_for_an_inaccurate_run_is_a_command_that_is_accurate(scene, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    place, options = scene, ("-m", "textbook:scheme=gyroscopic")
+    if scene not in NAMED:
+        place = tmp_path / "my body.toml"
+        place.write_text(conservative("new").stdout if scene == "new" else scene)
+        options = () if scene == "new" else ("--dt", "0.05" if scene is CHAOTIC else "0.2")
+    summary = run_as_json(place, *options)
+    assert summary["error"]["attitude"] > 0.1  # measured 0.2 and more
+    assert summary["status"].startswith("inaccurate")
+    better = summary["error"]["better"]
+    assert better["shorter"] is (scene is CHAOTIC)
+    assert better["command"] in conservative("run", place, *options).stdout
+    name, command, *arguments = shlex.split(better["command"])
+    assert (name, command) == ("conservative", "run")
+    again = run_as_json(*arguments)
+    assert (again["status"], "better" in again["error"]) == ("ok", False)
+    assert again["error"]["attitude"] == pytest.approx(better["attitude"], rel=0.2, abs=1e-10)
+
+
+def test_no_command_is_advised_without_an_accurate_run(monkeypatch):
+    monkeypatch.setattr("conservative.reports.run.single_run.candidates", lambda scene: (registry.method("reduced"),))
+    monkeypatch.setattr("conservative.reports.run.single_run.PARTS", (1,))
+    monkeypatch.setattr("conservative.reports.run.single_run.LARGE", 1e-12)
+    summary = run_as_json("brick_flip", "--dt", "0.1")
+    assert summary["error"]["better"] is None
+    shown = conservative("run", "brick_flip", "--dt", "0.1").stdout
+    assert "inaccurate" in shown
+    assert "conservative run" not in shown
+
+
+def test_a_table_marks_inaccurate_runs_and_says_what_to_do_once():
+    names = ("reduced", "reduced:tol=1e-09", "taylor:order=12")
+    lines = conservative(
+        "run", "brick_flip", "--dt", "0.1", *(text for name in names for text in ("-m", name))
+    ).stdout.splitlines()
+    shown = dict(line.split()[:2] for line in lines if line.strip().startswith(names))
+    assert shown == dict(zip(names, ("inaccurate", "inaccurate", "ok"), strict=True))
+    assert sum("conservative run" in line for line in lines) == 1
+    assert "conservative run" not in conservative("run", "brick_flip", "-m", "taylor", "-m", "gauss").stdout
 
 
 def test_samples_as_parquet_equal_those_as_csv(tmp_path):

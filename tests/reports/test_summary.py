@@ -1,19 +1,23 @@
 """Summaries of a scene and of random bodies: sentence, classes of methods, picture of families."""
 
 import math
+import shlex
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
-from conservative import registry
+from conservative import Gauss, Taylor, Torque, registry
 from conservative.benchmarks.measures import measurement
+from conservative.reports.cli.main import main
 from conservative.reports.document.cells import grade_ratio
 from conservative.reports.document.model import Grade
 from conservative.reports.rows import points as families
 from conservative.reports.rows.names import MethodClass, class_of, with_names
 from conservative.reports.rows.points import points
+from conservative.reports.run.plan import plan_report
 from conservative.reports.sections import advice, random_bodies, summary
 
 from .rows import frame, point
@@ -133,11 +137,37 @@ def test_a_closed_form_is_advised_only_if_it_is_faster(time, used):
     """At 1e-9 rad, which `gauss` reaches in 8e-6 s."""
     lines = (OURS, point("gauss", "ours", 1e-10, 8e-6, 0.001), SOLVER, point("lame", "ours", 1e-12, time))
     table = points(frame([each for line in lines for each in line]))
-    plan = SimpleNamespace(scenes=[SimpleNamespace(name="made_up")])
+    plan = SimpleNamespace(scenes=[SimpleNamespace(name="made_up")], methods=(), arguments={"made_up": "made_up"})
     found = advice.section(SimpleNamespace(plan=plan, points=table, ratios=()))
     rows = found.blocks[-1].rows
     assert {str(row[2]) for row in rows} == used
     assert ("lame" in found.blocks[0].text) == ("lame" in used)
+
+
+def test_commands_of_a_report_make_the_scenes_again(tmp_path):
+    path = tmp_path / "my body.toml"
+    path.write_text("t_end = 1.0\nbody.inertia = [1.0, 2.0, 2.5]\nstart.w_WB_B = [0.5, 3.0, 0.2]\n")
+    arguments = [str(path), "brick_flip:disturbance=1e-6", "lagrange_top"]
+    plan = plan_report(arguments, ["taylor"], quick=True)
+    assert [scene.name for scene in plan.scenes] == ["my body", "brick_flip_1e-06", "lagrange_top"]
+    lines = [line for scene in plan.scenes for line in point("taylor:order=12", "ours", 1e-10, 1e-6, scene=scene.name)]
+    found = advice.section(SimpleNamespace(plan=plan, points=points(frame(lines)), ratios=()))
+    commands = [shlex.split(str(row[-1])) for row in found.blocks[-1].rows]
+    assert {words[2] for words in commands} == set(arguments)
+    for words in commands[:: len(commands) // len(arguments)]:
+        done = CliRunner().invoke(main, [*words[1:], "--t-end", "0.5", "--no-truth"])
+        assert done.exit_code == 0, done.output
+
+
+def test_an_advised_method_is_not_said_to_take_a_scene_that_it_refuses():
+    lines = [*point("taylor", "ours", 1e-10, 1e-6, scene="brick_flip"), *point("gauss", "ours", 1e-4, 1e-6, scene="thruster")]
+    brick = registry.scene("brick_flip")
+    loaded = brick.rename("thruster", torque=Torque((0, 0, 1)))
+    for scenes, refused in (((brick,), False), ((brick, loaded), True)):
+        plan = SimpleNamespace(scenes=scenes, methods=(Taylor(), Gauss()), arguments={each.name: each.name for each in scenes})
+        lead = advice.section(SimpleNamespace(plan=plan, points=points(frame(lines)), ratios=())).blocks[0].text
+        assert "`taylor`" in lead
+        assert ("thruster" in lead) is refused
 
 
 @pytest.mark.parametrize(("ratio", "grade"), [(0.94, Grade.BAD), (0.97, Grade.FAIR), (1.03, Grade.FAIR), (1.07, Grade.GOOD)])
