@@ -194,10 +194,9 @@ class Scene(PickledByFields):
     @cached_property
     def smoothness(self) -> Smoothness:
         """Jumps of functions without declared break points, and the step that resolves them (`potentials.smoothness`)."""
-        functions = [load for load in self.loads if callable(load.value) and not len(load.breaks)]
-        calls: Any = [(lambda t, f=f: f.value(t, self.R_WB0)) if f.of_attitude else f.value for f in functions]
+        functions = tuple(load for load in self.loads if callable(load.value) and not len(load.breaks))
         known = np.concatenate([np.empty(0), *(load.breaks for load in self.loads)])
-        return examine(calls, self.t_end, known)
+        return examine(functions, self.t_end, tuple(known.tolist()))
 
     @property
     def integrable(self) -> bool:
@@ -221,10 +220,11 @@ class Scene(PickledByFields):
 
         Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
-        return self._energies or 1.0
+        return self.energies or 1.0
 
     @cached_property
-    def _energies(self) -> float:
+    def energies(self) -> float:
+        """The sum of these energies, J, which is 0 for a body at rest without a field and a load."""
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
@@ -234,7 +234,7 @@ class Scene(PickledByFields):
     def magnitudes(self) -> tuple[int, int | None]:
         """Binary exponents of the largest moment, kg m^2, and of the rate that all energy allows, 1/s; None without energy."""
         moment = math.frexp(float(self.body.moments.max()))[1]
-        energy = self._energies
+        energy = self.energies
         return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
     @cached_property

@@ -8,17 +8,21 @@ times: blocks for which both agree are short enough for a step. What is shorter 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attitude import Array
+from ..attitude import Array, rotation_about
+from ..check import read_only
 
 SCANNED = 2**16
 """Number of intervals of a scan."""
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
+ATTITUDE = read_only(rotation_about((1.0, 2.0, 3.0), 1.0))
+"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones."""
 STEEP, MOST_JUMPS = 10.0, 1000
 """An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
 
@@ -31,11 +35,17 @@ class Smoothness(NamedTuple):
     interval: tuple[float, float]
 
 
-def examine(functions: Sequence[Callable[[float], Array]], t_end: float, breaks: Array) -> Smoothness:
-    """Return the smoothness of functions from 0 to t_end, s, apart from their known break points (n,), s."""
-    jumps, step, interval = [breaks[:0]], math.inf, (0.0, t_end)
+@lru_cache(maxsize=64)
+def examine(loads: tuple[Any, ...], t_end: float, breaks: tuple[float, ...]) -> Smoothness:
+    """Return the smoothness of loads given as functions, from 0 to t_end, s, apart from known break points, s.
+
+    Functions of time and attitude are evaluated at `ATTITUDE`. So the result is the same for all scenes with these loads,
+    such as the bodies of an ensemble, and found once.
+    """
+    jumps, step, interval = [np.empty(0)], math.inf, (0.0, t_end)
     times = np.linspace(0.0, t_end, SCANNED + 1)
-    for function in functions:
+    for load in loads:
+        function = partial(_at_attitude, load.value) if load.of_attitude else load.value
         try:
             values = np.array([function(t) for t in times.tolist()], dtype=float).reshape(SCANNED + 1, -1)
         except Exception:  # the run reports a function that fails
@@ -46,6 +56,10 @@ def examine(functions: Sequence[Callable[[float], Array]], t_end: float, breaks:
         if resolved < step:
             step, interval = resolved, where
     return Smoothness(np.unique(np.concatenate(jumps)), step, interval)
+
+
+def _at_attitude(function: Callable[[float, Array], Array], t: float) -> Array:
+    return function(t, ATTITUDE)
 
 
 def _find_jumps(function: Callable[[float], Array], times: Array, values: Array) -> list[float]:
