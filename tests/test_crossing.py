@@ -422,6 +422,10 @@ def test_every_part_has_a_row() -> None:
         assert row.distance(row.t, motion(row.other, row.t)[0]) > 10 * RIGHT  # measured: from 0.21
 
 
+def test_a_jump_of_all_components_is_a_break() -> None:
+    assert ROWS[Need.TORQUE].scene().breaks.tolist() == [0.5, 0.8, 1.3, 2.0]
+
+
 def test_every_command_that_takes_a_scene_has_a_column() -> None:
     def takes(command: Any) -> bool:
         inner = getattr(command, "commands", {}).values()

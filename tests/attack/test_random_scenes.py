@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import conservative as cv
 
@@ -114,6 +115,47 @@ def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     case, what = random_case(seed + (SEED - 1) * 1_000_000)
     print(what)
     check(case)
+
+
+def test_a_wrong_run_is_found():
+    case, _ = random_case(6)
+    assert not complaint(case, truth_of(case), 1e-6)
+    other = replace(case, w0=case.w0 * (1 + 1e-5))
+    assert "off by" in complaint(case, truth_of(other), 1e-6)
+
+
+def needle(ratio):
+    """A body whose smallest moment is known to some per mille of itself only where its axes are rounded."""
+    R = Rotation.from_rotvec(0.7 * np.array((1, 2, 3)) / np.sqrt(14)).as_matrix()
+    J = R @ np.diag((1.0, 1.1, 1 / ratio)) @ R.T
+    return Case((J + J.T) / 2, np.eye(3), R @ np.array((0.3, 0.2, 5.0)), 10.0, ("gravity", 1.0, np.array((0.1, 0.2, 0.3))))
+
+
+@pytest.mark.attack
+@pytest.mark.parametrize(("ratio", "error"), [(1e4, 1e-9), (1e5, 1e-8), (1e5, 1e-9)])
+def test_needles(ratio, error):
+    case = needle(ratio)
+    found = complaint(case, truth_of(case), error)
+    assert not found, found
+
+
+@pytest.mark.attack
+def test_a_chaotic_motion_ends():
+    J = np.array([[0.8561473151436181, -0.1399209844619009, 0.2596232291707036]])
+    J = np.vstack([J, [[-0.1399209844619009, 0.8639032569163886, 0.2525273535979581]]])
+    J = np.vstack([J, [[0.2596232291707036, 0.2525273535979581, 0.531435779649731]]])
+    R0 = [[-0.36137691973756003, -0.46339656708943133, 0.8091170147084557]]
+    R0 += [[0.748683825368686, -0.661436587819048, -0.04443203851147]]
+    R0 += [[0.5555690631119225, 0.5897162554178279, 0.5859654312190021]]
+    b, A = (
+        [0.13666859642970388, -0.0930140741058145, -0.6886305645960864],
+        [-0.5202606179382248, -0.5662843993318173, 0.152834159],
+    )
+    w0 = np.array((0.34078729040002304, -1.5690401418883404, -1.021436630924228))
+    R0 = Rotation.from_matrix(R0).as_matrix()
+    case = Case(J, R0, w0, 208.07820450168416, ("attraction", 0.5198954949249285, np.array(b), np.array(A)))
+    _, warned = run(case, 1e-8, np.linspace(0, case.t_end, SAMPLES))
+    assert warned  # rounding the scene moves its end by more
 
 
 @pytest.mark.parametrize("seed", range(len(THEMES)))
