@@ -318,13 +318,13 @@ def write_motion(path: Path, R_WB: Any, w: Any, first: int = 0) -> None:
 
 def study(cell: Cell) -> None:
     """Errors of a study fall to those of a right motion."""
-    found = cell.call("study", "convergence", "--scenes", cell.name, "--methods", "projected,scipy", "--quick")
+    found = cell.call("study", "convergence", "--scenes", cell.name, "--methods", "reduced,projected", "--quick")
     check_rows(found["rows"])
 
 
 def report(cell: Cell) -> None:
     found = cell.call(
-        "report", "--scenes", cell.name, "--methods", "projected,scipy", "--quick", "--out", "page", "--bodies", "0"
+        "report", "--scenes", cell.name, "--methods", "reduced,projected,scipy", "--quick", "--out", "page", "--bodies", "0"
     )
     check_rows(found["rows"])
 
