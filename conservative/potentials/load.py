@@ -258,7 +258,7 @@ def find_corners(times: Array, values: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.diff(rows, axis=0) / gaps[:, None]
         bend, size = np.abs(np.diff(slopes, axis=0)).max(axis=1), np.abs(slopes).max(axis=1)
-        straight = bend <= _STRAIGHT * np.maximum(size[1:], size[:-1])  # False at a jump, where slopes are not finite
+        straight = (bend <= _STRAIGHT * np.maximum(size[1:], size[:-1])) & (gaps[1:] > 0) & (gaps[:-1] > 0)
     return np.unique(times[np.concatenate([[True], ~straight, [True]])])
 
 
