@@ -6,30 +6,33 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from conservative.attitude import Array, from_quaternion
+from conservative.attitude import Array, from_quaternion, hat
 from conservative.references.engine import principal_axes
-from conservative.references.engines.scipy import state_derivative
+from conservative.references.engines.scipy import Derivative, list_derivatives, solve_pieces, wheel_rates
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.scene import Scene
 
 Motion = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
-TOLERANCE = 2.3e-14  # the smallest relative one of SciPy
+TOLERANCE, COARSER = 2.3e-14, 20.0  # the smallest relative one of SciPy; its multiple that shows the error of a motion
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A recorded motion at times t (n,), s, from 0, and the scene whose motion it should be.
+    """A recorded motion at times t (n,), s, and the scene whose motion it should be.
 
-    If `from_row` is True, the scene starts in the first row, otherwise as the user's scene does.
+    If `from_row` is True, the scene starts in the first row, otherwise as the user's scene does. `start` is the time of that
+    state, s: a field or a load that depends on time has its value then. `tolerance` is the relative one of SciPy, for motions
+    without a closed form.
     """
 
     scene: Scene
     t: Array
     data: Motion
     from_row: bool
+    start: float = 0.0
+    tolerance: float = TOLERANCE
 
     def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Case:
         """Return the case of other attitudes and rates. The scene keeps the part of its initial state that they do not have."""
@@ -55,34 +58,54 @@ class Case:
     @cached_property
     def closed(self) -> bool:
         """Whether the exact motion is known in closed form."""
-        return self.scene.free or (Exact().unsupported(self.scene) is None and self.scene.symmetry_axis_B is not None)
+        scene = self.scene
+        return Exact().unsupported(scene) is None and (scene.potential is None or scene.symmetry_axis_B is not None)
+
+    @property
+    def torque_free(self) -> bool:
+        """Whether nothing acts on the body, and no rotor in it: only the ratios of its moments matter."""
+        return self.closed and self.scene.potential is None
 
     @cached_property
     def error(self) -> Array:
         """The errors (2, n) of the data."""
         return self.errors(self.truth(self.t))
 
+    @cached_property
+    def own_error(self) -> Array:
+        """The largest error (n,) of the exact motion up to each row: its change by a coarser tolerance. 0 in closed form."""
+        coarse = replace(self, data=self.truth(self.t), tolerance=COARSER * self.tolerance)
+        return np.maximum.accumulate(coarse.error.max(axis=0))
+
     def truth(self, t: Array) -> Motion:
-        """Return the exact motion at ascending times (n,), s, from 0 or later."""
+        """Return the exact motion at ascending times (n,), s, from `start` on."""
         body, field, R0, w0 = self.scene.body, self.scene.potential, self.scene.R_WB0, self.scene.w_WB_B0
-        if field is None:
-            return free_body(body, R0, w0, t)
-        return lagrange_top(body, field, R0, w0, t) if self.closed else self.move(t)  # type: ignore[arg-type]
+        if not self.closed:
+            return self.move(t)
+        elapsed = t - self.start
+        return free_body(body, R0, w0, elapsed) if field is None else lagrange_top(body, field, R0, w0, elapsed)  # type: ignore[arg-type]
 
     def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> Motion:
-        """Return the motion by SciPy's DOP853, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
-        exact, axes = state_derivative(self.scene), principal_axes(self.scene)
+        """Return the motion by integration, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
+        axes, wheel, states = principal_axes(self.scene), wheel_rates(self.scene), np.full((len(t), 7), np.nan)
+        rotor = hat(axes.rotor * (self.scene.body.motor is None))  # the state has the momentum of a rotor with a motor
 
-        def slope(t: float, y: Array) -> Array:
-            out = exact(t, y)
-            out[4:] -= damping * y[4:] + (0.0 if gyroscopic else np.cross(axes.J * y[4:], y[4:]) / axes.J)
-            return out
+        def changed(exact: Derivative) -> Derivative:
+            def slope(t: float, y: Array) -> Array:
+                out, w = exact(t, y), y[4:] - wheel(t)
+                out[4:] -= damping * w
+                if not gyroscopic:
+                    out[4:] -= (hat(axes.J * y[4:]) @ w + rotor @ w) / axes.J
+                return out
 
-        y, atol = np.full((len(t), 7), np.nan), TOLERANCE * np.repeat([1.0, self.scale], [4, 3])
+            return exact if gyroscopic and not damping else slope
+
+        pieces = [(a, b, changed(exact)) for a, b, exact in list_derivatives(self.scene, float(t[-1]), self.start)]
         with np.errstate(all="ignore"):  # a motion that diverges ends in nan
-            found = solve_ivp(slope, (0.0, t[-1]), [*axes.q0, *axes.w0], "DOP853", t, rtol=TOLERANCE, atol=atol).y
-            y[: np.shape(found)[1]] = np.transpose(found)
-            return self.motion(y)
+            atol = self.tolerance * np.repeat([1.0, self.scale], [4, 3])
+            found = solve_pieces(self.scene, pieces, t, rtol=self.tolerance, atol=atol)[0]
+            states[: len(found)] = found
+            return self.motion(states)
 
     def motion(self, y: Array) -> Motion:
         """Return the motion of states (n, 7): quaternions, scalar first, and rates, rad/s, in principal axes."""

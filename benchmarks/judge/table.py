@@ -37,7 +37,7 @@ COLUMNS: dict[str, tuple[str, Sequence[Sequence[str]]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recorded motion at times t (n,), s, from the first row of the `rows` of a file.
+    """A recorded motion at times t (n,), s, which are those of the file; it has `rows` rows.
 
     `norm` (n,) has the norms of quaternions, whose order wxyz is a guess unless `order_known`. `ignored` are columns of angles.
     """
@@ -99,7 +99,7 @@ def read(path: Path, quaternion: str | None, euler: str | None, world: bool, uni
         w = (w[:, None] @ R)[:, 0]
     norm, known = np.linalg.norm(rest, axis=1) if "quaternion" in found else None, quaternion is not None or not numbered
     degrees = any(size < 1 for size in found["rates"].values())
-    return Recording(values[:, 0] - values[0, 0], (R, w), norm, known, degrees, list(found["ignored"]), rows)
+    return Recording(values[:, 0], (R, w), norm, known, degrees, list(found["ignored"]), rows)
 
 
 def _chunks(path: Path) -> Iterator[pd.DataFrame]:

@@ -107,7 +107,8 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
 def judged(rows: pd.DataFrame, name: str) -> Any:
     """Return errors and drifts of a recorded motion after its first row, from `diagnose.judge`, a panel for each quantity."""
     panels = []
-    for kind, part in rows.assign(shown=rows["value"].clip(lower=FLOOR)).query("t > 0").groupby("quantity", sort=False):
+    shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))[rows["t"] > rows["t"].min()]
+    for kind, part in shown.groupby("quantity", sort=False):
         base = alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 130, title=f"{name}: {kind}").mark_line(strokeWidth=1.4)
         x = alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False))
         panels.append(

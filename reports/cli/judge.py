@@ -33,7 +33,7 @@ FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv":
 @click.option("--rates", type=click.Choice(["body", "world"]), default="body", show_default=True, help="Axes of the rates.")
 @click.option("--units", type=click.Choice(["deg", "rad"]), help="Unit of angles and rates whose columns name none.")
 @click.option(
-    "--start", type=click.Choice(["row", "scene"]), default="row", show_default=True, help="First row, or the scene's."
+    "--start", type=click.Choice(["row", "scene"]), default="row", show_default=True, help="First row, or the scene's t = 0."
 )
 @click.option(
     "--error", type=float, default=1e-6, show_default=True, help="Allowed error: rad, or relative to the largest rate."
@@ -56,7 +56,7 @@ def judge(run: Path, body: str, rates: str, start: str, error: float, as_json: b
 
     with output_files(out, FILES) as write, show_waiting(run.name):
         recording = table.read(run, world=rates == "world", **reading)
-        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row")
+        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row", error)
         document = build(summary, run.name, error)
         drawn = {"csv": lambda: rows.to_csv(index=False), "svg": lambda: style.svg_text(figures.judged(rows, run.name))}
         write(document, **drawn)

@@ -113,6 +113,38 @@ def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_pa
     assert "xyzw fits better" in done.stdout
 
 
+PARTS = """t_end = 5.0
+[body]
+inertia = [37.5, 180.0, 187.5]
+[rotor]
+momentum = [0.0, 0.0, 20.0]
+[torque]
+times = [0.0, 1.0, 1.0, 3.0, 3.0, 5.0]
+values = [[0, 0, 0], [0, 0, 0], [235, 0, 0], [235, 0, 0], [0, 0, 0], [0, 0, 0]]
+[start]
+w_WB_B = [0.0, 0.1, 0.0]
+"""
+
+
+@pytest.mark.parametrize("gone", ["", "rotor", "torque"])
+def test_parts_of_a_scene_file_are_judged_from_any_row(gone, tmp_path):
+    (tmp_path / "body.toml").write_text(PARTS)
+    made = PARTS
+    if gone:
+        start, end = PARTS.index(f"[{gone}]"), PARTS.index({"rotor": "[torque]", "torque": "[start]"}[gone])
+        made = PARTS[:start] + PARTS[end:]
+    (tmp_path / "made.toml").write_text(made)
+    options = ["-m", "scipy:DOP853,rtol=1e-13", "--dt", "0.01", "--csv", str(tmp_path / "run.csv")]
+    run = CliRunner().invoke(main, ["run", str(tmp_path / "made.toml"), *options])
+    assert run.exit_code == 0, run.output
+    pd.read_csv(tmp_path / "run.csv").iloc[150:].to_csv(tmp_path / "late.csv", index=False)
+    for start in ("row", "scene"):
+        arguments = [str(tmp_path / "late.csv"), "--body", str(tmp_path / "body.toml"), "--start", start, "--error", "1e-8"]
+        done = CliRunner().invoke(main, ["judge", *arguments])
+        assert done.exit_code == (1 if gone else 0), done.output
+        assert (f"It is the motion without the {gone}" in done.stdout) == bool(gone)
+
+
 @pytest.mark.parametrize(
     ("options", "expected"), [(("--euler", "zzq"), "euler: got 'zzq'"), (("--rates", "world"), "rates: got")]
 )

@@ -54,10 +54,10 @@ def noisy(scene, size, seed=3):
 def stepped(scene, name, parts, t=T):
     """The motion by a textbook method, with so many steps between two rows."""
     axes, f, step = principal_axes(scene), state_derivative(scene), TEXTBOOK[name][1]
-    y = before = np.append(axes.q0, axes.w0)
-    rows = [y]
+    y, h = np.append(axes.q0, axes.w0), t[1] / parts
+    rows, before = [y], f(0.0, y)
     for number in range(1, (len(t) - 1) * parts + 1):
-        y, before = step(lambda y: f(0.0, y), y, t[1] / parts, f(0.0, before)), y
+        y, before = step(f, (number - 1) * h, y, h, before), f((number - 1) * h, y)
         y[:4] /= np.linalg.norm(y[:4])
         rows += [y] * (number % parts == 0)
     return Case(scene, t, (None, None), True).motion(np.array(rows))
