@@ -95,7 +95,7 @@ class SciPy(Method):
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         atol = self.rtol * np.repeat([1.0, rate_scale], [4, 3])
         solver = _count_steps(getattr(integrate, self.integrator))
-        pieces = list_derivatives(scene, float(grid.t[-1]), grid.last)
+        pieces = list_derivatives(scene, float(grid.t[-1]), last=grid.last)
 
         def run() -> Trajectory:
             solver.steps = 0
@@ -110,7 +110,7 @@ class SciPy(Method):
 Pieces = list[tuple[float, float, Derivative]]
 
 
-def list_derivatives(scene: Scene, t_end: float, last: float = 0.0, t_start: float = 0.0) -> Pieces:
+def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0, last: float = 0.0) -> Pieces:
     """Return the times, s, between which a scene is smooth, from t_start to t_end, s, and the derivative between each two.
 
     Break points are known until `last`, s, at least the end of the scene.
