@@ -116,7 +116,7 @@ def test_very_small_scenes_are_integrated_in_their_own_units():
         (lambda: cv.Torque("up"), "value", "'up'"),
         (lambda: cv.Torque((1, np.nan, 0)), "value", "not finite"),
         (lambda: cv.Torque((1, 2, 3), "orbit"), "frame", "'orbit'"),
-        (lambda: cv.Torque(([0, 1, 1], np.zeros((3, 3)))), "times", "1 after 1, at index 2"),
+        (lambda: cv.Torque(([0, 1, 1, 1], np.zeros((4, 3)))), "times", "1 after 1, at index 3"),
         (lambda: cv.Torque(([0, 1], np.zeros((3, 3)))), "values", "shape (3, 3)"),
         (lambda: cv.Torque(lambda t: (1, 2)), "torque", "returns (1, 2)"),
         (lambda: cv.Torque(lambda t: (1, 2, np.nan)), "torque", "nan"),
@@ -131,7 +131,7 @@ def test_very_small_scenes_are_integrated_in_their_own_units():
         (lambda: cv.Damping(np.eye(3), lambda t: np.nan), "factor", "nan"),
         (lambda: cv.Damping(np.eye(3), ([0, 1], [1, -2])), "values", "-2"),
         (lambda: cv.Damping(np.eye(3), ([0, 1], [1, 2, 3])), "values", "shape (3,)"),
-        (lambda: cv.Damping(np.eye(3), ([1, 1], [1, 2])), "times", "1 after 1"),
+        (lambda: cv.Damping(np.eye(3), ([1, 0], [1, 2])), "times", "0 after 1"),
         (lambda: cv.Damping(np.eye(3), lambda t: 1.0, breaks=[np.inf]), "breaks", "inf"),
         (lambda: loaded(damping=cv.Damping(np.eye(3), ([0, 1], [1, 2]))), "factor", "a table from 0 to 1 s"),
         (lambda: loaded(damping=cv.Damping(np.eye(3), lambda t: 2 - t)), "factor", "returns -0.03125 at t = 2.03"),
@@ -154,17 +154,16 @@ def test_a_torque_that_fails_during_the_run_ends_it_with_its_time():
         cv.integrate(loaded(cv.Torque(after_two)), 0.01)
     assert failure.value.time == pytest.approx(4.905)
     assert isinstance(failure.value.__cause__, ValueError)
-    with pytest.raises(TorqueFailed, match=r"a table from 0 to 6 s at t = 6\.05"):
-        cv.integrate(loaded(TABLE, t_end=6.0), 1.1)
-    with pytest.raises(
-        TorqueFailed, match=r"factor: got a function that returns -1\.0 at t = 4\.905 s; expected a finite number"
-    ):
+    with pytest.raises(TorqueFailed, match=r"factor: got a function that returns -1\.0") as failure:
         cv.integrate(loaded(damping=cv.Damping(np.eye(3), lambda t: -1.0 if 4.9 < t < 4.99 else 1.0)), 0.01)
+    assert 4.9 < failure.value.time < 4.91
 
 
 @pytest.mark.parametrize(
     "method", ["taylor", "gauss", "splitting", "convected", "moser_veselov", "mujoco", "exact", "textbook"]
 )
 def test_other_methods_refuse_and_name_those_that_take_loads(method):
-    with pytest.raises(Unsupported, match="reduced, projected and scipy"):
+    with pytest.raises(Unsupported, match="a damping") as refusal:
         cv.integrate(SCENES["damping alone, gravity"], 0.01, method)
+    advised = str(refusal.value).rpartition(": ")[2]
+    assert {"projected", "reduced", "scipy"} <= {each.strip(" )") for each in advised.replace(" and ", ",").split(",")}

@@ -305,12 +305,13 @@ def test_scenes_of_other_content_share_nothing():
         satellite(potential=cv.GravityGradient(1.9e-3, INERTIA, (1, 0, 0))),
         satellite(potential=cv.GravityGradient(1.8e-3, INERTIA, (0, 1, 0))),
         satellite(body=cv.RigidBody(INERTIA * 2)),
-        satellite(dt=0.5),
+        satellite(torque=cv.Torque((0, 0, 1.0))),
+        scene.rename("longer", t_end=2.0),
     ]
-    found = [trials.content_of(each) for each in (scene, *others)]
+    found = [each.key for each in (scene, *others)]
     assert len(set(found)) == len(found)
-    same = [satellite(), scene.rename("other", t_end=2.0), scene.rename("grouped", group="mine", source="a book")]
-    assert {trials.content_of(each) for each in same} == {found[0]}
+    same = [satellite(), satellite(dt=0.5), scene.rename("grouped", group="mine", source="a book")]
+    assert {each.key for each in same} == {found[0]}
     assert trials.trials_of(same[0]).known is trials.trials_of(scene).known
     assert trials.trials_of(others[0]).known is not trials.trials_of(scene).known
 
