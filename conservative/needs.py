@@ -30,8 +30,8 @@ class Need(StrEnum):
     ROTOR = "a rotor"
     MOTOR = "a rotor with a motor"
     TORQUE = "a torque"
-    DAMPING = "a damping"
-    ATTITUDE = "a torque or damping that depends on the attitude"
+    DAMPING = "damping"
+    ATTITUDE = "a load that depends on the attitude"
     FLIGHT = "free flight"
 
 
