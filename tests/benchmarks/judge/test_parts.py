@@ -206,6 +206,17 @@ def test_a_textbook_method_is_named_in_a_torque_that_depends_on_time(name):
     assert max(found.left) < 1e-10
 
 
+@pytest.mark.slow
+def test_another_body_is_one_that_can_exist():
+    """A wheel whose motor does not act on the body: moments of 3, 6 and 218 kg m^2 would leave a tenth of the error."""
+    J, t = (10.0, 8.0, 6.0), np.linspace(0, 60, 301)
+    driven = cv.Scene("wheel", cv.RigidBody(J, lambda t: [0, 0, 0.05 * t]), np.eye(3), (0.02, 0.01, 0), 60.0)
+    wheel = cv.Scene("wheel", driven.body, np.eye(3), (0.02, 0.01, 0), 60.0, torque=cv.Torque([0, 0, 0.05]))
+    found = judged(driven, t, *exact(wheel, t))
+    assert max(found["error"]) > 1
+    assert found["diagnosis"] is None or found["diagnosis"].name != "another body"
+
+
 def test_a_table_with_many_corners_is_judged_without_fits():
     values = np.random.default_rng(1).normal(size=(len(T), 3))
     driven = scene(torque=cv.Torque((T, values)))
