@@ -26,6 +26,13 @@ SMALLEST, LARGEST = 1e-30, 1e30
 
 The product of three such numbers does not overflow or underflow, so energies and momenta do not either.
 """
+TENSOR_CONDITION = 1e13
+"""Largest ratio of the principal moments of a tensor that is not diagonal.
+
+Round-off of the tensor changes its smallest moment by up to 4e-16 of the largest (measured on 10,000 random tensors). That is
+0.4 % at this ratio; at 1e15 even the sign of the smallest moment is unknown. A diagonal tensor has no such limit.
+"""
+_INERTIA = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 _RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
 _UNIT = 4 * np.finfo(float).eps
 """A vector whose length is 1 to this is not changed, so that a second normalization changes nothing."""
@@ -55,6 +62,23 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
     if not _in_range(float(np.abs(array).max(initial=0.0))):
         raise BadInput(argument, describe(array.tolist()), f"{allowed}, the largest {_RANGE}")
     return read_only(array)
+
+
+def read_inertia(value: ArrayLike) -> Array:
+    """Return moments (3,) or a tensor (3, 3), kg m^2, as a symmetric read-only tensor of a possible body; see `RigidBody`."""
+    inertia = finite_array("inertia", value, ((3,), (3, 3)), _INERTIA)
+    tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
+    asymmetry = np.abs(tensor - tensor.T).max()
+    if asymmetry > 1e-12 * np.abs(tensor).max():
+        raise BadInput("inertia", f"a matrix that is not symmetric (off by {asymmetry:.3g})", _INERTIA)
+    is_diagonal = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
+    moments = np.sort(np.diag(tensor)) if is_diagonal else np.linalg.eigvalsh(tensor)
+    if moments[0] <= 0:
+        raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _INERTIA)
+    condition = LARGEST if is_diagonal else TENSOR_CONDITION
+    if moments[-1] > condition * moments[0]:
+        raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_INERTIA}, their ratio up to {condition:g}")
+    return read_only((tensor + tensor.T) / 2)
 
 
 def real_array(value: object) -> Array | None:

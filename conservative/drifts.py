@@ -14,6 +14,7 @@ import numpy as np
 from .attitude import Array
 from .batch import Batch
 from .deferred_imports import kernels
+from .flight import rotation_only
 from .grid import Grid
 from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, sizes
 from .potentials.field import lengths
@@ -25,20 +26,34 @@ ORTHONORMALITY = "orthonormality"
 _NO_ENERGIES = np.empty((0, 0))
 
 
-def measure_drifts(bodies: Batch, reference: Array, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+def measure_drifts(
+    bodies: Batch, reference: Array, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array, supplied: Array | None = None
+) -> Array:
     """Return the largest drifts (n, 5) of each body, dimensionless; `reference` (n, 10, 3) is from `find_reference`.
 
     The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the method
     conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not the grid's.
-    Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes. In scenes with
+    loads, drifts are those of the balances with `supplied` (n, m, 4), as in `Trajectory`; nan for a body that has none.
     """
-    drifts, rotor = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum
-    V = _NO_ENERGIES if bodies.scene.potential is None else field_energies(bodies, t, R_WB, w_WB_B)
-    kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts)
+    drifts, rotor, potential = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum, bodies.scene.potential
+    V, impulse = _NO_ENERGIES if potential is None else field_energies(bodies, t, R_WB, w_WB_B), None
+    if supplied is not None:
+        known = np.where(np.isnan(supplied), 0.0, supplied)
+        work, impulse = known[..., 0], np.ascontiguousarray(known[..., 1:])
+        if isinstance(potential, Turning):
+            work = work - impulse @ (potential.orbit.rate * potential.orbit.normal_W)
+        V = V - work if len(V) else -work
+        if (motor := bodies.scene.body.motor) is not None:  # a change of h counts as an impulse of the opposite sign
+            change = np.array([motor.at(each) for each in t.tolist()]) - motor.at(0.0)
+            impulse = impulse - (R_WB @ change[:, :, None])[..., 0]
+    kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, drifts)
+    if supplied is not None:
+        drifts[np.isnan(supplied).any(axis=(1, 2)), 1:] = np.nan
     return drifts
 
 
-def drifts_of(scene: Scene, conserved: frozenset[str]) -> Callable[[Grid, Array, Array, Array], Array]:
+def drifts_of(scene: Scene, conserved: frozenset[str]) -> Callable[..., Array]:
     """Return `measure_drifts` of the body of a scene, for a method that conserves the invariants of these names."""
     bodies = scene.derive(Batch.of)
     return partial(measure_drifts, bodies, find_reference(bodies, conserved))
@@ -52,10 +67,8 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
     """
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
-    L_B = momenta_of(bodies)
-    rotor = scene.body.rotor_momentum
-    kinetic = np.einsum("ni,ni->n", L_B if rotor is None else L_B - rotor, w) / 2
-    scale = kinetic + field_scales(bodies)
+    L_B, kinetic, rotor = momenta_of(bodies), kinetic_energies(bodies), scene.body.rotor_momentum
+    scale = energy_scales(bodies)
     scale[scale == 0] = 1.0
     largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
     momentum = lengths(L_B)
@@ -90,8 +103,8 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
-    """Return the names of drifts: orthonormality, and the invariants of the scene."""
-    return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
+    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
+    return (ORTHONORMALITY, *(each.name for each in rotation_only(bodies.scene).invariants))
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -102,7 +115,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]
-    for each in scene.invariants:
+    for each in rotation_only(scene).invariants:
         if each in scene.extra_invariants:
             start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
             values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
@@ -115,19 +128,28 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     return np.stack(columns, axis=1)
 
 
-def momenta_of(bodies: Batch) -> Array:
-    """Return the initial momenta (n, 3), kg m^2/s, body axes."""
+def momenta_of(bodies: Batch, rotor: bool = True) -> Array:
+    """Return the initial momenta (n, 3), kg m^2/s, body axes, with or without that of the rotor."""
+    h = bodies.scene.body.rotor_momentum
     if bodies.inertia is None:
-        return bodies.scene.body.momentum(bodies.w_WB_B0)
-    rotor = 0.0 if bodies.scene.body.rotor_momentum is None else bodies.scene.body.rotor_momentum
-    return rotor + np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
+        L_B = bodies.w_WB_B0 @ bodies.scene.body.inertia
+    else:
+        L_B = np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
+    return L_B if h is None or not rotor else L_B + h
 
 
-def field_scales(bodies: Batch) -> Array | float:
-    """Return the magnitude of the potential, J: (n,), or one number for all bodies."""
+def kinetic_energies(bodies: Batch) -> Array:
+    """Return the initial kinetic energies (n,), J, without the constant one of a rotor."""
+    return np.asarray(np.einsum("ni,ni->n", momenta_of(bodies, rotor=False), bodies.w_WB_B0) / 2)
+
+
+def energy_scales(bodies: Batch) -> Array:
+    """Return the sums of all energies (n,), J, as `Scene.energies`."""
+    if bodies.scene.loaded:
+        return np.array([bodies.take(i).energies for i in range(len(bodies))])
     if bodies.scene.potential is None:
-        return 0.0
-    return bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale()
+        return kinetic_energies(bodies)
+    return kinetic_energies(bodies) + (bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale())
 
 
 def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:

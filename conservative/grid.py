@@ -62,6 +62,11 @@ class Grid:
         steps[-1] = self.n_steps
         return steps
 
+    @property
+    def last(self) -> float:
+        """Time at which the last step starts, s."""
+        return (self.n_steps - 1) * self.dt
+
     @cached_property
     def _times(self) -> Array:
         return self.steps * self.dt
@@ -85,7 +90,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     """Return the checked grid of a run of steps dt up to t_end, both in s; the duration is by default the scene's.
 
     Raise `BadInput` if dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1
-    or more, the samples would not fit in memory, or the table of a load ends before t_end.
+    or more, the samples would not fit in memory, or the table of a load ends before the last step.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     if type(dt) is float and SMALLEST <= dt <= end:
@@ -95,12 +100,12 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         step = positive_number("dt", dt, allowed)
         if step > end:
             raise BadInput("dt", f"{step:g}", allowed)
-    for load in scene.loads:
-        load.require_times(end)
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
     n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
     if n_steps > MOST_STEPS:
         raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
+    for load in scene.loads:
+        load.require_times((n_steps - 1) * step)  # the last step may end after it
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
     return _recall_grid(dt=step, n_steps=n_steps, every=every)

@@ -7,6 +7,7 @@ by its code and the values and functions that it uses, because pickle's bytes of
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
@@ -15,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+_LIBRARIES = sys.stdlib_module_names | {"conservative", "numpy", "scipy"}
+"""Packages whose classes are represented by their names."""
 NOT_OF_MOTION = {"of motion": False}
 """Metadata of a field that does not change the motion, such as a name."""
 
@@ -46,6 +49,9 @@ def _list_parts(value: Any, above: list[object]) -> Any:  # noqa: PLR0912  # a b
         used = {name: known[name] for name in sorted({*_names(value.__code__)}) if name in known}
         cells = [cell.cell_contents for cell in value.__closure__ or ()]
         parts = [value.__code__, value.__defaults__, value.__kwdefaults__, used, cells]
+    elif isinstance(value, type) and value.__module__.partition(".")[0] not in _LIBRARIES:
+        own = {name: each for name, each in vars(value).items() if not name.startswith("__") or name == "__call__"}
+        parts = [value.__qualname__, value.__bases__, own]
     elif isinstance(value, ModuleType | type | BuiltinFunctionType | np.ufunc):
         parts = [getattr(value, "__module__", ""), getattr(value, "__qualname__", value.__name__)]
     elif isinstance(value, MethodType):
@@ -60,9 +66,9 @@ def _list_parts(value: Any, above: list[object]) -> Any:  # noqa: PLR0912  # a b
         parts = list(value)
     elif is_dataclass(value):
         parts = [[name, getattr(value, name)] for name in fields_of_motion(type(value))]
-    else:  # an object: its attributes; without any, of C for example, it equals itself only
+    else:  # an object: its class and attributes; one of C, without attributes, equals itself only
         slots = {name: getattr(value, name, None) for base in type(value).__mro__ for name in getattr(base, "__slots__", ())}
-        parts = [type(value).__call__ if callable(value) else None, slots | getattr(value, "__dict__", {}) or id(value)]
+        parts = [type(value), slots | value.__dict__ if hasattr(value, "__dict__") else slots or id(value)]
     return [kind, [_list_parts(part, inner) for part in parts]]
 
 

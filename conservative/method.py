@@ -45,6 +45,17 @@ def _refuse(prepare: Callable[[Any, Scene, Grid], Run]) -> Callable[[Any, Scene,
     return checked
 
 
+def _leave_alone(prepare_many: Callable[[Any, Any, Grid], Any]) -> Callable[[Any, Any, Grid], Any]:
+    """Extend `Method.prepare_many`: bodies with loads, and those that `prepare` refuses, run one by one."""
+
+    @wraps(prepare_many)
+    def checked(method: Method, bodies: Any, grid: Grid) -> Any:
+        scene = bodies.scene
+        return None if scene.loaded or lacking(method.takes, scene.needs) else prepare_many(method, bodies, grid)
+
+    return checked
+
+
 class Method(ABC):
     """An integration method: a frozen dataclass, defined in one file and registered by one entry point.
 
@@ -68,7 +79,7 @@ class Method(ABC):
         for name in ("colour", "variants", "suite", "rank", "candidates"):
             if name in vars(cls):  # these were class attributes in earlier versions
                 raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
-        for name, extend in (("unsupported", _ask_needs), ("prepare", _refuse)):
+        for name, extend in (("unsupported", _ask_needs), ("prepare", _refuse), ("prepare_many", _leave_alone)):
             if name in vars(cls):
                 setattr(cls, name, extend(vars(cls)[name]))
 
@@ -154,6 +165,7 @@ class Method(ABC):
         """Return the run of a `Batch`, which returns a `Block`; None if bodies have to run one by one.
 
         Runs of separate calls can execute in parallel threads. The numbers of a body do not depend on other bodies and runs.
+        Overrides are not asked for scenes with loads, or with parts that the method does not take.
         """
         return None
 

@@ -7,9 +7,13 @@ in `Card.takes` what it takes. `lacking` compares the two: nothing is computed w
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from enum import StrEnum
 from functools import lru_cache
 from typing import Any
+
+from .deferred_imports import ENGINES, METHODS, list_entries, load_entry
+from .errors import MissingEngine, NotLoadable
 
 
 class Need(StrEnum):
@@ -57,9 +61,12 @@ def lacking(takes: Needs, needs: Needs) -> str | None:
 
 @lru_cache(maxsize=256)
 def _reason(missing: Needs, needs: Needs) -> str:
-    from . import registry  # the list of methods imports this module
-
-    able = [name for name, card in registry.list_cards().items() if needs <= card.takes]
+    able = []
+    for group in (METHODS, ENGINES):
+        for name in list_entries(group):
+            with suppress(MissingEngine, NotLoadable):
+                card = getattr(load_entry(group, "method", name), "card", None)
+                able += [name] if card and needs <= card.takes and name not in able else []
     advice = f"these take the whole scene: {join(able)}" if able else "no method or engine takes the whole scene"
     return f"it does not take {join([each.value for each in Need if each in missing])}; {advice}"
 

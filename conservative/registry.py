@@ -19,10 +19,9 @@ that runs in an environment of its own is named the same way, with a version if 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
-from .card import Card, call_with_settings
+from .card import call_with_settings
 from .check import printable_text
 from .deferred_imports import ENGINES, METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
@@ -114,12 +113,3 @@ def list_families() -> dict[str, type[Method]]:
         if isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name:
             families[name] = family
     return families
-
-
-def list_cards() -> dict[str, Card]:
-    """Return the cards of all methods and engines by name, without those that cannot be loaded."""
-    cards = {name: family.card for name, family in list_families().items()}
-    for name in list_engines():
-        with suppress(MissingEngine, NotLoadable):
-            cards.setdefault(name, engine(name).card)
-    return cards

@@ -21,7 +21,7 @@ from .invariants import Invariant, InvariantInTime, axial_direction, balance_of,
 from .needs import LOADS, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
-from .potentials.smoothness import Smoothness, examine
+from .potentials.smoothness import SMOOTH, Smoothness, examine
 from .potentials.turning import Turning
 from .shapes import MassDistribution
 
@@ -121,17 +121,11 @@ class Scene(PickledByFields):
             raise BadInput("flight", describe(flight), "None, or the flight of a scene, and no potential")
         if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
             raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
-        if not isinstance(torque, Torque | None):
-            raise BadInput("torque", describe(torque), "None or a Torque, such as Torque((0, 0, 1.5))")
-        if not isinstance(damping, Damping | None):
-            raise BadInput("damping", describe(damping), "None or a Damping, such as Damping(0.1 * np.eye(3))")
-        if flight is not None and (torque is not None or damping is not None):
-            raise BadInput("torque" if torque else "damping", describe(torque or damping), "None in free flight")
+        for name_of_load, load, kind in (("torque", torque, Torque), ("damping", damping, Damping)):
+            if load is not None and (flight is not None or not isinstance(load, kind)):
+                raise BadInput(name_of_load, describe(load), f"None in free flight, otherwise None or a {kind.__name__}")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        attitude = rotation("R_WB0", R_WB0)
-        for load in filter(None, (torque, damping and damping.of_time, body.motor)):
-            load.require(end, attitude)  # for its exception
         try:
             given: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
@@ -145,7 +139,7 @@ class Scene(PickledByFields):
             self,
             name=name,
             body=body,
-            R_WB0=attitude,
+            R_WB0=rotation("R_WB0", R_WB0),
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
@@ -157,6 +151,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
+        for varying in self.loads:
+            varying.require(end, self.R_WB0)  # for its exception
 
     @cached_property
     def needs(self) -> Needs:
@@ -185,20 +181,14 @@ class Scene(PickledByFields):
         parts = self.torque, self.damping and self.damping.of_time, self.body.motor
         return tuple(load for load in parts if load and not load.constant)
 
-    @cached_property
+    @property
     def breaks(self) -> Array:
-        """Times (n,) in the run at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
-        known = [load.breaks for load in self.loads]
-        times = np.unique(np.concatenate([np.empty(0), *known, self.smoothness.jumps]))
-        return times[times > 0]
+        """Times (n,) above 0 at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
+        return self.smoothness().breaks
 
-    @cached_property
-    def smoothness(self) -> Smoothness:
-        """Jumps of functions without declared break points, and the step that resolves them (`potentials.smoothness`)."""
-        functions = [load for load in self.loads if callable(load.value) and not len(load.breaks)]
-        calls: Any = [(lambda t, f=f: f.value(t, self.R_WB0)) if f.of_attitude else f.value for f in functions]
-        known = np.concatenate([np.empty(0), *(load.breaks for load in self.loads)])
-        return examine(calls, self.t_end, known)
+    def smoothness(self, t_end: float = 0.0) -> Smoothness:
+        """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
+        return examine(self.loads, max(t_end, self.t_end)) if self.loads else SMOOTH
 
     @property
     def integrable(self) -> bool:
@@ -222,10 +212,11 @@ class Scene(PickledByFields):
 
         Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
-        return self._energies or 1.0
+        return self.energies or 1.0
 
     @cached_property
-    def _energies(self) -> float:
+    def energies(self) -> float:
+        """The sum of these energies, J, which is 0 for a body at rest without a field and a load."""
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
@@ -235,7 +226,7 @@ class Scene(PickledByFields):
     def magnitudes(self) -> tuple[int, int | None]:
         """Binary exponents of the largest moment, kg m^2, and of the rate that all energy allows, 1/s; None without energy."""
         moment = math.frexp(float(self.body.moments.max()))[1]
-        energy = self._energies
+        energy = self.energies
         return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
     @cached_property

@@ -135,12 +135,15 @@ class Trajectory:
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
-        place = (*self.place, self.t) if isinstance(invariant, invariants.InvariantInTime) else ()
-        R = self.scene.in_field_axes(self.R_WB, self.t)
-        change = invariant.evaluate(R, self.w_WB_B, *place) - self.scene.initial_value(invariant)
+        change = self.values_of(invariant) - self.scene.initial_value(invariant)
         if invariant.supplied is not None:
             change = change - (np.nan if self.supplied is None else invariant.supplied(self.supplied))
         return np.asarray(change / invariant.scale)
+
+    def values_of(self, invariant: Invariant) -> Array:
+        """Return the values of an invariant at the samples, (n,) or (n, 3), in its unit."""
+        more = (*self.place, self.t) if isinstance(invariant, invariants.InvariantInTime) else ()
+        return invariant.evaluate(self.scene.in_field_axes(self.R_WB, self.t), self.w_WB_B, *more)
 
     def error(self, truth: Trajectory) -> Array:
         """Return the attitude error (n,), rad: the angle between this attitude and that of `truth` at each sample.

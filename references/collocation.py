@@ -37,7 +37,7 @@ def collocate(scene: Scene, grid: Grid, parts: int) -> Trajectory:
     """
     c, b, A = _tableau()
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
-    bends = scene.breaks.astype(np.longdouble)
+    bends = scene.smoothness(grid.last).breaks.astype(np.longdouble)
     stops = np.union1d(ends, bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
     L = scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0 + wheel(scene, ends[:1])[:, 0]
@@ -76,13 +76,15 @@ def _slope(scene: Scene) -> Callable[[Reals, Reals], Reals]:
             field = fixed._replace(back=(np.cos(half), *(-np.sin(half) * n for n in fixed.normal)))
         T = np.zeros_like(y[4:]) if field is None else np.array(field.body_torque((a, b, c, d)))
         turn = -b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x
-        R = from_quaternion(np.array([a, b, c, d]).T.astype(float)) if Need.ATTITUDE in scene.needs else [None] * len(t)
+        R: Any = [None] * len(t)
+        if Need.ATTITUDE in scene.needs:
+            R = from_quaternion(np.array([a, b, c, d]).T.astype(float))
         if scene.damping is not None:
             D = np.array([scene.damping.at(*state) for state in zip(t.astype(float).tolist(), R, strict=True)])
             T = T - np.einsum("nij,jn->in", D, np.array([x, y_, z]))
         if scene.torque is not None:
-            given = [scene.torque.at(*state) for state in zip(t.astype(float).tolist(), R, strict=True)]
-            given = np.array(given, dtype=np.longdouble).T
+            values = [scene.torque.at(*state) for state in zip(t.astype(float).tolist(), R, strict=True)]
+            given = np.array(values, dtype=np.longdouble).T
             T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
         L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
         spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]

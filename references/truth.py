@@ -144,8 +144,9 @@ def confirm(scene: Scene, grid: Grid) -> Truth:
 def _confirm_loads(scene: Scene, grid: Grid) -> Truth:
     """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, checked by SciPy."""
     second, allowed = SciPy("DOP853", TIGHTEST), 1e-8
-    gaps = np.diff(np.union1d(grid.t, scene.breaks[scene.breaks < grid.t[-1]]))
-    parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / scene.smoothness.step))) if scene.loads else 1
+    breaks, step, _ = scene.smoothness(grid.last)
+    gaps = np.diff(np.union1d(grid.t, breaks[breaks < grid.t[-1]]))
+    parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / step)))
     trajectory, change = collocate(scene, grid, parts), np.inf
     while change > CONFIRMED and parts < MOST_PARTS:
         parts, coarse = 2 * parts, trajectory

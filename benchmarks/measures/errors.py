@@ -80,10 +80,8 @@ def measure_drifts(trajectory: Trajectory, truth: Trajectory | None = None) -> l
     scene, n = trajectory.scene, len(trajectory)
     relatives = {invariant.name: trajectory.drift(invariant) for invariant in scene.invariants}
     if truth is not None:
-        R_ref, w_ref = scene.in_field_axes(truth.R_WB[:n], truth.t[:n]), truth.w_WB_B[:n]
-        R = scene.in_field_axes(trajectory.R_WB, trajectory.t)
         for balance in (each for each in scene.invariants if each.supplied):
-            off = balance.evaluate(R, trajectory.w_WB_B) - balance.evaluate(R_ref, w_ref)
+            off = trajectory.values_of(balance) - truth.values_of(balance)[:n]
             relatives[f"{balance.name}, loads of the truth"] = np.asarray(off / balance.scale)
     for name, relative in relatives.items():
         size = sizes(relative)

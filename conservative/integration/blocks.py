@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
 """Largest number of bodies in a block, and the approximate limit on the size of its samples, bytes."""
-SAMPLE_BYTES = 96
-"""Size of a sample: attitude and rates, bytes."""
+SAMPLE_BYTES, LOAD_BYTES = 96, 32
+"""Size of a sample, attitude and rates, and of what loads supplied up to it, bytes."""
 MOST_WAITING = 16
 """Largest number of blocks that wait for a worker of a cluster, in addition to those that run."""
 LONGEST_WAIT = 0.1
@@ -52,17 +52,22 @@ class BlockResult:
         Largest drifts (n, k), dimensionless, by the names of `conservative.drifts.list_drifts`.
     failures
         Failures by the index of the body in the block.
+    supplied
+        `Trajectory.supplied` (n, m, 4), nan without; None in scenes without loads.
     """
 
     R_WB: Array
     w_WB_B: Array
     drifts: Array
     failures: dict[int, IntegrationFailed]
+    supplied: Array | None = None
 
     def put(self, first: int, part: BlockResult) -> None:
         """Insert the result of a part that begins with body number `first`."""
         rows = slice(first, first + len(part))
         self.R_WB[rows], self.w_WB_B[rows], self.drifts[rows] = part.R_WB, part.w_WB_B, part.drifts
+        if self.supplied is not None:
+            self.supplied[rows] = part.supplied
         self.failures.update((first + i, failure) for i, failure in part.failures.items())
 
     def __len__(self) -> int:
@@ -76,11 +81,12 @@ def list_blocks(n: int, grid: Grid) -> range:
 
 def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     """Return the samples of a block. The outcome of each body is the same as from `Method.solve` for the body alone."""
-    n, m = len(bodies), grid.n_samples
+    n, m, loaded = len(bodies), grid.n_samples, bodies.scene.loaded
     run, reference = method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
     if run is None:
-        block, alone = Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool)), np.arange(n)
-        measured = np.empty((n, 5))
+        samples = np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan)
+        block = Block(*samples, np.zeros(n, dtype=bool), supplied=np.full((n, m, 4), np.nan) if loaded else None)
+        alone, measured = np.arange(n), np.empty((n, 5))
     else:
         block = run()
         measured = measure_drifts(bodies, reference, grid, grid.t, block.R_WB, block.w_WB_B)
@@ -94,9 +100,11 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
         if failure is not None:
             failures[i] = failure
     if len(alone):
-        samples = block.R_WB[alone], block.w_WB_B[alone]
-        measured[alone] = measure_drifts(bodies[alone], reference[alone], grid, grid.t, *samples)
-    return BlockResult(block.R_WB, block.w_WB_B, arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B), failures)
+        supplied = None if block.supplied is None else block.supplied[alone]
+        given = grid.t, block.R_WB[alone], block.w_WB_B[alone], supplied
+        measured[alone] = measure_drifts(bodies[alone], reference[alone], grid, *given)
+    drifts = arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B)
+    return BlockResult(block.R_WB, block.w_WB_B, drifts, failures, block.supplied)
 
 
 def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> Any:
@@ -132,6 +140,8 @@ def run_alone(method: Method, bodies: Batch, grid: Grid, i: int, block: Block) -
     except BadInput as refusal:
         return NotRun(str(refusal))
     block.R_WB[i, : len(trajectory)], block.w_WB_B[i, : len(trajectory)] = trajectory.R_WB, trajectory.w_WB_B
+    if block.supplied is not None and trajectory.supplied is not None:
+        block.supplied[i, : len(trajectory)] = trajectory.supplied
     return trajectory.failure
 
 

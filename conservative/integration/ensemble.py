@@ -60,6 +60,9 @@ class Ensemble:
         Exceptions of runs that ended early, by the index of the body.
     choice
         Method, step size and estimated error, if `integrate_many` had a target error, otherwise None.
+    supplied
+        Work, J, and impulse, N m s, world axes, of torque and damping up to each sample (n, m, 4), as in `Trajectory`; nan
+        after a failure and for methods that do not provide it, None for scenes without them.
     """
 
     bodies: Batch
@@ -70,6 +73,7 @@ class Ensemble:
     label: str
     failures: Mapping[int, IntegrationFailed]
     choice: Choice | None = None
+    supplied: Array | None = None
 
     @cached_property
     def t(self) -> Array:
@@ -174,6 +178,7 @@ class Ensemble:
                 bodies=self.bodies[i],
                 R_WB=self.R_WB[i],
                 w_WB_B=self.w_WB_B[i],
+                supplied=None if self.supplied is None else self.supplied[i],
                 drifts={name: values[i] for name, values in self.drifts.items()},
                 failures={k: self.failures[number] for k, number in enumerate(numbers) if number in self.failures},
             )
@@ -181,7 +186,11 @@ class Ensemble:
         failure, R_WB, w_WB_B = self.failures.get(i), np.asarray(self.R_WB[i]), np.asarray(self.w_WB_B[i])
         m = len(self.t) if failure is None else int(np.isfinite(w_WB_B).all(axis=1).sum())
         counters = Counters(self.grid.n_steps if failure is None else max(0, m - 1) * self.grid.every)
-        return Trajectory(self.bodies.take(i), self.t[:m], R_WB[:m], w_WB_B[:m], self.label, counters, failure, self.choice)
+        supplied = None if self.supplied is None else np.asarray(self.supplied[i])[:m]
+        if supplied is not None and np.isnan(supplied).any():  # the method does not provide it
+            supplied = None
+        samples = self.t[:m], R_WB[:m], w_WB_B[:m]
+        return Trajectory(self.bodies.take(i), *samples, self.label, counters, failure, self.choice, supplied)
 
     def to_zarr(self, path: str | Path) -> None:
         """Write the ensemble to a new folder, from which `open_ensemble(path)` reads it: see `conservative.integration.store`.
@@ -199,7 +208,8 @@ class Ensemble:
             for first in store.blocks:
                 part = self[first : first + store.blocks.step]
                 drifts = np.stack(list(part.drifts.values()), axis=1)
-                store.write(first, part.bodies, BlockResult(part.R_WB, part.w_WB_B, drifts, dict(part.failures)))
+                result = BlockResult(part.R_WB, part.w_WB_B, drifts, dict(part.failures), part.supplied)
+                store.write(first, part.bodies, result)
 
     def __len__(self) -> int:
         return len(self.bodies)
@@ -236,7 +246,8 @@ def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
     store = open_store(path)
     bodies, (drifts, failures), record = store.read_bodies(scene), store.read_results(), store.record
     grid = Grid(record["dt"], record["n_steps"], record["sample_every"])
-    return Ensemble(bodies, grid, store.arrays["R_WB"], store.arrays["w_WB_B"], drifts, record["method"], failures)
+    samples = store.arrays["R_WB"], store.arrays["w_WB_B"]
+    return Ensemble(bodies, grid, *samples, drifts, record["method"], failures, supplied=store.arrays.get("supplied"))
 
 
 def ensemble_of_one(bodies: Batch, grid: Grid, trajectory: Trajectory, choice: Choice | None) -> Ensemble:
@@ -244,6 +255,9 @@ def ensemble_of_one(bodies: Batch, grid: Grid, trajectory: Trajectory, choice: C
     n, failure = len(trajectory), trajectory.failure
     R_WB, w_WB_B = np.full((1, grid.n_samples, 3, 3), np.nan), np.full((1, grid.n_samples, 3), np.nan)
     R_WB[0, :n], w_WB_B[0, :n] = trajectory.R_WB, trajectory.w_WB_B
-    measured = bodies.first.derive(drifts_of, frozenset())(grid, grid.t, R_WB, w_WB_B)
+    supplied = np.full((1, grid.n_samples, 4), np.nan) if bodies.scene.loaded else None
+    if supplied is not None and trajectory.supplied is not None:
+        supplied[0, :n] = trajectory.supplied
+    measured = bodies.first.derive(drifts_of, frozenset())(grid, grid.t, R_WB, w_WB_B, supplied)
     drifts = dict(zip(list_drifts(bodies), arrange_drifts(bodies, measured, R_WB, w_WB_B).T, strict=True))
-    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, trajectory.label, {0: failure} if failure else {}, choice)
+    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, trajectory.label, {0: failure} if failure else {}, choice, supplied)

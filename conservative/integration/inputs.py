@@ -32,8 +32,6 @@ def read_bodies(
 
     Raise `BadInput` if an argument has the wrong shape, or `Scene` or one of its parts rejects a body.
     """
-    if scene.loaded:
-        raise BadInput("scene", f"{scene.name!r} with a torque or damping", "a scene without them; integrate takes one body")
     with suppress(Exception):  # not a Rotation: the checks below report the error
         R_WB0 = R_WB0.as_matrix()
     given: dict[str, Array] = {}

@@ -20,11 +20,11 @@ from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
 from ..method import Method
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
+from .blocks import LOAD_BYTES, BlockResult, list_blocks, run_blocks, start_workers
 from .blocks import SAMPLE_BYTES as STORED_BYTES
-from .blocks import BlockResult, list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
-from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support
+from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
 from .shared_choice import choose_for_all, pick_hardest
 from .store import write_store
 
@@ -55,7 +55,8 @@ def integrate_many(
     Parameters
     ----------
     scene
-        The scene of all bodies. It provides everything that is not given here.
+        The scene of all bodies. It provides everything that is not given here. In free flight the rotation is integrated, and
+        trajectories have the positions that follow from it and the exact parabola of the centre of mass.
     R_WB0
         Attitudes at t = 0 (n, 3, 3), body to world, or n rotations as a SciPy `Rotation`.
     w_WB_B0
@@ -106,43 +107,47 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    scene = rotation_only(scene)
+    flight, scene = scene.flight, rotation_only(scene)
     _check_options(threads, progress, path, resume)
     only_scene = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(Batch.of) if only_scene else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
+    flying = bodies if flight is None else replace(bodies, scene=bodies.scene.rename(bodies.scene.name, flight=flight))
     choice: ChoiceForMany | None = None
     try:
         if error is None:
             chosen = read_method(method, bodies.first)
             grid = grid_for(bodies.first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
             require_support(chosen, bodies.first)
+            warn_of_loads(bodies.first, chosen, grid.dt)
             if len(bodies) > 1:  # the run of a single body raises the error itself
                 _require_steps(chosen, bodies, grid)
         else:
             choice = choose_for_all(bodies, error, *read_target(bodies.first, error, method, dt, t_end, sample_every))
             chosen, grid = choice.method, choice.grid
         if len(bodies) == 1 and path is None and client is None:
-            ensemble = ensemble_of_one(bodies, grid, chosen.solve(bodies.first, grid), choice)
+            ensemble = ensemble_of_one(flying, grid, chosen.solve(bodies.first, grid), choice)
             if progress is not None:
                 progress(ProgressOfMany(0.0, 1, 1))
             return ensemble
         blocks = list_blocks(len(bodies), grid)
         if path is None:
-            n, m, most = len(bodies), grid.n_samples, most_samples() * SAMPLE_BYTES // STORED_BYTES
+            size = STORED_BYTES + LOAD_BYTES * bodies.scene.loaded
+            n, m, most = len(bodies), grid.n_samples, most_samples() * SAMPLE_BYTES // size
             if n * m > most:
-                allowed = f"more steps between samples, or a path: {most:.3g} samples of {STORED_BYTES} bytes fit in memory"
+                allowed = f"more steps between samples, or a path: {most:.3g} samples of {size} bytes fit in memory"
                 raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
             names = list_drifts(bodies)
-            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {})
+            supplied = np.empty((n, m, 4)) if bodies.scene.loaded else None
+            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {}, supplied)
             with start_workers(client, threads, len(blocks)) as workers:
                 run_blocks(chosen, bodies, grid, workers, blocks, lambda i, _, part: whole.put(i, part), progress)
             drifts = dict(zip(names, whole.drifts.T, strict=True))
-            return Ensemble(bodies, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice)
-        stored = write_store(path, chosen.label, bodies, grid, resume)
+            return Ensemble(flying, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice, supplied)
+        stored = write_store(path, chosen.label, flying, grid, resume)
         with start_workers(client, threads, len(blocks)) as workers, stored as store:
             left = [first for first in blocks if not store.is_whole(first)]
             run_blocks(chosen, bodies, grid, workers, left, store.write, progress)
-        return replace(open_ensemble(path, bodies.scene), choice=choice)
+        return replace(open_ensemble(path, flying.scene), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # if it is the failure itself, it keeps its own cause
 

@@ -35,8 +35,8 @@ def require_support(method: Method, scene: Scene) -> None:
 
 def warn_of_loads(scene: Scene, method: Method, dt: float) -> None:
     """Warn if fixed steps, s, are too long for a function of time; adaptive methods are told the longest step."""
-    if scene.loads and method.order is not None and dt > scene.smoothness.step:
-        warnings.warn(LoadNotResolved(dt, *scene.smoothness[1:]), stacklevel=3)
+    if scene.loads and method.order is not None and dt > scene.smoothness().step:
+        warnings.warn(LoadNotResolved(dt, *scene.smoothness()[1:]), stacklevel=3)
 
 
 _REDUCED = Reduced()

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..check import read_only
+from ..check import PickledByFields, read_only
 from ..errors import require_extra, restore
 
 LOCK = threading.Lock()
@@ -87,7 +87,7 @@ def _pickler() -> Any:
                 return restore, (type(value), value.args, vars(value))
             kind: Any = type(value)
             cached = _cached_names(kind)
-            if not cached.isdisjoint(getattr(value, "__dict__", ())):
+            if not isinstance(value, PickledByFields) and not cached.isdisjoint(getattr(value, "__dict__", ())):
                 return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
             return super().reducer_override(value)
 

@@ -44,7 +44,8 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
         raise BadInput("scene", describe(scene), "None, or the Scene of the run")
     if not record["fields"]["extra_invariants"]["tuple"]:
         scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
-    scene = rotation_only(scene)
+    if "flight" not in record["fields"]:  # as earlier versions wrote it
+        scene = rotation_only(scene)
     if not is_same_motion(record, record_scene(scene)):
         raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
     return scene

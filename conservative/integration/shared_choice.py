@@ -18,14 +18,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..batch import Batch
-from ..drifts import field_scales, momenta_of
+from ..drifts import energy_scales
 from ..errors import AccuracyNotReached
 from ..grid import Grid
 from ..method import Method
 from ..methods.automatic import cut_step, grid_of
 from ..methods.between import SampleTimes
 from ..methods.search import find_cheapest
-from ..methods.trials import Estimate, trials_of
+from ..methods.trials import Estimate, parts_for, trials_of
 from ..outcome import ChoiceForMany
 
 HARDEST, RANDOM, VERIFIED = 3, 5, 8
@@ -48,17 +48,17 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTim
     method, dt = find_cheapest(trials_of(bodies.take(chosen[0])), error, t_end)
     if method.order is None:
         dt = min(dt, LONGEST * min(method.longest_step(bodies.take(i)) for i in numbers))
-    attempts: tuple[tuple[float, float], ...] = ()
+    attempts, parts = tuple[tuple[float, float], ...](), parts_for(bodies.scene)
     for _ in range(ROUNDS):
         tried = cut_step(
             method,
             dt,
             error,
-            lambda dt: grid_of(dt, t_end, samples),
+            lambda dt: grid_of(dt, t_end, samples, parts),
             lambda grid: find_worst(bodies, chosen, method, grid)[0],  # noqa: B023  # called in this round only
         )
         attempts, (dt, estimate) = attempts + tried, tried[-1]
-        grid = grid_of(dt, t_end, samples)
+        grid = grid_of(dt, t_end, samples, parts)
         worst, number = find_worst(bodies, verified, method, grid)
         if worst.total <= error or estimate > error:
             break
@@ -78,8 +78,7 @@ def pick(bodies: Batch) -> list[int]:
 
 def pick_hardest(bodies: Batch) -> list[int]:
     """Return the numbers of the bodies whose energy allows the fastest rotation, the fastest first."""
-    energy = np.sum(momenta_of(bodies) * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
-    rates = np.sqrt(energy) / np.sqrt(bodies.principal[0].min(axis=1))
+    rates = np.sqrt(energy_scales(bodies)) / np.sqrt(bodies.principal[0].min(axis=1))
     fastest = np.argpartition(-rates, min(HARDEST, len(rates) - 1))[:HARDEST]
     return fastest[np.argsort(-rates[fastest], kind="stable")].tolist()
 

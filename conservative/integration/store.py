@@ -2,6 +2,7 @@
 
     R_WB, w_WB_B     samples (n, m, 3, 3), body to world, and (n, m, 3), rad/s, body axes; nan after a failure
     t                times (m,), s
+    supplied         work and impulse of loads (n, m, 4), J and N m s, as in `Trajectory`; in scenes with loads only
     drifts           largest drifts (n, k), dimensionless; the attribute `names` lists the quantities
     outcome          kinds of outcomes (n,), as indices into the attribute `kinds`
     failure          the exceptions of bodies that failed (n,), as JSON; otherwise empty
@@ -127,6 +128,7 @@ class Store:
             text = json.dumps({"type": name if known else "", **values}, default=lambda number: number.item())
             kinds[i], failures[i] = _KINDS.index(failure.outcome.kind), text
         columns = {"R_WB": result.R_WB, "w_WB_B": result.w_WB_B, "drifts": result.drifts, "outcome": kinds, "failure": failures}
+        columns |= {} if result.supplied is None else {"supplied": result.supplied}
         try:
             for name, column in (columns | list_inputs(bodies)).items():
                 self.arrays[name][first : first + len(result)] = column
@@ -253,6 +255,8 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
     group.create_array("t", data=grid.t, dimension_names=("sample",), **options)
     add("R_WB", (n, m, 3, 3), ("body", "sample", "world", "axis"))
     add("w_WB_B", (n, m, 3), ("body", "sample", "axis"))
+    if "supplied" in record:
+        add("supplied", (n, m, 4), ("body", "sample", "quantity"))
     add("drifts", (n, len(names)), ("body", "name")).update_attributes({"names": list(names)})
     add("outcome", (n,), ("body",), "uint8", 255).update_attributes({"kinds": list(_KINDS)})
     add("failure", (n,), ("body",), "string", "")
@@ -282,7 +286,7 @@ def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
         "block": min(list_blocks(len(bodies), grid).step, len(bodies)),
         "scene": record_scene(bodies.scene),
         "digests": {name: hashlib.sha256(values.data).hexdigest()[:16] for name, values in inputs.items()},
-    }
+    } | ({"supplied": True} if bodies.scene.loaded else {})
 
 
 def read_record(place: Path, allowed: str = NEW_FOLDER) -> dict[str, Any]:
@@ -307,7 +311,8 @@ def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
     try:
         with zarr.config.set({"array.write_empty_chunks": True}):
             group = zarr.open_group(place, mode=mode, zarr_format=3)
-            return Store(place, record, {name: group[name] for name in (*_RESULTS, *record["digests"])})
+            names = (*_RESULTS, *(["supplied"] if "supplied" in record else ()), *record["digests"])
+            return Store(place, record, {name: group[name] for name in names})
     except Exception as error:  # KeyError for a missing array, and anything for damaged metadata
         allowed = "an ensemble that can be read, or a new folder"
         raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", allowed) from None

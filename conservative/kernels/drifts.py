@@ -32,7 +32,7 @@ def largest_skewness(R):
 
 
 @entry
-def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts):
+def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, drifts):
     """Measure the largest drifts of n bodies over m samples.
 
     Parameters
@@ -43,6 +43,8 @@ def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts):
         Attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     V
         Energies (n, m), J, to add to the kinetic ones; (0, 0) if there are none.
+    impulse
+        Impulses (n, m, 3) of loads, N m s, world axes, to subtract from the momenta; None without loads.
     rotor
         Momentum (3,) of the rotor of all bodies, kg m^2/s, body axes; None without one.
     reference
@@ -76,6 +78,9 @@ def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, rotor, reference, drifts):
                 L_B = (L_B[0] + rotor[0], L_B[1] + rotor[1], L_B[2] + rotor[2])
             L = transform(axes, transform(R, L_B))
             a, b, c = L[0] - at[6, 0], L[1] - at[6, 1], L[2] - at[6, 2]
+            if impulse is not None:
+                S = transform(axes, impulse[i, k])
+                a, b, c = a - S[0], b - S[1], c - S[2]
             of_R = largest_skewness(R)
             of_energy = abs((E - at[8, 0]) * at[8, 1])
             of_momentum = a * a + b * b + c * c

@@ -116,7 +116,10 @@ class TorquesOfAttitude(NamedTuple):
     address: Any
     rows: Any
     now: Any = (0.0, 0.0, 0.0)
-    at = Torques.at
+
+    def at(self, t, first, last, *q):
+        """Return the torques as `Torques.at`."""
+        return Torques.at(self, t, first, last, *q)
 
 
 class DampingOfAttitude(NamedTuple):
@@ -125,7 +128,10 @@ class DampingOfAttitude(NamedTuple):
     address: Any
     rows: Any
     now: Any = (0.0, 0.0, 0.0)
-    at = DampingInTime.at
+
+    def at(self, t, first, last, *q):
+        """Return the rows of the matrix as `DampingInTime.at`."""
+        return DampingInTime.at(self, t, first, last, *q)
 
 
 class Wheel(NamedTuple):

@@ -151,10 +151,11 @@ def move(
     q = np.ascontiguousarray(to_quaternion(R[far] @ body.R_BP))
     L = np.zeros((len(far), 7 if scene.loaded else 3))
     L[:, :3] = (w[far] * units.time @ body.R_BP) * body.moments
-    field = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
+    field: Any = UniformField(0.0, 0.0, 0.0) if start.field is None else start.field  # there is code for it anyway
     table = (*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
-    now, left, edges = times.copy(), gaps[far] / units.time, np.concatenate([[-math.inf], scene.breaks, [math.inf]])
+    breaks = scene.smoothness(float(times[-1])).breaks
+    now, left, edges = times.copy(), gaps[far] / units.time, np.concatenate([[-math.inf], breaks, [math.inf]])
     moved, waiting = len(far), np.arange(len(far))
     while len(waiting):  # once, or once more for each break point in a gap
         place = np.searchsorted(edges, now[waiting] * (1 + SAME), side="right")

@@ -24,12 +24,15 @@ class Block:
         `failures` has the reason.
     failures
         Failures by the index of the body, the same as of each body alone. Their samples after the failure are nan.
+    supplied
+        `Trajectory.supplied` (n, s, 4), nan without; None in scenes without loads.
     """
 
     R_WB: Array
     w_WB_B: Array
     finished: Any
     failures: Mapping[int, IntegrationFailed] = field(default_factory=dict)
+    supplied: Array | None = None
 
 
 RunMany = Callable[[], Block]

@@ -18,6 +18,7 @@ from ..invariants import jacobi_scale, largest_momentum
 from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning
+from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from .non_spinning import Resolved
 
@@ -87,7 +88,7 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     L = (scene.w_WB_B0 @ R_BP) * moments
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
     if scene.loaded:
-        field = load_field(field, scene.torque, scene.damping, R_BP, scene.body.motor)
+        field = load_field(field or UniformField(0.0, 0.0, 0.0), scene.torque, scene.damping, R_BP, scene.body.motor)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
     rotor = None if scene.body.motor else scene.body.rotor_along(R_BP)
     q = quadruple(scene.R_WB0 @ R_BP)

@@ -43,8 +43,8 @@ def prepare_run(
     q, L = np.empty((n, 4)), np.empty((n, 7 if loaded else 3))
     bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
     enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
-    if scene.loaded and find_coefficients and len(scene.breaks):
-        enter = partial(march_pieces, list_pieces(grid, scene.breaks.tolist()), kernel, model, find_coefficients, grid)
+    if find_coefficients and len(breaks := scene.smoothness(grid.last).breaks):
+        enter = partial(march_pieces, list_pieces(grid, breaks.tolist()), kernel, model, find_coefficients, grid)
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
     counters = _NO_COUNTERS

@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
 
+import numpy as np
+
 from .. import registry
 from ..errors import MissingEngine
 from ..grid import Grid
@@ -165,8 +167,9 @@ def begin(method: Method, scene: Scene, error: float, t_end: float) -> Candidate
     rate = bound_rate(scene)
     duration = min(t_end, PROBE_RADIANS / rate)
     dt = min(duration / 2, method.card.longest / rate)
-    if scene.loads:
-        dt = min(dt, scene.smoothness.step)
+    if scene.loads:  # runs at two and four times the step have to differ everywhere (`conservative.methods.pieces`)
+        breaks, step, _ = scene.smoothness(t_end)
+        dt = min(dt, step, t_end / 4 / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
     return Candidate(method, error * min(1.0, 4 * duration / t_end), duration, rate, dt)

@@ -24,7 +24,6 @@ from ..check import read_only, replace_unchecked
 from ..grid import Grid
 from ..method import Method, Run
 from ..potentials.potential import depends_on_time
-from ..potentials.smoothness import Smoothness
 from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -63,7 +62,7 @@ class Units:
             rotor = read_only(rotor / self.moment * self.time)
         motor = motor and motor.in_units(self.moment / self.time, self.time)
         inertia = read_only(scene.body.inertia / self.moment)
-        converted = replace_unchecked(
+        return replace_unchecked(
             scene,
             body=replace_unchecked(scene.body, inertia=inertia, rotor_momentum=rotor, motor=motor),
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
@@ -75,11 +74,6 @@ class Units:
             extra_invariants=(),
             flight=flight,
         )
-        if scene.loads:  # found once
-            jumps, step, interval = scene.smoothness
-            known = Smoothness(jumps / self.time, step / self.time, (interval[0] / self.time, interval[1] / self.time))
-            vars(converted)["smoothness"] = known
-        return converted
 
     def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""

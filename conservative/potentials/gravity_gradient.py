@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arithmetic import add, apply, cross, dot, fuse, halfway, in_body, scale, times
 from ..attitude import Array
-from ..body import RigidBody
-from ..check import positive_number, replace_unchecked, set_fields, unit_vector
+from ..check import positive_number, read_inertia, replace_unchecked, set_fields, unit_vector
 from ..needs import Need, Needs
 from .field import FieldPotential
 
@@ -127,7 +126,7 @@ class GravityGradient(FieldPotential):
         set_fields(
             self,
             rate=positive_number("rate", rate, "a finite rate above 0, rad/s"),
-            inertia=RigidBody(inertia).inertia,
+            inertia=read_inertia(inertia),
             direction_W=unit_vector("direction_W", direction_W),
         )
 

@@ -25,7 +25,6 @@ from ..deferred_imports import kernels
 from ..errors import BadInput, TorqueFailed
 from ..needs import Need, Needs
 from .callback import find_address
-from .uniform_gravity import UniformField
 
 FRAMES = ("body", "world")
 _TIMES = "two or more times (n,), s, that do not decrease; two equal ones are a jump"
@@ -136,6 +135,7 @@ class OfTime(PickledByFields):
     name: ClassVar[str]
     shape: ClassVar[tuple[int, ...]]
     one: ClassVar[str]
+    may_jump: ClassVar[bool] = True
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
@@ -258,7 +258,7 @@ def find_corners(times: Array, values: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.diff(rows, axis=0) / gaps[:, None]
         bend, size = np.abs(np.diff(slopes, axis=0)).max(axis=1), np.abs(slopes).max(axis=1)
-        straight = bend <= _STRAIGHT * np.maximum(size[1:], size[:-1])  # False at a jump, where slopes are not finite
+        straight = (bend <= _STRAIGHT * np.maximum(size[1:], size[:-1])) & (gaps[1:] > 0) & (gaps[:-1] > 0)
     return np.unique(times[np.concatenate([[True], ~straight, [True]])])
 
 
@@ -332,6 +332,7 @@ class RotorMomentum(OfTime):
     """The momentum of a rotor that a motor turns, without jumps."""
 
     name: ClassVar[str] = "rotor_momentum"
+    may_jump: ClassVar[bool] = False
     shape: ClassVar[tuple[int, ...]] = (3,)
     one: ClassVar[str] = "three finite numbers (3,), kg m^2/s"
 
@@ -410,15 +411,15 @@ def load_field(
     kernel, rows, zero = kernels("function_field"), tuple(triple(row) for row in R_BP), (0.0, 0.0, 0.0)
     body = world = zero
     call: Any = ()
+    matrix: Any = (zero, zero, zero)
+    resistance: Any = ()
     if torque is not None and torque.constant:
         body, world = (triple(torque.at(0.0) @ R_BP), zero) if torque.frame == "body" else (zero, triple(torque.at(0.0)))
     elif torque is not None:
         call = (kernel.TorquesOfAttitude if torque.of_attitude else kernel.Torques)(find_address(torque), rows)
-    matrix, resistance = (zero, zero, zero), ()
-    if damping is not None and (varying := damping.of_time) is None:
-        matrix = tuple(triple(row) for row in R_BP.T @ damping.at(0.0) @ R_BP)
-    elif damping is not None:
+    if damping is not None and (varying := damping.of_time):
         resistance = (kernel.DampingOfAttitude if varying.of_attitude else kernel.DampingInTime)(find_address(damping), rows)
+    elif damping is not None:
+        matrix = tuple(triple(row) for row in R_BP.T @ damping.at(0.0) @ R_BP)
     wheel = () if motor is None else kernel.Wheel(find_address(motor), rows)
-    beside = UniformField(0.0, 0.0, 0.0) if field is None else field
-    return Loaded(beside, call, body, world, matrix, 0.0, resistance, wheel)
+    return Loaded(field, call, body, world, matrix, 0.0, resistance, wheel)

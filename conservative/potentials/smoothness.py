@@ -8,44 +8,67 @@ times: blocks for which both agree are short enough for a step. What is shorter 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attitude import Array
+from ..attitude import Array, rotation_about
+from ..check import read_only
+from ..errors import BadInput
 
 SCANNED = 2**16
 """Number of intervals of a scan."""
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
+ATTITUDE = read_only(rotation_about((1.0, 2.0, 3.0), 1.0))
+"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones."""
 STEEP, MOST_JUMPS = 10.0, 1000
 """An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
 
 
 class Smoothness(NamedTuple):
-    """Times (n,) of jumps, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
+    """Break points (n,) above 0, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
 
-    jumps: Array
+    breaks: Array
     step: float
     interval: tuple[float, float]
 
 
-def examine(functions: Sequence[Callable[[float], Array]], t_end: float, breaks: Array) -> Smoothness:
-    """Return the smoothness of functions from 0 to t_end, s, apart from their known break points (n,), s."""
-    jumps, step, interval = [breaks[:0]], math.inf, (0.0, t_end)
+SMOOTH = Smoothness(np.empty(0), math.inf, (0.0, math.inf))
+"""Smoothness of a scene without loads that depend on time."""
+
+
+@lru_cache(maxsize=64)
+def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
+    """Return the smoothness of loads (`conservative.potentials.load.OfTime`) from 0 to t_end, s.
+
+    Functions of time and attitude are evaluated at `ATTITUDE`. So the result is the same for all scenes with these loads,
+    such as the bodies of an ensemble, and found once.
+    """
+    step, interval = math.inf, (0.0, t_end)
+    breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
-    for function in functions:
+    for load in loads:
+        function = partial(_at_attitude, load.value) if load.of_attitude else load.value
         try:
             values = np.array([function(t) for t in times.tolist()], dtype=float).reshape(SCANNED + 1, -1)
-        except Exception:  # the run reports a function that fails
+        except Exception:  # a table; or a function that fails, which the run reports
             continue
-        found = np.array(_find_jumps(function, times, values))
-        resolved, where = _resolve(times, values, np.concatenate([breaks, found]))
-        jumps.append(found)
+        found = _find_jumps(function, times, values)
+        found = [t for t in found if not np.isclose(t, breaks, rtol=1e-12, atol=1e-12 * t_end).any()]
+        if found and not load.may_jump:
+            raise BadInput(load.name, f"a function that jumps at t = {found[0]:g} s", "a function without jumps")
+        breaks = np.union1d(breaks, found)
+        resolved, where = _resolve(times, values, breaks)
         if resolved < step:
             step, interval = resolved, where
-    return Smoothness(np.unique(np.concatenate(jumps)), step, interval)
+    return Smoothness(read_only(breaks[breaks > 0]), step, interval)
+
+
+def _at_attitude(function: Callable[[float, Array], Array], t: float) -> Array:
+    return function(t, ATTITUDE)
 
 
 def _find_jumps(function: Callable[[float], Array], times: Array, values: Array) -> list[float]:
@@ -77,7 +100,7 @@ def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[f
         rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
         off = np.abs(rule - dense).max(axis=1)
         for side in ("left", "right"):  # a break point between two blocks is part of both
-            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0  # type: ignore[call-overload]
+            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0
         if off.mean() > AGREED * total:
             worst = int(off.argmax())
             return result[0], (float(times[worst * size]), float(times[(worst + 1) * size]))

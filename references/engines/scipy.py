@@ -95,7 +95,7 @@ class SciPy(Method):
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         atol = self.rtol * np.repeat([1.0, rate_scale], [4, 3])
         solver = _count_steps(getattr(integrate, self.integrator))
-        pieces = list_derivatives(scene, float(grid.t[-1]))
+        pieces = list_derivatives(scene, float(grid.t[-1]), last=grid.last)
 
         def run() -> Trajectory:
             solver.steps = 0
@@ -110,12 +110,16 @@ class SciPy(Method):
 Pieces = list[tuple[float, float, Derivative]]
 
 
-def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0) -> Pieces:
-    """Return the times, s, between which a scene is smooth, from its start to its end, and the derivative between each two."""
-    inner = scene.breaks[(scene.breaks > t_start) & (scene.breaks < t_end)].tolist()
+def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0, last: float = 0.0) -> Pieces:
+    """Return the times, s, between which a scene is smooth, from t_start to t_end, s, and the derivative between each two.
+
+    Break points are known until `last`, s, at least the end of the scene.
+    """
+    breaks = scene.smoothness(last).breaks
+    inner = breaks[(breaks > t_start) & (breaks < t_end)].tolist()
     ends = [t_start, *inner, t_end]
-    edges = [-math.inf, *scene.breaks.tolist(), math.inf]
-    first = int(np.searchsorted(scene.breaks, t_start, side="right"))
+    edges = [-math.inf, *breaks.tolist(), math.inf]
+    first = int(np.searchsorted(breaks, t_start, side="right"))
     windows = list(pairwise(edges))[first:]
     return [(a, b, state_derivative(scene, window)) for (a, b), window in zip(pairwise(ends), windows, strict=False)]
 
@@ -137,7 +141,7 @@ def solve_pieces(
     axes, found, evaluations, reason = principal_axes(scene), [], 0, ""
     wheel = wheel_rates(scene)
     y = np.concatenate([axes.q0, axes.w0 + wheel(pieces[0][0])])
-    longest = scene.smoothness.step if scene.loads else math.inf
+    longest = scene.smoothness().step
     for a, b, derivative in pieces:
         last = b == pieces[-1][1]
         some = t[(t >= a) & ((t < b) | last)]

@@ -28,7 +28,7 @@ from ..worker.client import EngineCrashed
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """Numbers that all bodies of a run have in common."""
 
-FIELDS: dict[type, tuple[str, ...]] = {
+FIELDS: dict[Any, tuple[str, ...]] = {
     Turning: (),
     UniformGravity: (),
     LinearSpring: ("point", "anchor", "stiffness", "rest_length"),
@@ -37,7 +37,7 @@ FIELDS: dict[type, tuple[str, ...]] = {
 }
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
 
-NEEDS: dict[type, Needs] = {kind: frozenset({Need.TURNING}) if kind is Turning else kind.needs for kind in FIELDS}
+NEEDS: dict[Any, Needs] = {kind: frozenset({Need.TURNING}) if kind is Turning else kind.needs for kind in FIELDS}
 """What these fields need."""
 
 

@@ -31,7 +31,7 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
     metavar="M,N",
     shell_complete=completion.methods,
     help="Methods, one panel each; the reference solutions `exact` and `precise` are also the outline in the other panels.  "
-    f"[default: {DEFAULT_METHOD}]",
+    f"[default: {DEFAULT_METHOD}, or the first method that supports the scene]",
 )
 @click.option("--dt", type=float, help="Step size, s.  [default: the step that an engine's users take, or the scene's]")
 @t_end_option
@@ -51,6 +51,7 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
     require_extra("conservative watch", "report", "rich")
     from conservative import registry
     from conservative.files import text_file
+    from conservative.integration.one import read_method
     from conservative.method import Role
     from conservative.trajectory import Trajectory
 
@@ -62,7 +63,7 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
     if out.suffix not in KINDS:
         raise BadInput("out", repr(str(out)), f"a file that ends in {', '.join(KINDS)}")
     body = registry.scene(scene)
-    names = split_names("method", methods) or [DEFAULT_METHOD]
+    names = split_names("method", methods) or [read_method(None, body).name]
     chosen = [registry.method(name) for name in names]
     longest = body.t_end if t_end is None else t_end
     steps = [min(method.card.usual_dt or body.dt, longest) if dt is None else dt for method in chosen]

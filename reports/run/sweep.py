@@ -16,7 +16,7 @@ from conservative import registry
 from conservative.check import describe, positive_number
 from conservative.errors import AccuracyNotReached, BadInput, NotWritten, nearest
 from conservative.grid import MOST_STEPS, Grid, grid_for
-from conservative.integration.blocks import SAMPLE_BYTES
+from conservative.integration.blocks import LOAD_BYTES, SAMPLE_BYTES
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
@@ -57,7 +57,7 @@ class Sweep:
     @property
     def size(self) -> str:
         """The size of all samples, such as `58 MB`."""
-        size = len(self.starts["R_WB0"]) * self.samples * SAMPLE_BYTES
+        size = len(self.starts["R_WB0"]) * self.samples * (SAMPLE_BYTES + LOAD_BYTES * self.scene.loaded)
         power = min(max(0, int(math.log10(size) // 3)), 4)
         return f"{size / 1000**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
 
