@@ -234,6 +234,8 @@ def _fitted(case: Case, name: str) -> Finding:
             of = of.read(*(None if each is None else each @ turn for each in of.data))
         elif name == "another body":
             of = replace(of, scene=_stretched(scene, expm(np.concatenate(part)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])))
+            if _impossible(of.scene.body) and not _impossible(scene.body):
+                return of, _no_motion(of)
         elif name == "first row":
             R0, w0 = scene.R_WB0 @ Rotation.from_rotvec(part[0]).as_matrix(), scene.w_WB_B0 + part[1] * of.scale
             of = replace(of, scene=scene.rename(scene.name, R_WB0=R0, w_WB_B0=w0))
@@ -243,7 +245,7 @@ def _fitted(case: Case, name: str) -> Finding:
             try:
                 return of, of.truth(of.start + elapsed * (1 + rate) + shift)
             except TorqueFailed:  # a function may end with the rows
-                return of, (np.full((len(of.t), 3, 3), np.nan), np.full((len(of.t), 3), np.nan))
+                return of, _no_motion(of)
         else:
             return of, of.move(of.t, name == "damped", float(sum(part[0] * units)))
         return of, of.truth(of.t)
@@ -314,6 +316,15 @@ def _parts(case: Case) -> Iterator[Finding]:
         other = replace(case, scene=scene.rename(scene.name, **change))
         if other.scene.key != scene.key:
             yield _finding(case, name, text, {}, other, other.truth(other.t))
+
+
+def _no_motion(of: Case) -> Motion:
+    return np.full((len(of.t), 3, 3), np.nan), np.full((len(of.t), 3), np.nan)
+
+
+def _impossible(body: RigidBody) -> bool:
+    """Return whether a moment exceeds the sum of the other two."""
+    return bool(2 * body.moments.max() > (1 + 1e-6) * body.moments.sum())
 
 
 def _stretched(scene: Scene, stretch: Array) -> Scene:
