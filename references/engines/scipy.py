@@ -221,7 +221,9 @@ def state_derivative(scene: Scene, window: Window = (-math.inf, math.inf)) -> De
         w = y[4:] - turning
         out = of_field(t, np.concatenate([y[:4], w]))
         momentum = axes.J * turning if scene.body.motor is not None else axes.rotor
-        out[4:] += (np.cross(momentum, w) + np.array(loads.at_time(t).load(y[:4], w))) / axes.J
+        (a, b, c), (x, y_, z) = momentum.tolist(), w.tolist()
+        gyration = b * z - c * y_, c * x - a * z, a * y_ - b * x  # `np.cross` takes a third of the time of all this
+        out[4:] += np.add(gyration, loads.at_time(t).load(y[:4], w)) / axes.J
         return out
 
     return with_loads

@@ -59,10 +59,10 @@ class Commands(click.Group):
 
 def _as_click(error: Exception) -> Exception:
     """Return the click exception for an error that a user can act on; other errors are bugs and show their traceback."""
-    from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra
+    from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra, PotentialFailed, TorqueFailed
 
     text = "; ".join([str(error), *notes(error)])
-    if isinstance(error, BadInput | MissingEngine | MissingExtra):
+    if isinstance(error, BadInput | MissingEngine | MissingExtra | PotentialFailed | TorqueFailed):
         return _UserError(text)
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         sys.stdout = io.StringIO()  # or Python tries again to write the rest at its end
