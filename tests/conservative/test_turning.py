@@ -159,7 +159,7 @@ class Unaware(cv.Method):
 @pytest.mark.parametrize("method", ["reduced", "convected", "gauss", "lame", "substepped", Unaware()], ids=str)
 def test_methods_without_support_for_time_refuse(method):
     for each in (scene(), shaken()):
-        with pytest.raises(cv.Unsupported, match="a turning field|a potential that depends on time"):
+        with pytest.raises(cv.Unsupported, match=r"a turning field|a potential that depends on time"):
             cv.integrate(each, 0.1, method)
 
 
