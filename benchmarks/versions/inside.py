@@ -22,6 +22,8 @@ from conservative.method import Method, Role
 
 Answer = dict[str, Any]
 Array = np.ndarray[Any, Any]
+LOADED = 7
+"""Number of times at which loads are described."""
 _scene = lru_cache(maxsize=64)(registry.scene)
 
 
@@ -64,7 +66,7 @@ def list_methods(names: list[str], project: str = "") -> Answer:
 
 
 def describe_scene(scene: str, probes: Array) -> Answer:
-    """Describe the motion of a scene, and its energies in J at the attitudes `probes` (n, 3, 3)."""
+    """Describe the motion of a scene: its parts, and its energies in J at the attitudes `probes` (n, 3, 3)."""
     built = _scene(scene)
     potential: Any = built.potential  # a version may be older than the protocols of potentials
     if potential is None:
@@ -73,7 +75,12 @@ def describe_scene(scene: str, probes: Array) -> Answer:
         energies = [float(potential.energy_at(R, t)) for t in (0.0, built.t_end) for R in probes]
     else:
         energies = [float(potential.energy(R)) for R in probes]
+    rotor = getattr(built.body, "rotor_momentum", None)
+    loads = (getattr(built, "torque", None), getattr(built, "damping", None), getattr(built.body, "motor", None))
+    times = np.linspace(0.0, built.t_end, LOADED).tolist()
+    values = [np.ravel(load.at(t)).tolist() for load in loads if hasattr(load, "at") for t in times]
     return {
+        "parts": [[] if rotor is None else rotor.tolist(), *values],
         "inertia": built.body.inertia,
         "R_WB0": built.R_WB0,
         "w_WB_B0": built.w_WB_B0,

@@ -147,7 +147,7 @@ class Remote(StandIn):
 def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:
     """Return the hash of a scene, by default as this process has it. Raise `BadInput` if it does not have the scene."""
     answer = describe(scene=name, probes=np.array(points.PROBES))
-    numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")]
+    numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")] + [*answer["parts"]]
     return points.define([name, *answer["invariants"]], numbers)
 
 

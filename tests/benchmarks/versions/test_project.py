@@ -135,6 +135,7 @@ def test_a_scene_that_a_version_does_not_have_is_an_error_of_its_rows():
 def definition(scene):
     """Return the description of a scene by a version."""
     return {
+        "parts": [[]],
         "inertia": scene.body.inertia,
         "R_WB0": scene.R_WB0,
         "w_WB_B0": scene.w_WB_B0,
@@ -150,6 +151,8 @@ def test_a_scene_of_another_motion_is_not_compared():
     ((_, each),) = Answers(describe_scene=heavier).measure("brick_flip")
     assert each.reason == "another motion"
     assert violations(row(), each) == {"definition"}
+    ((_, each),) = Answers(describe_scene=definition(brick) | {"parts": [[0.0, 0.0, 1.0]]}).measure("brick_flip")  # a rotor
+    assert each.reason == "another motion"
 
 
 def test_a_scene_that_a_version_does_not_support_is_skipped():
