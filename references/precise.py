@@ -24,7 +24,7 @@ from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.needs import ROTATION, Need
+from conservative.needs import Need, needs_of
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
@@ -149,7 +149,9 @@ class Precise(Method):
     role: ClassVar[Role] = Role.TRUTH
     order = None
     card: ClassVar[Card] = Card(
-        report=(), colour="grey", takes=ROTATION - {Need.FIELD, Need.FUNCTION} | {Need.TURNING, Need.ROTOR}
+        report=(),
+        colour="grey",
+        takes=frozenset({Need.TURNING, Need.ROTOR, Need.FLIGHT}).union(*map(needs_of, FIELDS)),
     )
 
     def __post_init__(self) -> None:

@@ -17,7 +17,7 @@ from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, RunMany
 from conservative.methods.units import in_own_units
-from conservative.needs import FIELDS, Need
+from conservative.needs import Need, needs_of
 from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -98,7 +98,7 @@ class Heyoka(Method):
             *("frame=base_vectors,driver=ensemble", "frame=lean", "frame=base_vectors,width=8,numbers=compiled"),
         ),
         colour="green",
-        takes=FIELDS - {Need.FIELD, Need.FUNCTION} | {Need.TURNING, Need.ROTOR},
+        takes=frozenset({Need.TURNING, Need.ROTOR}).union(*map(needs_of, accelerations.READERS)),
     )
 
     def __post_init__(self) -> None:
