@@ -27,7 +27,7 @@ def _ask_needs(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
-        return lacking(method.takes, scene.needs) or unsupported(method, scene)
+        return lacking(method.takes, scene.needs, method.lacks) or unsupported(method, scene)
 
     return reason
 
@@ -99,6 +99,11 @@ class Method(ABC):
     def takes(self) -> Needs:
         """Parts of scenes that it takes; default: those of its card."""
         return self.card.takes
+
+    @property
+    def lacks(self) -> str:
+        """The reason why it takes no more, for messages; default: none is given."""
+        return ""
 
     @property
     def maker(self) -> Maker:

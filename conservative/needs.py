@@ -36,6 +36,8 @@ class Need(StrEnum):
 
 
 Needs = frozenset[Need]
+MOST_NAMED = 12
+"""Number of methods and engines that a message names, methods first."""
 FIELDS: Needs = frozenset({Need.GRAVITY, Need.SPRING, Need.ATTRACTION, Need.GRADIENT, Need.FIELD, Need.FUNCTION})
 """All potentials that depend on the attitude only."""
 IN_TIME: Needs = frozenset({Need.TURNING, Need.TIME})
@@ -53,22 +55,27 @@ def needs_of(part: Any) -> Needs:
     return own | {Need.TIME} if getattr(part, "time_dependent", False) and Need.TURNING not in own else own
 
 
-def lacking(takes: Needs, needs: Needs) -> str | None:
-    """Return the reason why a scene with these needs is not supported, with the methods and engines that do; None if it is."""
-    missing = needs - takes
-    return _reason(missing, needs) if missing else None
+def lacking(takes: Needs, needs: Needs, why: str = "") -> str | None:
+    """Return the reason why a scene with these needs is not supported, with the methods and engines that do; None if it is.
+
+    `why` is what the method itself says about it.
+    """
+    missing = [each.value for each in Need if each in needs - takes]
+    return f"it does not take {join(missing)}{why and f' ({why})'}; {_advise(needs)}" if missing else None
 
 
 @lru_cache(maxsize=256)
-def _reason(missing: Needs, needs: Needs) -> str:
+def _advise(needs: Needs) -> str:
     able = []
     for group in (METHODS, ENGINES):
         for name in list_entries(group):
             with suppress(MissingEngine, NotLoadable):
                 card = getattr(load_entry(group, "method", name), "card", None)
                 able += [name] if card and needs <= card.takes and name not in able else []
-    advice = f"these take the whole scene: {join(able)}" if able else "no method or engine takes the whole scene"
-    return f"it does not take {join([each.value for each in Need if each in missing])}; {advice}"
+    if not able:
+        return "no method or engine takes the whole scene"
+    more = [f"{len(able) - MOST_NAMED} others"] if len(able) > MOST_NAMED else []
+    return f"these take the whole scene: {join(able[:MOST_NAMED] + more)}"
 
 
 def join(names: Iterable[str]) -> str:

@@ -320,7 +320,13 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
     return _cut(result, n, Diverged(time, f"the drift of {name} is {drift:.3g}, the bound {bound:.3g}"))
 
 
-def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
-    changes: dict[str, Any] = {"supplied": None if result.supplied is None else result.supplied[:n], "failure": failure}
-    changes["frame"] = result.frame and (result.frame[0][:n], result.frame[1][:n])
+def head(result: Trajectory, n: int) -> Trajectory:
+    """Return the first n samples of a trajectory."""
+    supplied, frame = result.supplied, result.frame
+    changes: dict[str, Any] = {"supplied": None if supplied is None else supplied[:n]}
+    changes["frame"] = frame and (frame[0][:n], frame[1][:n])
     return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], **changes)
+
+
+def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
+    return replace(head(result, n), failure=failure)

@@ -148,7 +148,7 @@ def _confirm_loads(scene: Scene, grid: Grid) -> Truth:
     gaps = np.diff(np.union1d(grid.t, breaks[breaks < grid.t[-1]]))
     parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / step)))
     trajectory, change = collocate(scene, grid, parts), np.inf
-    while change > CONFIRMED and parts < MOST_PARTS:
+    while not change <= CONFIRMED and parts < MOST_PARTS:  # of steps that are too long it may be nan
         parts, coarse = 2 * parts, trajectory
         trajectory = collocate(scene, grid, parts)
         change = difference(coarse, trajectory)

@@ -21,7 +21,7 @@ from conservative.outcome import Outcome
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
-from conservative.trajectory import Trajectory
+from conservative.trajectory import Trajectory, head
 
 from ..measures import errors
 from ..measures.measurement import Samples
@@ -60,7 +60,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
                 case = Case(study.name, scene, method, grid_for(scene, step, scene.t_end * durations))
                 done = study.attempt(case)
                 if isinstance(done, Success):
-                    begin = _head(done.trajectory, first.n_samples)
+                    begin = head(done.trajectory, first.n_samples)
                     yield from case.rows(errors.measure_errors(begin, study.truth(scene, first).trajectory))
                     yield from _lines(case, done.trajectory)
                     break
@@ -81,7 +81,7 @@ def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
         some = np.unique(np.linspace(0, len(values) - 1, count).round().astype(int))
         return case.samples(quantity, trajectory.t[some], values[some])
 
-    begin = _head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - 1e-9))))
+    begin = head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - 1e-9))))
     states = np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
     yield from (line(quantity, values, FRAMES + 1) for quantity, values in zip(STATES, states.T, strict=True))
     for invariant in case.scene.invariants:
@@ -91,10 +91,6 @@ def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
             drift = sizes(drift + start) - sizes(start)
         yield line(SIGNED + invariant.name, drift, POINTS)
     yield from (line(axis, values, SAMPLES) for axis, values in zip(AXES, project_on_sphere(trajectory).T, strict=True))
-
-
-def _head(trajectory: Trajectory, n: int) -> Trajectory:
-    return replace(trajectory, t=trajectory.t[:n], R_WB=trajectory.R_WB[:n], w_WB_B=trajectory.w_WB_B[:n])
 
 
 def project_on_sphere(trajectory: Trajectory) -> Array:

@@ -194,17 +194,18 @@ class AdapterMethod(Method):
             return None
         return self.data.orders[next(iter(settings.values()))] if self.data.orders else self.data.order
 
+    @property
+    def lacks(self) -> str:
+        only = self.data.free_only
+        return only if isinstance(only, str) else only.get(next(iter(self.settings.values())), "")
+
     def unsupported(self, scene: Scene) -> str | None:
         reason, potential = unsupported_reason(scene), scene.potential
         if potential is not None:
-            only = self.data.free_only
-            if not isinstance(only, str):
-                only = only.get(next(iter(self.settings.values())), "")
             kinds = list(dict.fromkeys([type(potential), type(static_part(potential))]))
-            supported = [kind for kind in FIELDS if kind.__name__ in self.data.fields]
-            if only:
-                reason = only
-            elif kinds == [Turning, UniformGravity] or not {*kinds} <= {*supported}:
+            if self.lacks:
+                reason = self.lacks
+            elif kinds == [Turning, UniformGravity] or not {*kinds} <= {*FIELDS}:
                 reason = f"not supported by our adapter: {' of '.join(kind.__name__ for kind in kinds)}"
         if reason is None and self.settings.get("as_installed"):
             return rate_limit_reason(scene, self.data.rate_limit)

@@ -77,10 +77,14 @@ def test_other_fields_agree_with_their_own_gradients(name):
 
 
 def test_a_potential_without_expressions_is_unsupported(heavy):
-    reason = Precise().unsupported(
+    class OwnGravity(cv.UniformGravity):
+        """A field of a user."""
+
+    assert "Python functions" in Precise().unsupported(
         heavy.rename("unknown", potential=cv.FunctionPotential(lambda R: R[2, 2], lambda R: np.diag((0, 0, 1.0))))
     )
-    assert "FunctionPotential" in reason
+    reason = Precise().unsupported(heavy.rename("unknown", potential=OwnGravity(1.0, (0, 0, 1))))
+    assert "OwnGravity" in reason
     assert "FIELDS" in reason
 
 

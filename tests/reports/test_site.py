@@ -58,7 +58,7 @@ def test_the_site_is_built_without_warnings_complete_and_searchable(tmp_path):
     index = json.loads((folder / "searchindex.js").read_text().removeprefix("Search.setIndex(").rstrip(")"))
     assert {"moserveselov", "quaternion", "wirbel"} - {*index["terms"], *index["titleterms"]} == {"wirbel"}
     check_names_and_options(pages)
-    assert pages["conservative/methods/DERIVATION.html"].count("<math") == 21
+    assert pages["conservative/methods/DERIVATION.html"].count("<math") == 22
     loaded = {"".join(found) for page in pages.values() for found in LOADED.findall(page)}
     assert loaded
     assert not [address for address in loaded if re.match(r"https?:|//", address)]
