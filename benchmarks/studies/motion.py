@@ -9,7 +9,6 @@ field is the trace of an axis, a unit vector in world axes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
