@@ -27,7 +27,8 @@ def _ask_needs(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
-        return lacking(method.takes, scene.needs, method.lacks) or unsupported(method, scene)
+        takes, needs = method.takes, scene.needs
+        return unsupported(method, scene) if needs <= takes else lacking(takes, needs, method.lacks)
 
     return reason
 

@@ -55,13 +55,13 @@ def needs_of(part: Any) -> Needs:
     return own | {Need.TIME} if getattr(part, "time_dependent", False) and Need.TURNING not in own else own
 
 
-def lacking(takes: Needs, needs: Needs, why: str = "") -> str | None:
-    """Return the reason why a scene with these needs is not supported, with the methods and engines that do; None if it is.
+def lacking(takes: Needs, needs: Needs, why: str = "") -> str:
+    """Return the reason why a scene with these needs is not supported, and the methods and engines that support it.
 
     `why` is what the method itself says about it.
     """
     missing = [each.value for each in Need if each in needs - takes]
-    return f"it does not take {join(missing)}{why and f' ({why})'}; {_advise(needs)}" if missing else None
+    return f"it does not take {join(missing)}{why and f' ({why})'}; {_advise(needs)}"
 
 
 @lru_cache(maxsize=256)

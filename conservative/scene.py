@@ -175,7 +175,7 @@ class Scene(PickledByFields):
         """True if a torque, a damping or the motor of a rotor acts beside the potential."""
         return bool(self.needs & LOADS)
 
-    @property
+    @cached_property
     def loads(self) -> tuple[OfTime, ...]:
         """The torque, the damping and the momentum of the rotor, as far as they are not constant."""
         parts = self.torque, self.damping and self.damping.of_time, self.body.motor
