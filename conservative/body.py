@@ -70,7 +70,7 @@ class RigidBody(PickledByFields):
 
     @property
     def needs(self) -> Needs:
-        """What a scene with this body needs."""
+        """Members of `Need` for scenes with this body."""
         rotor = set() if self.rotor_momentum is None and self.motor is None else {Need.ROTOR}
         return frozenset(rotor if self.motor is None else {Need.MOTOR})
 

@@ -1,4 +1,4 @@
-"""What a scene needs from a method, an engine, a closed form or a command, and which of it they take.
+"""Needs of scenes, and their comparison with the parts that methods, engines and closed forms take.
 
 Each part of a scene declares its members of `Need` in its attribute `needs`, and `Scene.needs` collects them. A method declares
 in `Card.takes` what it takes. `lacking` compares the two: nothing is computed with a part left out.
@@ -44,11 +44,11 @@ IN_TIME: Needs = frozenset({Need.TURNING, Need.TIME})
 LOADS: Needs = frozenset({Need.TORQUE, Need.DAMPING, Need.MOTOR})
 """Parts that act beside the potential and may depend on time."""
 ROTATION: Needs = FIELDS | {Need.FLIGHT}
-"""What a method takes that integrates the rotation in any field: in free flight the position follows from it."""
+"""Parts taken by methods that integrate the rotation in any field: in free flight the position follows from it."""
 
 
 def needs_of(part: Any) -> Needs:
-    """Return what a part of a scene needs; a user's potential without the attribute `needs` is of Python functions."""
+    """Return the needs of a part of a scene; a user's potential without the attribute `needs` is of Python functions."""
     if part is None:
         return frozenset()
     own: Needs = getattr(part, "needs", frozenset({Need.FUNCTION}))

@@ -156,7 +156,7 @@ class Scene(PickledByFields):
 
     @cached_property
     def needs(self) -> Needs:
-        """What a method has to take: the union of the needs of its parts (`conservative.needs`)."""
+        """Parts that a method has to take: the union of the needs of all parts (`conservative.needs`)."""
         parts = self.body, self.potential, self.torque, self.damping, self.flight
         return frozenset().union(*map(needs_of, parts))
 

@@ -41,7 +41,7 @@ class FieldPotential(ABC):
     NUMBERS: ClassVar[tuple[str, ...]]
     """Names of the attributes that `build_field` takes."""
     needs: ClassVar[Needs] = frozenset({Need.FIELD})
-    """What a scene with it needs from a method."""
+    """Members of `Need` for scenes with it."""
 
     @staticmethod
     @abstractmethod

@@ -299,7 +299,7 @@ class Torque(OfTime):
 
     @property
     def needs(self) -> Needs:
-        """What a scene with it needs."""
+        """Members of `Need` for scenes with it."""
         return frozenset({Need.TORQUE, Need.ATTITUDE} if self.of_attitude else {Need.TORQUE})
 
 
@@ -387,7 +387,7 @@ class Damping(PickledByFields):
 
     @property
     def needs(self) -> Needs:
-        """What a scene with it needs."""
+        """Members of `Need` for scenes with it."""
         varying = self.of_time
         return frozenset({Need.DAMPING, Need.ATTITUDE} if varying and varying.of_attitude else {Need.DAMPING})
 

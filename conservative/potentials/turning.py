@@ -147,7 +147,7 @@ class Turning:
 
     @property
     def needs(self) -> Needs:
-        """What a scene with it needs."""
+        """Members of `Need` for scenes with it."""
         return needs_of(self.potential) | {Need.TURNING}
 
     def in_orbit(self, R_WB: Array, t: Array) -> Array:

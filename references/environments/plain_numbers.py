@@ -38,7 +38,7 @@ FIELDS: dict[Any, tuple[str, ...]] = {
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
 
 NEEDS: dict[Any, Needs] = {kind: frozenset({Need.TURNING}) if kind is Turning else needs_of(kind) for kind in FIELDS}
-"""What these fields need."""
+"""Needs of these fields."""
 
 
 def describe_field(axes: EngineAxes) -> dict[str, Any]:

@@ -208,7 +208,7 @@ def add_damping(draw: Draw, case: Case, theme: str, moments: Any, rate: float) -
 
 
 def describe(case: Case, theme: str) -> str:
-    """Return what a case consists of."""
+    """Return the needs of a case."""
     parts = [
         theme,
         "" if case.field is None else case.field[0] + " in time" * (case.field[0] == "quartic" and case.field[4] > 0),

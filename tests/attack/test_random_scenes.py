@@ -87,7 +87,7 @@ def run(case, error, times):
 
 
 def complaint(case, truth, error):
-    """Return what is wrong with a run: it is called ok and is not as accurate as was asked, or it does not end; or ""."""
+    """Return the fault of a run (called ok and less accurate than asked, or without an end), or ""."""
     try:
         found, warned = run(case, error, truth.t)
     except TooLong:
