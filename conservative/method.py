@@ -52,7 +52,8 @@ def _leave_alone(prepare_many: Callable[[Any, Any, Grid], Any]) -> Callable[[Any
     @wraps(prepare_many)
     def checked(method: Method, bodies: Any, grid: Grid) -> Any:
         scene = bodies.scene
-        return None if scene.loaded or lacking(method.takes, scene.needs) else prepare_many(method, bodies, grid)
+        taken = scene.needs <= method.takes and not scene.loaded
+        return prepare_many(method, bodies, grid) if taken else None
 
     return checked
 
