@@ -76,7 +76,7 @@ def describe_scene(scene: str, probes: Array) -> Answer:
     else:
         energies = [float(potential.energy(R)) for R in probes]
     rotor = getattr(built.body, "rotor_momentum", None)
-    loads = (getattr(built, "torque", None), getattr(built, "damping", None), getattr(built.body, "motor", None))
+    loads: list[Any] = [getattr(built, "torque", None), getattr(built, "damping", None), getattr(built.body, "motor", None)]
     times = np.linspace(0.0, built.t_end, LOADED).tolist()
     values = [np.ravel(load.at(t)).tolist() for load in loads if hasattr(load, "at") for t in times]
     return {
