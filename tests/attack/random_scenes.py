@@ -140,6 +140,8 @@ def add_field(draw: Draw, case: Case, energy: float, theme: str, rate: float) ->
     }
     turning = theme == "turning" or (kind != "quartic" and draw.chance(0.15))
     orbit = (rate * draw.between(0.1, 2), draw.vector(draw.between(0.1, 10))) if turning else None
+    if kind == "quartic" and fields[kind][3]:  # a field that turns does not depend on time otherwise
+        orbit = None
     return replace(case, field=(kind, *fields[kind]), turning=orbit), energy + 2 * size
 
 

@@ -1,4 +1,4 @@
-"""What scenes need and methods take, the key of a scene, pickling, and steps that end at break points."""
+"""Needs of scenes, the key of a scene, pickling, and steps that end at break points."""
 
 import math
 import pickle
