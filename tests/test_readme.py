@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from conservative.benchmarks.measures import measurement
-from conservative.benchmarks.studies import price as price_study
 
 from .pages import ROOT
 from .reports.rows import row
@@ -128,9 +127,6 @@ def test_the_tables_of_benchmarks_are_made_of_their_studies(tmp_path, monkeypatc
                 if study == "each_step" and role == "engine":
                     times["time per simulated second, each step kept, engine's own loop"] = time / 2
                 rows += [row(study, name, each, spent, **common, process=process) for each, spent in times.items()]
-    for family, role, price in (("taylor", "ours", 0.63), ("heyoka", "engine", 0.19)):
-        rows += [row("price", family, measure, price, role=role) for measure in price_study.MEASURES.values()]
-        rows.append(row("price", family, "attitude error final", 3e-9, role=role))
     measurement.frame(rows).to_csv(tmp_path / "study.csv", index=False)
     before = program.ROWS.read_text(encoding="utf-8").splitlines()
     page = program.BENCHMARKS.read_text(encoding="utf-8")
@@ -138,17 +134,15 @@ def test_the_tables_of_benchmarks_are_made_of_their_studies(tmp_path, monkeypatc
         (tmp_path / name).write_text(text, encoding="utf-8")
         monkeypatch.setattr(program, name, tmp_path / name)
     monkeypatch.syspath_prepend(FOLDER)
-    monkeypatch.setattr(sys, "argv", ["readme", "--scenes", str(tmp_path), str(tmp_path), "--price", str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["readme", "--scenes", str(tmp_path), str(tmp_path)])
     program.main()
     tables = (tmp_path / "BENCHMARKS").read_text(encoding="utf-8").split(program.MARK)
-    assert [tables[i] == page.split(program.MARK)[i] for i in (1, 3, 5, 7)] == [True, False, True, False]
+    assert [tables[i] == page.split(program.MARK)[i] for i in (1, 3, 5, 7)] == [True, False, True, True]
     header, _, at_1e_3, *_ = tables[3].splitlines()
     assert header.startswith("| scene | error, rad | our general integrators | heyoka 7.13.2 | heyoka / general |")
     assert re.match(r"\| brick_flip \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", at_1e_3)
     (own,) = [line for line in tables[3].splitlines() if "without the conversion" in line]
     assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
-    assert "| conservative | 0.63 |" in tables[7]
-    assert "| heyoka 7.13.2 | **0.19** |" in tables[7]
 
 
 def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
     python .ci/readme                    # write both
     python .ci/readme --check            # exit with 1 if one of them is not current
-    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price FOLDER
+    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price
 
 The last form first replaces rows of measured.csv, from the folders of a report and of studies, and the picture. Options can be
 left out; the rows of others stay. CONTRIBUTING.md has the commands that make the folders.
@@ -180,10 +180,11 @@ def main() -> None:
     )
     parser.add_argument("--scenes", nargs=2, type=Path, metavar="FOLDER", help="TIMES EACH_STEP: the table of three scenes")
     parser.add_argument("--many", type=Path, metavar="FOLDER", help="the table of many bodies")
-    parser.add_argument("--price", type=Path, metavar="FOLDER", help="the table of prices")
+    parser.add_argument("--price", action="store_true", help="measure the table of prices, in new processes")
     options = parser.parse_args()
     if options.measured or options.scenes or options.many or options.price:
-        import measure  # beside this file; it needs the package
+        import measure  # beside this file, as is `price`; they need the package
+        import price
 
         report, times, *random = options.measured or (None, None)
         made = {
@@ -191,7 +192,7 @@ def main() -> None:
             BODIES: measure.random_rows(*random) if random else None,
             SCENES: measure.three_scenes(*options.scenes) if options.scenes else None,
             MANY: measure.many_rows(options.many) if options.many else None,
-            PRICE: measure.price_rows(options.price) if options.price else None,
+            PRICE: price.price_rows(price.measure_pairs()) if options.price else None,
         }
         old = read_rows()
         rows = [row for part, new in made.items() for row in new or [each for each in old if part_of(each) == part]]

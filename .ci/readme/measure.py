@@ -13,10 +13,9 @@ import pandas as pd
 from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.document.cells import tolerance
-from conservative.reports.document.model import Table
 from conservative.reports.rows.names import MethodClass, of_classes, with_names
 from conservative.reports.rows.points import points
-from conservative.reports.sections import many_bodies, price
+from conservative.reports.sections import many_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
 from conservative.reports.sections.scene_contests import each_step
 
@@ -38,7 +37,6 @@ SCENES = (
     f"conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 {METHODS}",
 )
 MANY = "conservative study throughput --methods taylor,heyoka,mujoco --sizes 1024"
-PRICE = "conservative study price"
 OURS = {"our general integrators": MethodClass.GENERAL, "our closed forms": MethodClass.SOLUTION}
 OTHERS = {**ENGINES, "CyRK": "cyrk"}
 EACH = ("the scene's steps, all stored", "without the conversion of an engine's states", "the scene's steps, final state only")
@@ -101,16 +99,6 @@ def many_rows(throughput: Path) -> Iterator[dict[str, Any]]:
             place = f"{contest.scene.replace('_', ' ')}, {statistic}, {tolerance(contest.error)} rad"
             common = {"scene": place, "name": "many bodies", "version": "", "command": MANY}
             yield from (common | {"date": _date(throughput / "study.csv")} | row for row in _ratio_rows({}, contest))
-
-
-def price_rows(study: Path) -> Iterator[dict[str, Any]]:
-    """Yield the columns of the table of prices for each side."""
-    table = next(each for each in price.section(_read(study / "study.csv"), pd.DataFrame()).blocks if isinstance(each, Table))
-    common = {"scene": "price", "method": "", "version": "", "command": PRICE, "date": _date(study / "study.csv")}
-    for side, _, *cells in table.rows:
-        for quantity, cell in zip(table.header[2:], cells, strict=True):
-            name, _, unit = quantity.rpartition(", ")
-            yield common | {"name": str(side), "quantity": name, "unit": unit, "value": cell.value}
 
 
 def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:

@@ -13,6 +13,7 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from . import step_ladder
 from .case import Case, drop_step, outcome_of_error
+from .declaration import Declaration
 from .line import LinePoint, measure_line
 from .selection import Missing
 from .study import Progress, Study
@@ -65,3 +66,6 @@ def order_rows(case: Case, names: tuple[Measure, Measure], order: Order, reason:
     outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
     rows = case.rows(map(Value, names, (order.slope, order.stderr)), outcome, "" if reason else str(order))
     return list(map(drop_step, rows))
+
+
+STUDY = Declaration(findings)

@@ -28,6 +28,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from .case import Case
+from .declaration import Declaration, Extent
 from .line import LinePoint, list_settings, measure_line
 from .speed import Runs, keep_end, time_runs
 from .study import Progress, Study
@@ -87,3 +88,6 @@ def time_chosen(study: Study, chosen: Iterable[Case], processes: Processes) -> I
             if measure == Measure.TIME_SAMPLED and case.method.role == Role.ENGINE and hasattr(done.run, "own_loop"):
                 ready[case, Measure.TIME_OWN_LOOP] = timed, done.run.own_loop
     yield from time_runs(study, ready, processes)
+
+
+STUDY = Declaration(findings, Extent.FULL, timed=True, in_turn=True)

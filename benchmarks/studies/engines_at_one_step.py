@@ -22,6 +22,7 @@ from ..measures import errors
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from .case import Case, Success
+from .declaration import Declaration, Named
 from .selection import Missing
 from .speed import MEASURES, time_steps
 from .step_ladder import SAMPLES
@@ -100,3 +101,6 @@ def count_turns_over(trajectory: Trajectory) -> int:
     along = (body.momentum(trajectory.w_WB_B) @ body.R_BP)[:, int(np.argmax(np.abs(body.momentum(start) @ body.R_BP)))]
     signs = np.sign(along[np.abs(along) >= FAR_SIDE * abs(along[0])])
     return int(np.count_nonzero(np.diff(signs)))
+
+
+STUDY = Declaration(findings, named=Named.ONLY, apart=True, timed=True, options=("scenes",))

@@ -20,6 +20,7 @@ from ..measures.processes import Processes
 from . import step_ladder
 from .case import Case, Success, drop_step
 from .convergence import find_no_order, order_rows
+from .declaration import Declaration, Named
 from .line import LinePoint, measure_line
 from .speed import time_runs
 from .study import Progress, Study
@@ -99,3 +100,6 @@ def time_rows(study: Study, runs: dict[Case, Success]) -> Iterator[Measurement]:
         if case not in quick:
             value = Value(Measure.TIME, done.cost.first_call / (case.grid.dt * case.grid.n_steps))
             yield case.row(value, detail="a single run")
+
+
+STUDY = Declaration(findings, named=Named.ONLY, apart=True, timed=True, options=("scenes",))

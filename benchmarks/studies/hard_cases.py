@@ -6,7 +6,7 @@ does not support have rows with that outcome.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from conservative.scene import Scene
 
 from ..measures.measurement import Measurement
 from .case import Case
+from .declaration import Declaration, Extent
 from .paper import measure_accuracy
-from .selection import Missing
+from .selection import Missing, all_variants
 from .study import HANG_FACTOR, Progress, Study
 from .time_limit import attempt_within
 
@@ -33,7 +34,7 @@ def scenes() -> tuple[Scene, ...]:
     return tuple(sorted(map(registry.scene, registry.list_scenes()), key=lambda scene: scene.group))
 
 
-def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
+def settings(methods: Iterable[Method]) -> tuple[Method, ...]:
     """Return one or two settings of each family: the first and the last for our methods, the first two for an engine."""
     families: dict[str, list[Method]] = {}
     for method in methods:
@@ -63,3 +64,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             case = Case(study.name, scene, method, steps)
             done = attempt_within(limit, case, study.skip_missing, apart=True)
             yield from measure_accuracy(case, done, truth)
+
+
+STUDY = Declaration(
+    findings, Extent.LONG, apart=True, scenes=scenes, settings=lambda method: settings(all_variants(method)), in_report=settings
+)

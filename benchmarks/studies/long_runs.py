@@ -12,6 +12,7 @@ from ..measures.errors import measure_drifts
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from .case import Case
+from .declaration import Declaration
 from .study import Progress, Study
 
 DURATIONS = 10.0
@@ -30,3 +31,6 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 yield from case.rows((Value(Measure.DRIFT_MAX, math.nan, each.name) for each in scene.invariants), done)
             else:
                 yield from case.rows(measure_drifts(done.trajectory), detail=f"over {case.grid.t[-1]:g} s")
+
+
+STUDY = Declaration(findings)

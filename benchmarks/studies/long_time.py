@@ -28,6 +28,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value
 from .case import Case
+from .declaration import Declaration, Extent
 from .study import Finding, Progress, Study
 
 TURNS = (1e2, 1e4, 1e6)
@@ -130,3 +131,6 @@ def grid_of(scene: Scene, duration: float) -> Grid:
     """Return the grid of a run at the scene's step of about this duration, s."""
     every = max(1, round(duration / scene.dt / SAMPLES))
     return Grid(scene.dt, every * SAMPLES, every)
+
+
+STUDY = Declaration(findings, Extent.FULL, apart=True, timed=True)

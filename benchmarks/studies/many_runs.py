@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
@@ -116,7 +116,7 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
         return outcome_of_error(way.method, error, skip_missing)
 
 
-def family_settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
+def family_settings(methods: Iterable[Method]) -> tuple[Method, ...]:
     """Return one setting of each family that runs many bodies: without truncation error if there is one, else the first."""
     families = {type(method): method.settings_for("many") for method in methods}.values()
     return tuple(sorted(offered, key=takes_exact_steps, reverse=True)[0] for offered in families if offered)

@@ -17,8 +17,6 @@ from conservative.references.truth import reference
 from . import studies
 from .study import Finding, Progress, Study, remember_truths
 
-UNTIMED = ("paper", "convergence", "long_runs", "motion", "paper_figures", "stability", "hard_cases")
-
 
 def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterator[Finding]:
     """Yield the findings of a study from the workers of the Dask cluster with this scheduler; see `studies.findings`.
@@ -33,8 +31,9 @@ def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterato
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """
-    if study.name not in UNTIMED:
-        allowed = f"no scheduler for a study of times, which need an idle machine, or one of {', '.join(UNTIMED)}"
+    if studies.STUDIES[study.name].timed:
+        untimed = ", ".join(name for name, each in studies.STUDIES.items() if not each.timed)
+        allowed = f"no scheduler for a study of times, which need an idle machine, or one of {untimed}"
         raise BadInput("scheduler", f"one for the study {study.name!r}", allowed)
     parts = [replace(study, scenes=(scene,), truth=reference) for scene in study.scenes]
     with open_client(scheduler) as client, start_executor(client) as executor:

@@ -15,6 +15,7 @@ from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from .case import Case, Success
+from .declaration import Declaration
 from .study import Progress, Study
 
 FRACTIONS = (1.0, 0.5, 0.25)
@@ -68,3 +69,6 @@ def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> 
     }
     counts = [Value(measure, float(count)) for measure, count in work.items() if count is not None]
     return case.rows(errors.measure_errors(done.trajectory, truth) + counts)
+
+
+STUDY = Declaration(findings)

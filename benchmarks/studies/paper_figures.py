@@ -24,6 +24,7 @@ from conservative.trajectory import Trajectory
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Samples
 from .case import Case
+from .declaration import Declaration, Extent
 from .study import Finding, Progress, Study
 
 BRICK, TOP = "brick_flip", "lagrange_top"
@@ -89,3 +90,6 @@ def com_W(scene: Scene, R_WB: Array) -> Array:
     """Return the centre of mass (..., 3), m, world axes, of a scene in uniform gravity at attitudes (..., 3, 3)."""
     assert isinstance(scene.potential, UniformGravity)  # as the top is
     return np.asarray(R_WB @ scene.potential.com_B)
+
+
+STUDY = Declaration(findings, Extent.FULL)

@@ -24,6 +24,7 @@ import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
@@ -42,11 +43,14 @@ from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..measures.timing import wall_time
 from .case import NOT_DRAWN, Case, Drawn, outcome_of_error
+from .declaration import Declaration
 from .line import list_settings
 from .selection import Missing, tolerance_setting
 from .speed import Runs, keep_end, time_runs
 from .study import Progress, Study, remember_truths
 
+BODIES = 10
+"""Random bodies in each field."""
 DECADES = tuple(10.0**-k for k in range(2, 13))
 """Attitude errors, rad, at which methods are compared."""
 SAMPLES = 12
@@ -73,10 +77,10 @@ TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
 
 
-def random_study(
-    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False, processes: int = 1
-) -> Study:
+def random_study(methods: tuple[Method, ...], bodies: int = BODIES, seed: int = 0, **settings: Any) -> Study:
     """Return the study of `bodies` random bodies in each field. The first bodies do not depend on the number.
+
+    `settings` are fields of `Study` by keyword.
 
     Raises
     ------
@@ -87,8 +91,7 @@ def random_study(
     places = [(field, seed, index) for field in FIELDS for index in range(bodies)]
     scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
     drawn = tuple(Drawn(*place) for place in places)
-    find = remember_truths(confirm)
-    return Study("random", scenes, methods, quick, skip_missing, find, processes=processes, drawn=drawn)
+    return Study(STUDY.name, scenes, methods, truth=remember_truths(confirm), drawn=drawn, **settings)
 
 
 def settings(method: Method) -> tuple[Method, ...]:
@@ -223,3 +226,15 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
     except Exception as error:
         return outcome_of_error(case.method, error)
     return run if outcome.ok else outcome
+
+
+STUDY = Declaration(
+    findings,
+    apart=True,
+    timed=True,
+    in_turn=True,
+    draw=random_study,
+    settings=settings,
+    in_report=select,
+    options=("methods", "bodies", "seed"),
+)

@@ -21,6 +21,7 @@ from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..measures.timing import Timing, time_interleaved, wall_time
 from .case import Case, Success
+from .declaration import Declaration
 from .study import Progress, Study
 from .time_limit import is_known_to_end
 
@@ -178,3 +179,6 @@ def prepare_loop(case: Case, own: bool) -> Callable[[], Any]:
     run = case.method.prepare(case.scene, case.grid)
     run()  # so that engines find their limits outside of the loop
     return getattr(run, "own_loop", run) if own else run
+
+
+STUDY = Declaration(findings, timed=True)

@@ -31,7 +31,9 @@ from conservative.trajectory import Bounds, Trajectory, cut_at_failure
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
+from . import selection
 from .case import Case, drop_step
+from .declaration import Declaration, Extent
 from .selection import Missing
 from .study import Progress, Study
 from .time_limit import attempt_within
@@ -113,3 +115,6 @@ def detect_wrong_branch(trajectory: Trajectory, R_WB: Array, size: int) -> Outco
     if off <= turn + TOLERANCE:
         return None
     return Outcome(OutcomeKind.WRONG_BRANCH, f"first step {off:.2g} rad off, the body turns by {turn:.2g} rad")
+
+
+STUDY = Declaration(findings, Extent.LONG, apart=True, scenes=lambda: selection.scenes(SCENES))

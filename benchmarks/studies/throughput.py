@@ -19,6 +19,7 @@ import math
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
@@ -39,9 +40,10 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from .case import Case, Drawn, outcome_of_error
+from .declaration import Declaration, Extent, Named
 from .ensembles import DURATION, KINDS, draw
 from .line import list_settings
-from .many_runs import ManyDone, RunBlocks, Way, attempt_many, list_ways
+from .many_runs import ManyDone, RunBlocks, Way, attempt_many, family_settings, list_ways
 from .paper import agreement_row
 from .selection import Missing, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
@@ -106,7 +108,7 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
     """
     scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
     usual = {"sizes": QUICK_SIZES, "bodies": QUICK_BODIES} if quick else {}
-    return ThroughputStudy("throughput", scenes, methods, quick, **{**usual, **extent})
+    return ThroughputStudy(STUDY.name, scenes, methods, quick, **{**usual, **extent})
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,3 +270,18 @@ def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
         if size > 1 and seconds * size > most:
             return Outcome(OutcomeKind.SKIPPED, f"{what} would take {seconds * size:.2g} s; --time-limit raises that")
     return None
+
+
+STUDY = Declaration(
+    findings,
+    Extent.LONG,
+    Named.TOO,
+    apart=True,
+    timed=True,
+    in_turn=True,
+    draw=throughput_study,
+    settings=methodcaller("settings_for", "many"),
+    in_report=family_settings,
+    options=("methods", "bodies", "seed", "sizes"),
+    more=(("quick", True),),  # coarse: preparing engines takes minutes
+)

@@ -13,6 +13,7 @@ from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from . import step_ladder
 from .case import Case
+from .declaration import Declaration
 from .line import list_settings, measure_line
 from .selection import tolerance_setting
 from .speed import time_cases
@@ -56,3 +57,6 @@ def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int
         tolerances.add(getattr(method, setting))
     case = Case(study.name, scene, method, step_ladder.samples(scene, method))
     return list_settings(case, grids[:: 2 if study.quick else 1], sorted(tolerances, reverse=True))
+
+
+STUDY = Declaration(findings, timed=True, in_turn=True)

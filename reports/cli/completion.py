@@ -40,9 +40,9 @@ def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> l
 
 def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the studies that complete the text."""
-    from conservative.benchmarks.studies.studies import MAKERS
+    from conservative.benchmarks.studies.studies import STUDIES
 
-    return [CompletionItem(name) for name in MAKERS if name.startswith(incomplete)]
+    return [CompletionItem(name) for name in STUDIES if name.startswith(incomplete)]
 
 
 def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:

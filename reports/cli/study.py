@@ -29,8 +29,19 @@ FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\
 """The files of `--out`, and how each begins."""
 
 
+class StudyCommand(OutputCommand):
+    """The command, with the declared studies in its help."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_help_text(ctx, formatter)
+        from conservative.benchmarks.studies.studies import STUDIES  # takes a second, which only this help needs
+
+        with formatter.section("Names"):
+            formatter.write_dl([(name, each.about) for name, each in STUDIES.items()])
+
+
 @click.command(
-    cls=OutputCommand,
+    cls=StudyCommand,
     short_help="Run one study: random bodies, work-precision, ...",
     epilog=epilog(
         "conservative study random --bodies 40 --seed 7",
@@ -78,9 +89,7 @@ def study(
 ) -> None:
     """Run one study and show its rows, or for `random` the time ratios.
 
-    NAME is paper, convergence, speed, work_precision, each_step, long_runs, long_time, motion, paper_figures,
-    engines_at_one_step, engines_over_steps, stability, hard_cases, random, price or throughput. A report consists of the same
-    studies. benchmarks/README.md describes them.
+    A report consists of the same studies.
     """
     require_extra("conservative study", "report")
     from ..run.provenance import provenance

@@ -10,7 +10,7 @@ import pandas as pd
 from conservative.attitude import from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import motion
+from conservative.benchmarks.studies import convergence, motion, paper_figures
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
@@ -84,12 +84,12 @@ def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def _of_figure(samples: pd.DataFrame, scene: str) -> pd.DataFrame:
-    return samples[(samples["study"] == "paper_figures") & (samples["scene"] == scene)]
+    return samples[(samples["study"] == paper_figures.STUDY.name) & (samples["scene"] == scene)]
 
 
 def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     """Return the errors of the convergence study: columns scene, method, family, name, dt (s), error (unit of the measure)."""
-    rows = with_outcome(of_measure(of_study(table, "convergence"), measure), OutcomeKind.OK)
+    rows = with_outcome(of_measure(of_study(table, convergence.STUDY.name), measure), OutcomeKind.OK)
     return rows.rename(columns={"value": "error"})[list(ERROR_COLUMNS)].reset_index(drop=True)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import engines_over_steps, work_precision
 from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
@@ -27,7 +28,7 @@ _KEYS = ["scene", "series", "method", *_NAMES, "role", "dt"]
 
 
 def points(
-    table: pd.DataFrame, study: str = "work_precision", time: Measure = Measure.TIME, untimed: bool = False
+    table: pd.DataFrame, study: str = work_precision.STUDY.name, time: Measure = Measure.TIME, untimed: bool = False
 ) -> pd.DataFrame:
     """Return the points of the work-precision study, or of another one with errors and times over steps.
 
@@ -73,7 +74,7 @@ def pooled(timed: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 def all_points(table: pd.DataFrame) -> pd.DataFrame:
     """Return the points of the work-precision study, and the points that only the study of engines has."""
-    ours, engines = points(table), points(table, "engines_over_steps")
+    ours, engines = points(table), points(table, engines_over_steps.STUDY.name)
     known = set(zip(ours["scene"], ours["name"], strict=True))
     new = [key not in known for key in zip(engines["scene"], engines["name"], strict=True)]
     return pd.concat([ours, engines[new]], ignore_index=True) if any(new) else ours

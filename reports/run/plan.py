@@ -6,18 +6,38 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from conservative.benchmarks.measures.processes import PROCESSES
-from conservative.benchmarks.studies import engine_selection, many_runs, price, random, selection, studies, throughput
-from conservative.benchmarks.studies.study import Study
+from conservative.benchmarks.studies import engine_selection, selection
+from conservative.benchmarks.studies.declaration import Extent, Named
+from conservative.benchmarks.studies.studies import STUDIES
+from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.method import Method
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 
 from .provenance import LockedEngine
 
-MAIN_TIME_LIMIT = 0.15
-"""Time budget of a run, s, in a default report, which then takes a minute; the default of `Study` is used in a full report."""
-BODIES, QUICK_BODIES = 3, 1
-"""Random bodies in each field of a full report, and of a quick one."""
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of report: its longest studies, whether it has all methods, and the random bodies in each field.
+
+    `time_limit` is the time budget of a run, s, None for that of `Study`; `processes` is the number that time in turn.
+    """
+
+    extent: Extent
+    every_method: bool = False
+    bodies: int = 0
+    time_limit: float | None = None
+    processes: int = 1
+
+
+DEFAULT, QUICK, FULL, QUICK_FULL = "default", "quick", "full", "quick and full"
+KINDS = {
+    DEFAULT: Kind(Extent.EVERY, bodies=1, time_limit=0.15),  # it takes a minute
+    QUICK: Kind(Extent.EVERY, time_limit=0.15),
+    FULL: Kind(Extent.LONG, every_method=True, bodies=3, processes=PROCESSES),
+    QUICK_FULL: Kind(Extent.FULL, every_method=True, bodies=1),
+}
 FEW_METHODS, FEW_BODIES = ("taylor:order=12", "heyoka:frame=lean", "mujoco"), 3
 """Methods on the random bodies of a default report, and their number, each in a field of its own. A further field takes four
 seconds after the installation, mostly to compile kernels, and a further method of ours two to four seconds a field."""
@@ -75,16 +95,15 @@ def plan_report(
     ----------
     scenes, methods, engines
         Names. Default: the paper's two scenes, `selection.main_methods` (all registered methods if `full`), no engine.
-    full
-        True if everything is measured: more random bodies, many bodies, hard cases, stability and the paper's figures as well.
-    quick, skip_missing, time_limit
-        See `Study`. A quick report has no study of hard cases or of many bodies. The default limit is `MAIN_TIME_LIMIT` for the
-        scenes, unless `full`.
+    full, quick
+        The kind of the report, see `KINDS`; `quick` also for each study.
+    skip_missing, time_limit
+        See `Study`. The default limit is that of the kind.
     png
         True if pictures are also written as PNG.
     bodies, seed
-        Random bodies in each field, and their seed. Default if no scene is named: if `full` `BODIES`, or `QUICK_BODIES` if
-        `quick`; in a default report one in each of `FEW_BODIES` fields. Otherwise none.
+        Random bodies in each field, and their seed. Default: those of the kind; in a default report in `FEW_BODIES` fields, and
+        none if a scene or a method is named; in a full one none if a scene is named.
 
     Raises
     ------
@@ -93,38 +112,36 @@ def plan_report(
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    names, methods = tuple(scenes), tuple(methods)
-    few = bodies is None and not (names or methods or full or quick)
+    names, methods, engines = tuple(scenes), tuple(methods), tuple(engines)
+    kind = KINDS[(QUICK_FULL if quick else FULL) if full else QUICK if quick else DEFAULT]
+    whole = bool(methods) or kind.every_method
+    few = bodies is None and not names and not whole
     if bodies is None:
-        bodies = 1 if few else 0 if names or not full else QUICK_BODIES if quick else BODIES
+        bodies = 0 if names or (methods and not full) else kind.bodies
     chosen = selection.scenes(names) if names else selection.scenes()
-    every = selection.methods(methods or None, skip_missing) if methods or full or (bodies and not few) else ()
-    compared = every if methods or full else selection.main_methods(skip_missing)
-    named = engine_selection.select_engines(engines, skip_missing) if (engines := tuple(engines)) else ()
+    every = selection.methods(methods or None, skip_missing) if whole or (bodies and not few) else ()
+    compared = every if whole else selection.main_methods(skip_missing)
+    named = engine_selection.select_engines(engines, skip_missing) if engines else ()
     if not skip_missing:
         for method in (*compared, *named):
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
+    shared = {"truth": remember_truths(), "skip_missing": skip_missing}
     made: list[Study] = []
-    # Random bodies come first, as on the page. Methods that do not support them are not part of the study.
-    processes = PROCESSES if full and not quick else 1
-    drawn = tuple(method for method in compared if method.name in FEW_METHODS) if few else random.select(every)
-    if bodies and drawn:
-        study = random.random_study(drawn, bodies, seed, quick or few, skip_missing, processes)
-        made.append(replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES]) if few else study)
-    # In the order of the table of all studies.
-    crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
-    main_limit = MAIN_TIME_LIMIT if time_limit is None and not full else time_limit
-    made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit, processes)
-    made = [replace(each, methods=(*compared, *named)) if each.name == "motion" else each for each in made]
-    if named:
-        made += studies.cross_studies(studies.ENGINES, chosen, named, quick, skip_missing, time_limit)
-    if full and not (names or quick):
-        made += studies.list_hard_studies(compared, skip_missing, time_limit)
-    if full and bodies and not quick:
-        made += studies.cross_studies((studies.PRICE,), price.scenes(), compared, skip_missing=skip_missing)
-    # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
-    if full and bodies and not quick and (many := many_runs.family_settings((*compared, *named))):
-        more = {"skip_missing": skip_missing, "time_limit": time_limit, "processes": processes}
-        made.append(throughput.throughput_study(many, quick=True, seed=seed, **more))
+    for each in STUDIES.values():
+        if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
+            continue
+        if each.draw and few:
+            taken = tuple(method for method in compared if method.name in FEW_METHODS)
+        else:
+            mine = () if each.named is Named.ONLY else every if each.draw else compared
+            taken = each.in_report((*mine, *(() if each.named is Named.APART else named)))
+        if not taken:
+            continue
+        limit = kind.time_limit if time_limit is None and each.named is not Named.ONLY else time_limit
+        extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if each.draw else shared
+        settings = {"quick": quick or (few and each.draw is not None), "time_limit": limit, **extent, **dict(each.more)}
+        made.append(each.plan(taken, () if each.scenes else chosen, kind.processes, **settings))
+        if each.draw and few:
+            made[-1] = replace(made[-1], scenes=made[-1].scenes[:FEW_BODIES], drawn=made[-1].drawn[:FEW_BODIES])
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
     return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed, arguments)

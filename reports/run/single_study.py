@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from operator import methodcaller
+from typing import Any
 
 from conservative.benchmarks.measures.processes import PROCESSES, QUICK_PROCESSES
-from conservative.benchmarks.studies import (
-    engine_selection,
-    hard_cases,
-    on_cluster,
-    price,
-    random,
-    selection,
-    stability,
-    studies,
-    throughput,
-)
+from conservative.benchmarks.studies import engine_selection, on_cluster, selection, studies
+from conservative.benchmarks.studies.declaration import Declaration, Named
 from conservative.benchmarks.studies.study import Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
 
 from .measure import Measurements
-
-DEFAULT_BODIES = 10
-"""Random bodies in each field."""
 
 
 def plan_study(
@@ -52,53 +40,29 @@ def plan_study(
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    choice("name", name, tuple(studies.MAKERS))
-    _require_fitting(name, scenes=scenes, methods=methods, sizes=sizes, bodies=bodies, seed=seed)
-    if name in studies.ENGINES:
+    choice("name", name, tuple(studies.STUDIES))
+    declared = studies.STUDIES[name]
+    counts = tuple(read_count("sizes", size) for size in sizes)
+    extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
+    _require_options(declared, {"scenes": scenes, "methods": methods, **extent})
+    if declared.named is Named.ONLY:
         compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
     else:
-        of_family: dict[str, selection.Settings] = {
-            studies.RANDOM: random.settings,
-            studies.THROUGHPUT: methodcaller("settings_for", "many"),
-        }
-        named = selection.methods(methods or None, skip_missing, of_family.get(name, selection.all_variants))
+        ours = selection.methods(methods or None, skip_missing, declared.settings)
         others = engine_selection.select_engines(engines, skip_missing) if engines else ()
-        compared = tuple(dict.fromkeys((*named, *others)))
-    processes = (QUICK_PROCESSES if quick else PROCESSES) if name in studies.IN_TURN else 1
-    if name == studies.RANDOM:
-        number = DEFAULT_BODIES if bodies is None else bodies
-        return random.random_study(compared, number, seed or 0, quick, skip_missing, processes)
-    if name == studies.THROUGHPUT:
-        counts = tuple(read_count("sizes", size) for size in sizes)
-        numbers = {"sizes": counts or None, "bodies": bodies, "seed": seed, "time_limit": time_limit}
-        given = {key: value for key, value in numbers.items() if value is not None}
-        return throughput.throughput_study(compared, quick=quick, skip_missing=skip_missing, processes=processes, **given)
-    if name == "hard_cases":
-        compared = hard_cases.settings(compared)
-    usual = {
-        "stability": lambda: selection.scenes(stability.SCENES),
-        "hard_cases": hard_cases.scenes,
-        "price": price.scenes,
-    }
-    chosen = selection.scenes(scenes) if scenes else usual.get(name, selection.scenes)()
-    return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit, processes=processes)
+        compared = tuple(dict.fromkeys((*ours, *others)))
+    settings = {"quick": quick, "skip_missing": skip_missing, "time_limit": time_limit, **extent}
+    processes = QUICK_PROCESSES if quick else PROCESSES
+    return declared.plan(compared, selection.scenes(scenes) if scenes else (), processes, **settings)
 
 
-def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:
-    """Raise `BadInput` if an argument is given that a study does not have."""
-    drawn = (studies.RANDOM, studies.THROUGHPUT)
-    draws = f"nothing: only the studies {drawn[0]!r} and {drawn[1]!r} draw bodies"
-    refused = (
-        ("scenes", name in drawn, "none: the study draws its bodies; their number and seed are options"),
-        ("bodies", name not in drawn, draws),
-        ("seed", name not in drawn, draws),
-        ("sizes", name != studies.THROUGHPUT, f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"),
-        ("methods", name in studies.ENGINES, "none: the study is of --engines"),
-    )
-    for argument, applies, allowed in refused:
-        value = given[argument]
-        if applies and value not in (None, (), []):
-            raise BadInput(argument, str(value) if isinstance(value, int) else ", ".join(value or ()), allowed)
+def _require_options(declared: Declaration, given: Mapping[str, Any]) -> None:
+    """Raise `BadInput` if an option is given that the study does not have."""
+    for option, value in given.items():
+        if value not in ((), []) and option not in declared.options:
+            others = ", ".join(name for name, each in studies.STUDIES.items() if option in each.options)
+            text = ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
+            raise BadInput(option, text, f"nothing: the study {declared.name!r} has no {option}; these have: {others}")
 
 
 def read_count(argument: str, text: str) -> int:

@@ -7,6 +7,7 @@ import shlex
 from collections import Counter
 
 from conservative.benchmarks.contest import costs, credit
+from conservative.benchmarks.studies import work_precision
 
 from ..document.cells import DASH, numeric, tolerance
 from ..document.model import Emphasis, Paragraph, Row, Section, Table, filled
@@ -61,4 +62,4 @@ def section(measured: Measured) -> Section:
     table = Table(HEADER, rows, caption)
     lead = Paragraph(" ".join(parts), Emphasis.LEAD) if parts else None
     blocks = filled(lead, Paragraph(f"{_OWN} {random}".strip()), table)
-    return Section("What to use", blocks, "use", "What to use", source={"study": "work_precision"})
+    return Section("What to use", blocks, "use", "What to use", source={"study": work_precision.STUDY.name})

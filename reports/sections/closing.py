@@ -8,6 +8,7 @@ import pandas as pd
 
 from conservative.benchmarks.contest import costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import convergence, paper, speed
 from conservative.method import Role
 
 from ..document.cells import DASH, factor, number, tolerance
@@ -30,11 +31,11 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
     Methods that differ only in tolerance are one row, with the drifts and errors of the default tolerance, which is the last.
     The table is that of `names.with_names`; the points are those of the scene (see `rows.points`).
     """
-    accuracy = of_study(table, "paper", scene)
+    accuracy = of_study(table, paper.STUDY.name, scene)
     accuracy = accuracy[(accuracy["role"] != Role.TRUTH.value) & accuracy["value"].notna()]
     times = costs(points, [MIDDLE], ["series"]).set_index("series")["time"]
-    orders = lines.orders(of_study(table, "convergence", scene))
-    steps = of_measure(of_study(table, "speed", scene), Measure.TIME_PER_STEP).set_index("method")["value"]
+    orders = lines.orders(of_study(table, convergence.STUDY.name, scene))
+    steps = of_measure(of_study(table, speed.STUDY.name, scene), Measure.TIME_PER_STEP).set_index("method")["value"]
     body = []
     for series, line in accuracy.groupby("series", sort=False):
         method = str(line["method"].iloc[-1])

@@ -12,10 +12,10 @@ import pandas as pd
 from conservative.benchmarks.contest import cost
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import engines_at_one_step, engines_over_steps
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.benchmarks.studies.selection import Missing
-from conservative.benchmarks.studies.studies import ENGINES
 from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..charts import figures, vega_embed
@@ -26,7 +26,7 @@ from ..rows.points import points as points_over
 from .measured import Measured, of_scene
 from .provenance import lock_sections
 
-ONE_STEP, OVER_STEPS = "engines_at_one_step", "engines_over_steps"
+ONE_STEP, OVER_STEPS = engines_at_one_step.STUDY.name, engines_over_steps.STUDY.name
 USABLE = 0.1
 """Largest attitude error over the run, rad, of a usable step."""
 ERROR = 1e-3
@@ -98,7 +98,7 @@ class EngineRow:
 
 def section(measured: Measured) -> Section:
     """Return the section of the engines that the report names."""
-    table = measured.rows[measured.rows["study"].isin(ENGINES)]
+    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
     points = points_over(table, OVER_STEPS)
     words = (
         "Engines in their own environments, and those installed with this package. Each runs in its own loop and "
@@ -122,12 +122,12 @@ def section(measured: Measured) -> Section:
         blocks.append(Section(f"{name}: every setting", [every_setting(rows, dt, name)], source={"scene": name}))
     blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
-    return Section("Engines", blocks, "engines", source={"study": ENGINES})
+    return Section("Engines", blocks, "engines", source={"study": (ONE_STEP, OVER_STEPS)})
 
 
 def tables(measured: Measured) -> list[Table]:
     """Return the table of engines for each scene, `side_by_side`; none if the report names no engines."""
-    table = measured.rows[measured.rows["study"].isin(ENGINES)]
+    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
     points = points_over(table, OVER_STEPS)
     scenes = [scene.name for scene in measured.plan.scenes] if measured.plan.engines else []
     return [side_by_side(engine_rows(table, scene, points), scene) for scene in scenes]

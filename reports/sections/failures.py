@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.studies import ENGINES, HARD, RANDOM
+from conservative.benchmarks.studies import paper
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
@@ -13,12 +13,9 @@ from ..document.cells import DASH, numeric, outcome_text
 from ..document.model import Paragraph, Section, Style, Table, filled
 from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outcome
 
-_ELSEWHERE = (*HARD, *ENGINES)
-"""Studies with tables of their own."""
-
 
 def section(table: pd.DataFrame) -> Section:
-    """Return the section of the rows of a report."""
+    """Return the section of the rows of a report that are not apart (see `Measured.scene_rows`)."""
     words = (
         "Runs that did not reach their end, and runs that were skipped because they would have exceeded `--time-limit`. "
         "Errors are relative to a reference solution that a second, independent one confirms."
@@ -30,7 +27,7 @@ def section(table: pd.DataFrame) -> Section:
 
 def failures(table: pd.DataFrame) -> Table:
     """Return the runs that failed or were skipped."""
-    rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *ABSENT)
+    rows = without_outcome(table, OutcomeKind.OK, OutcomeKind.NO_ORDER, *ABSENT)
     rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
     body = []
     for key, members in rows.groupby(["scene", "name", "text"], sort=False):
@@ -42,7 +39,7 @@ def failures(table: pd.DataFrame) -> Table:
 
 def unsupported(table: pd.DataFrame) -> Table:
     """Return the unsupported and missing methods, one row per reason."""
-    rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *ABSENT)
+    rows = with_outcome(table, *ABSENT)
     # A reason can contain numbers that differ from step to step: the first one stands for all of a method.
     rows = rows.assign(reason=rows.groupby(["scene", "outcome", "name"])["reason"].transform("first"))
     body = [
@@ -53,8 +50,8 @@ def unsupported(table: pd.DataFrame) -> Table:
 
 
 def truths(table: pd.DataFrame) -> Table:
-    """Return the difference of the two independent reference solutions, for each scene and step, without random bodies."""
-    rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["study"] != RANDOM)]
+    """Return the difference of the two independent reference solutions, for each scene and step."""
+    rows = table[table["measure"] == Measure.AGREEMENT.text]
     body = [
         [row["scene"], numeric(row["dt"], f"{row['dt']:g}"), row["label"], numeric(row["value"])] for _, row in rows.iterrows()
     ]
@@ -64,7 +61,7 @@ def truths(table: pd.DataFrame) -> Table:
 
 def failures_of_ours(table: pd.DataFrame) -> list[str]:
     """Return the failures of our methods at the steps of the paper, one line each."""
-    rows = of_study(table, "paper")
+    rows = of_study(table, paper.STUDY.name)
     rows = without_outcome(rows[rows["role"] == Role.OURS.value], OutcomeKind.OK, OutcomeKind.SKIPPED, *ABSENT)
     lines = [
         f"{method} on {scene}, dt = {dt:g} s: {outcome}"

@@ -10,6 +10,8 @@ import pandas as pd
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import outcome_of
+from conservative.benchmarks.studies.hard_cases import STUDY as HARD_CASES
+from conservative.benchmarks.studies.stability import STUDY as STABILITY
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 
@@ -33,14 +35,16 @@ def sections(table: pd.DataFrame) -> list[Section]:
         f"run failed; {DASH}: not supported, or nothing to judge."
     )
     cases, steps = hard_cases(table), stability(table)
-    judged = Section("Hard cases", [Paragraph(words), cases], "hard-cases", source={"study": "hard_cases"}) if cases else None
-    longest = Section("Stability", [steps], "stability", source={"study": "stability"}) if steps else None
+    judged = (
+        Section("Hard cases", [Paragraph(words), cases], "hard-cases", source={"study": HARD_CASES.name}) if cases else None
+    )
+    longest = Section("Stability", [steps], "stability", source={"study": STABILITY.name}) if steps else None
     return [each for each in (judged, longest) if each]
 
 
 def hard_cases(table: pd.DataFrame) -> Table | None:
     """Return a row for each case and a column for each method, the best methods first; None without that study."""
-    rows = _competitors(table, "hard_cases")
+    rows = _competitors(table, HARD_CASES.name)
     if rows.empty:
         return None
     judged = {key: judge(members) for key, members in _by_method_and_scene(rows).items()}
@@ -91,7 +95,7 @@ def _judgement(motion: Cell, invariants: Cell) -> Cell:
 
 def stability(table: pd.DataFrame) -> Table | None:
     """Return the longest step of each method on each scene, and how the next one fails; None without that study."""
-    rows = _competitors(table, "stability")
+    rows = _competitors(table, STABILITY.name)
     if rows.empty:
         return None
     cases, groups = list(rows["scene"].unique()), _by_method_and_scene(rows)

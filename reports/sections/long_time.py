@@ -7,8 +7,7 @@ import math
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.long_time import ATTITUDE
-from conservative.benchmarks.studies.studies import LONG_TIME
+from conservative.benchmarks.studies.long_time import ATTITUDE, STUDY
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
@@ -26,7 +25,7 @@ TERMS = (
 
 def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
     """Return the section of a report from named rows and samples of the study (see `names.with_names`)."""
-    lines = samples.loc[samples["study"] == LONG_TIME, ["scene", "quantity", "family", "name", "t", "value"]]
+    lines = samples.loc[samples["study"] == STUDY.name, ["scene", "quantity", "family", "name", "t", "value"]]
     figure = None
     if len(lines):
         title, picture = "Growth of errors over a million turns", figures.growth(lines)
@@ -38,7 +37,7 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
 
 def as_table(table: pd.DataFrame) -> Table:
     """Return a row for each method on each scene: the turns that it reached, and each error with its growth."""
-    here = table[table["study"] == LONG_TIME]
+    here = table[table["study"] == STUDY.name]
     quantities = list(dict.fromkeys(here.loc[here["measure"] == Measure.GROWTH.text, "quantity"]))
     rows: list[Row] = []
     for (scene, name), members in here.groupby(["scene", "name"], sort=False):

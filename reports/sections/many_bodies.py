@@ -8,8 +8,7 @@ import pandas as pd
 
 from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
+from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST, STUDY
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
@@ -57,7 +56,7 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
 
 def lines(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the study with a value, with the columns of `LINE`."""
-    rows = table[(table["study"] == THROUGHPUT) & (table["measure"] != Measure.AGREEMENT.text)]
+    rows = table[(table["study"] == STUDY.name) & (table["measure"] != Measure.AGREEMENT.text)]
     kinds = [class_of(role, method).value for role, method in zip(rows["role"], rows["method"], strict=True)]
     rows = rows.assign(name=rows["line"].where(rows["way"] == "", rows["line"] + ", " + rows["way"]), **{"class": kinds})
     return rows[rows["value"].notna() | (rows["class"] == MethodClass.SOLUTION)]
@@ -146,7 +145,7 @@ def cost_table(rows: pd.DataFrame, reached: pd.DataFrame) -> Table:
 
 def absent(table: pd.DataFrame) -> Table:
     """Return the methods that did not run, and why; sizes omitted for lack of time are not listed, as fewer bodies ran."""
-    here = table["study"] == THROUGHPUT
+    here = table["study"] == STUDY.name
     failed = table[
         here & ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
     ]

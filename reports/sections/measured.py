@@ -7,8 +7,9 @@ from functools import cached_property
 
 import pandas as pd
 
+from conservative.benchmarks.studies import random
 from conservative.benchmarks.studies.step_ladder import SAMPLES
-from conservative.benchmarks.studies.studies import ENGINES, LONG_TIME, PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies.studies import STUDIES
 from conservative.scene import Scene
 
 from ..rows import points
@@ -45,8 +46,9 @@ class Measured:
 
     @cached_property
     def scene_rows(self) -> pd.DataFrame:
-        """The rows of the studies that compare methods on scenes."""
-        return self.rows[~self.rows["study"].isin((*ENGINES, RANDOM, THROUGHPUT, PRICE, LONG_TIME))].reset_index(drop=True)
+        """The rows of the studies that compare methods on scenes, without those that have a section of their own."""
+        together = [name for name, each in STUDIES.items() if not each.apart]
+        return self.rows[self.rows["study"].isin(together)].reset_index(drop=True)
 
     @cached_property
     def points(self) -> pd.DataFrame:
@@ -63,7 +65,7 @@ class Measured:
     @cached_property
     def ratios(self) -> tuple[random_bodies.RandomRatios, ...]:
         """The ratios on random bodies; empty without that study."""
-        return random_bodies.ratios(self.rows) if RANDOM in self.plan.names else ()
+        return random_bodies.ratios(self.rows) if random.STUDY.name in self.plan.names else ()
 
 
 def of_scene(rows: pd.DataFrame, scene: str) -> pd.DataFrame:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.paper_figures import STUDY
 
 from ..charts import paper
 from ..document.model import Figure, Layout, Section, Table, filled
@@ -25,12 +26,12 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         title = "Figure 2 of the paper: centre of mass of the top"
         figures.append(Figure("paper_figure_2", title, words, *paper.figure_2(positions), Layout.PANELS))
     blocks = filled(*figures, position_errors(table))
-    return Section("The paper's figures, drawn again", blocks, "paper", "The paper", source={"study": "paper_figures"})
+    return Section("The paper's figures, drawn again", blocks, "paper", "The paper", source={"study": STUDY.name})
 
 
 def position_errors(table: pd.DataFrame) -> Table | None:
     """Return the errors of the top's centre of mass after one period of precession; None without that study."""
-    rows = of_study(table, "paper_figures")
+    rows = of_study(table, STUDY.name)
     if rows.empty:
         return None
     wide = rows.pivot(index="dt", columns="measure", values="value").sort_index(ascending=False)

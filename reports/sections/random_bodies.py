@@ -13,8 +13,7 @@ import pandas as pd
 
 from conservative.benchmarks.contest import LINE, Cheapest, Ratios, contests, costs
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.random import DECADES
-from conservative.benchmarks.studies.studies import RANDOM
+from conservative.benchmarks.studies.random import DECADES, STUDY
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
@@ -58,13 +57,13 @@ class RandomRatios(Ratios):
 
 def supported_rows(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the study about methods, without those that do not support a field."""
-    return without_outcome(of_study(table, RANDOM), OutcomeKind.UNSUPPORTED)
+    return without_outcome(of_study(table, STUDY.name), OutcomeKind.UNSUPPORTED)
 
 
 def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
     """Return the ratios in named rows of the study: against the fastest engine, then against each one."""
     rows = supported_rows(table)
-    reached = costs(points(rows, RANDOM, untimed=True), DECADES)
+    reached = costs(points(rows, STUDY.name, untimed=True), DECADES)
     ours, theirs = reached[~reached["class"].isin(OF_ENGINES)], of_classes(reached, *OF_ENGINES)
     taken = rows[rows["role"] == Role.ENGINE]
     engines = list(taken["family"].unique())
@@ -81,7 +80,7 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
 
 def truths(table: pd.DataFrame) -> str:
     """Return in words how well the two reference solutions agree, and on how many bodies they do not."""
-    rows = table[(table["study"] == RANDOM) & (table["measure"] == Measure.AGREEMENT.text)]
+    rows = table[(table["study"] == STUDY.name) & (table["measure"] == Measure.AGREEMENT.text)]
     good = with_outcome(rows, OutcomeKind.OK)
     if not len(good):
         return "No body has two reference solutions that agree."
@@ -108,7 +107,7 @@ def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str =
         figure = Figure("random_bodies", title, words, picture, panels, layout=Layout.PAIRS)
     terms = Paragraph(TERMS, Emphasis.NOTE)
     blocks = filled(Paragraph(f"{drawn} {about}"), figure, as_table(ratios), by_engine(ratios), terms)
-    return Section("Random bodies", blocks, "random", "Random bodies", source={"study": RANDOM})
+    return Section("Random bodies", blocks, "random", "Random bodies", source={"study": STUDY.name})
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:
@@ -190,7 +189,7 @@ def count_text(ratios: Ratios) -> str:
 
 def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios]) -> Summary:
     """Return the summary of named rows of the study and their ratios."""
-    measured = points(supported_rows(table), RANDOM, untimed=True)
+    measured = points(supported_rows(table), STUDY.name, untimed=True)
     reached = costs(measured, DECADES, [*LINE, "version", "series"])
     families = map(display_name, reached["family"], reached["version"], [""] * len(reached))
     reached = reached.assign(name=list(families))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from conservative.benchmarks.contest import Contest, costs
-from conservative.benchmarks.studies.studies import RANDOM
+from conservative.benchmarks.studies import each_step, random, work_precision
 
 from ..document.cells import DASH, grade_ratio, tolerance
-from ..document.model import Cell, Emphasis, Grade, Paragraph, Row, Section, Style, Table
+from ..document.model import Block, Cell, Emphasis, Grade, Paragraph, Row, Section, Style, Table
 from ..rows.names import MethodClass
 from ..rows.points import DECADES
 from .measured import Measured
 from .random_bodies import ANY, RandomRatios
-from .scene_contests import STUDY, sides
+from .scene_contests import sides
 
 _RATIOS = (
     "The time of the fastest engine or ODE solver divided by that of our fastest method, at each decade of the largest "
@@ -26,8 +26,9 @@ _RATIOS = (
 
 def section(measured: Measured) -> Section:
     """Return the section."""
-    source, terms = {"study": (RANDOM, "work_precision", STUDY)}, Paragraph(_RATIOS, Emphasis.NOTE)
-    return Section("Where an engine is faster", [ratio_table(measured), terms], "ratios", source=source)
+    source = {"study": tuple(each.STUDY.name for each in (random, work_precision, each_step))}
+    blocks: list[Block] = [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]
+    return Section("Where an engine is faster", blocks, "ratios", source=source)
 
 
 def ratio_table(measured: Measured) -> Table:

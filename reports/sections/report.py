@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import LONG_TIME, PRICE, RANDOM, THROUGHPUT
+from conservative.benchmarks.studies import random
 
 from ..document.model import Document, Paragraph, Section, filled
 from ..run.measure import Measurements
@@ -23,7 +23,6 @@ from . import (
     long_time,
     many_bodies,
     paper,
-    price,
     provenance,
     random_bodies,
     ratios,
@@ -34,8 +33,8 @@ from . import (
 )
 from .measured import Measured, of_scene
 
-SECTIONS: dict[str, Any] = {THROUGHPUT: many_bodies, LONG_TIME: long_time, PRICE: price}
-"""Studies that have a section of their own rows and samples."""
+SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time)}
+"""Sections of the rows and samples of one study, by its name."""
 SCHEMA = 2
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
@@ -48,7 +47,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     summaries = {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes}
     rows = measured.scene_rows
     details: list[Section] = [ratios.section(measured)]
-    if RANDOM in plan.names:
+    if random.STUDY.name in plan.names:
         details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
     details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
     if plan.engines:
@@ -56,7 +55,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     for name, part in SECTIONS.items():
         if name in plan.names:
             details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
-    details += hard_cases.sections(rows)
+    details += hard_cases.sections(measured.rows)
     details += filled(paper.section(rows, measured.samples), failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
     blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]

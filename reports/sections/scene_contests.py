@@ -9,15 +9,13 @@ import pandas as pd
 
 from conservative.benchmarks.contest import Cheapest, Contest, contests, costs
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.each_step import ERROR
+from conservative.benchmarks.studies.each_step import ERROR, STUDY
 
 from ..document.cells import DASH, factor, numeric, ratio_text, tolerance
 from ..document.model import Cell, Row, Table
 from ..rows.names import OF_ENGINES, MethodClass, of_classes
 from ..rows.points import DECADES, points
 
-STUDY = "each_step"
-"""Name of the study with every step stored."""
 _COSTS = "µs per s", "µs a sample"
 HEADER = (
     *("error, rad", "our fastest general integrator", *_COSTS, "fastest engine", *_COSTS, "engine / ours"),
@@ -39,9 +37,9 @@ class EachStep:
 
 def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
     """Return the costs with every step stored on a scene; None without the study."""
-    rows = table[(table["study"] == STUDY) & (table["scene"] == scene)]
+    rows = table[(table["study"] == STUDY.name) & (table["scene"] == scene)]
     times = (Measure.TIME_SAMPLED, Measure.TIME_OWN_LOOP, Measure.TIME)
-    stored, engines, final = (costs(points(rows, STUDY, time), [ERROR]) for time in times)
+    stored, engines, final = (costs(points(rows, STUDY.name, time), [ERROR]) for time in times)
     if stored.empty:
         return None
     own_loop = pd.concat([stored[~stored["name"].isin(engines["name"])], engines])

@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import long_runs, step_ladder
+from conservative.benchmarks.studies import convergence, each_step, long_runs, paper, speed, step_ladder, work_precision
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.scene import Scene
 
@@ -53,7 +53,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         Paragraph(SAMPLE_TERMS, Emphasis.NOTE),
     ]
     if decades.rows:
-        source = {"study": ("work_precision", scene_contests.STUDY)}
+        source = {"study": (work_precision.STUDY.name, each_step.STUDY.name)}
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True, source=source))
     errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     fits = lines.fits(errors)
@@ -66,11 +66,15 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
             Section("Work against precision", work),
-            Section("Drift over time", long_times, source={"study": "long_runs"}),
-            Section("Drift at the scene's own step", filled(drift(rows, name)), folded=True, source={"study": "paper"}),
+            Section("Drift over time", long_times, source={"study": long_runs.STUDY.name}),
+            Section(
+                "Drift at the scene's own step", filled(drift(rows, name)), folded=True, source={"study": paper.STUDY.name}
+            ),
             Section("Convergence", [_convergence_figure(errors, fits, name), Paragraph(order_words)]),
-            Section("Orders and errors as tables", orders, folded=True, source={"study": ("convergence", "paper")}),
-            Section("Wall time", [Paragraph(time_words), time(rows, name)], source={"study": "speed"}),
+            Section(
+                "Orders and errors as tables", orders, folded=True, source={"study": (convergence.STUDY.name, paper.STUDY.name)}
+            ),
+            Section("Wall time", [Paragraph(time_words), time(rows, name)], source={"study": speed.STUDY.name}),
             Section("The motion itself", [curves]) if curves else None,
         ),
         name,
@@ -115,7 +119,7 @@ def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float
 
 def drift(table: pd.DataFrame, scene: str) -> Table:
     """Return the drift of every invariant at the scene's step, its slope over time, and the error of orthonormality."""
-    values = _wide(table, "paper", scene)
+    values = _wide(table, paper.STUDY.name, scene)
     invariants = [column[1] for column in values.columns if column[0] == Measure.DRIFT_MAX.text]
     header = ["method", *(f"{name}{part}" for name in invariants for part in ("", ", 1/s")), "orthonormality"]
     body: list[Row] = []
@@ -136,7 +140,7 @@ _ERRORS = ((Measure.ATTITUDE_MAX, "rad"), (Measure.ATTITUDE_FINAL, "rad"), (Meas
 
 def accuracy(table: pd.DataFrame, scene: str) -> Table:
     """Return errors of attitude and rates at the paper's steps: the scene's own, a half and a quarter of it."""
-    rows = of_study(table, "paper", scene)
+    rows = of_study(table, paper.STUDY.name, scene)
     rows = rows[rows["measure"].isin([measure.text for measure, _ in _ERRORS])]
     steps = sorted(rows["dt"].unique(), reverse=True)
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
@@ -172,10 +176,10 @@ _TIMES = (
 
 def time(table: pd.DataFrame, scene: str) -> Table:
     """Return wall times at the scene's step: minimum and median of interleaved rounds, and the costs before the first step."""
-    rows = of_measure(of_study(table, "speed", scene), Measure.TIME)
+    rows = of_measure(of_study(table, speed.STUDY.name, scene), Measure.TIME)
     details = rows.set_index("name")["detail"]
     header = ["method", f"steps of {DEFAULT_METHOD}", *(title for _, _, title in _TIMES), "timed"]
-    ranked = _lines(_wide(table, "speed", scene), (Measure.TIME.text, ""))
+    ranked = _lines(_wide(table, speed.STUDY.name, scene), (Measure.TIME.text, ""))
     unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in ranked if name == DEFAULT_METHOD), math.nan)
     body: list[Row] = []
     for name, row in ranked:
@@ -189,7 +193,7 @@ def conservation(table: pd.DataFrame, scene: str) -> Table:
 
     Orthonormality counts as a quantity.
     """
-    rows = of_study(table, "long_runs", scene)
+    rows = of_study(table, long_runs.STUDY.name, scene)
     rows = rows[rows["measure"].isin([Measure.DRIFT_MAX.text, Measure.ORTHONORMALITY.text])]
     rows = rows.assign(quantity=rows["quantity"].mask(rows["quantity"] == "", "orthonormality"))
     quantities = list(rows["quantity"].unique())

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import RANDOM
+from conservative.benchmarks.studies import random
 from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
@@ -24,7 +24,7 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     data: dict[str, Any] = {"study": name, **made}
     named = with_names(measured.table)
     shown: list[Block]
-    if name == RANDOM:
+    if name == random.STUDY.name:
         ratios = random_bodies.ratios(named)
         sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
         shown, terms = filled(random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence), random_bodies.TERMS

@@ -11,6 +11,7 @@ import numpy as np
 from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import convergence, motion, speed
 from conservative.method import Role
 from conservative.outcome import Outcome
 from conservative.scene import Scene
@@ -23,6 +24,8 @@ from .hard_cases import RIGHT, USABLE
 from .measured import Measured, of_scene
 from .summary import MIDDLE
 
+STUDIES = tuple(each.STUDY.name for each in (motion, convergence, speed))
+"""Studies of the section."""
 PAPER_MAP = "reduced"
 MOST = 8
 """Largest number of motions next to each other, with the exact one."""
@@ -86,7 +89,7 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     signs = Paragraph("Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far.", Emphasis.NOTE)
     lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, signs) if shown else ()
     blocks = filled(lead, *moving, table(found, scene))
-    source = {"study": ("motion", "convergence", "speed"), "scene": scene.name}
+    source = {"study": STUDIES, "scene": scene.name}
     return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
 
 

@@ -15,6 +15,7 @@ from conservative.benchmarks.studies.engine_selection import select_engines
 from conservative.benchmarks.studies.study import Study
 from conservative.outcome import OutcomeKind
 
+from .. import declared
 from .generic_study import Broken, truth
 
 BRICK = cv.scenes.brick_flip()
@@ -74,7 +75,7 @@ def test_orders_and_times_over_steps():
     assert any(error > engines_over_steps.TIMED for error in errors.values())  # what is another motion is not timed
 
 
-@pytest.mark.parametrize("name", studies.ENGINES)
+@pytest.mark.parametrize("name", declared.ENGINES)
 def test_a_failing_engine_costs_its_own_rows_only(name):
     broken = (Broken("raises"), Broken("unsupported"))
     measured = studied(name, (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5))

@@ -106,7 +106,7 @@ def test_a_body_at_rest_is_measured_in_its_own_steps():
 
 
 def test_the_scenes_of_the_study_are_registered():
-    study = studies.list_hard_studies((cv.Reduced(),))[0]
+    study = stability.STUDY.plan((cv.Reduced(),))
     assert tuple(scene.name for scene in study.scenes) == stability.SCENES
     assert np.all(np.diff(stability.STEP_SIZES) > 0)
     assert (stability.UNIT * stability.STEP_SIZES[0], stability.UNIT * stability.STEP_SIZES[-1]) == pytest.approx((0.1, 10.0))
@@ -148,7 +148,7 @@ def test_a_long_motion_is_cut_by_its_turn():
 
 def test_every_scene_and_every_engine_takes_part():
     methods = selection.methods()
-    study = studies.list_hard_studies(methods)[1]
+    study = hard_cases.STUDY.plan(hard_cases.settings(methods))
     assert {scene.name for scene in study.scenes} == set(registry.list_scenes())
     chosen = study.methods
     families = {method.family for method in methods if method.role != Role.TRUTH}

@@ -27,6 +27,7 @@ from conservative.references.environments.environment import worker_of
 from conservative.references.worker import client
 from conservative.references.worker.client import EngineCrashed, Worker, time_limit
 
+from ..declared import ENGINES
 from . import trial
 from .trial_engine import Trial
 
@@ -254,7 +255,7 @@ def rows(name, *methods):
 
 
 @pytest.mark.usefixtures("short_limits")
-@pytest.mark.parametrize("name", studies.ENGINES)
+@pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("do", ENDS)
 def test_a_crash_or_a_hang_is_a_row(name, do):
     table = rows(name, Trial(do), registry.method("pinocchio"), Trial())

@@ -6,7 +6,6 @@ import pytest
 
 from conservative import BadInput, MissingEngine, registry
 from conservative.benchmarks.contest import cheapest, costs
-from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.document.model import Grade
@@ -17,6 +16,7 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.sections.engines import OVER_STEPS, engine_rows, every_setting, figure, picture_points, side_by_side
 
+from ..declared import ENGINES
 from .made_up import SCENE, STEPS, at_step, over_steps
 from .rows import point, table
 
@@ -115,11 +115,9 @@ def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend(rows
 def test_a_plan_has_studies_of_engines_only_where_some_are_named():
     without = plan_report([SCENE], ["reduced"], quick=True)
     named = plan_report([SCENE], ["reduced"], quick=True, engines=["pinocchio"])
-    assert not set(without.names) & set(studies.ENGINES)
-    assert set(named.names) - set(without.names) == set(studies.ENGINES)
-    assert {method.family for study in named.studies if study.name in studies.ENGINES for method in study.methods} == {
-        "pinocchio"
-    }
+    assert not set(without.names) & set(ENGINES)
+    assert set(named.names) - set(without.names) == set(ENGINES)
+    assert {method.family for study in named.studies if study.name in ENGINES for method in study.methods} == {"pinocchio"}
     assert registry.method("pinocchio") not in named.methods
 
 

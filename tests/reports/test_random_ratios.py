@@ -16,7 +16,7 @@ from conservative.reports.document.model import Section, Table, walk
 from conservative.reports.report import render
 from conservative.reports.run.checkpoint import terms
 from conservative.reports.run.measure import Measurements
-from conservative.reports.run.plan import BODIES, FEW_BODIES, FEW_METHODS, QUICK_BODIES, plan_report
+from conservative.reports.run.plan import FEW_BODIES, FEW_METHODS, FULL, KINDS, QUICK_FULL, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.single_study import plan_study
 from conservative.reports.sections import random_bodies
@@ -254,8 +254,8 @@ def test_rows_of_random_bodies_are_nowhere_else(plan):
 def test_how_many_bodies_a_report_has():
     assert plan_report(["brick_flip"], METHODS).bodies == 0
     assert plan_report([], METHODS).bodies == plan_report(["brick_flip"], METHODS, full=True).bodies == 0
-    assert plan_report([], METHODS, full=True).bodies == BODIES
-    assert plan_report([], METHODS, full=True, quick=True).bodies == QUICK_BODIES
+    assert plan_report([], METHODS, full=True).bodies == KINDS[FULL].bodies == 3
+    assert plan_report([], METHODS, full=True, quick=True).bodies == KINDS[QUICK_FULL].bodies == 1
     first = plan_report(["brick_flip"], METHODS, bodies=1).studies[0]
     assert (first.name, len(first.scenes)) == ("random", len(FIELDS))
     assert plan_report([], METHODS, bodies=0).studies[0].name != "random"

@@ -23,6 +23,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import failures
 from conservative.reports.sections.report import SCHEMA
 
+from ..declared import ENGINES, FULL, MAIN
 from .made_up import measurements
 from .rows import frame, row
 
@@ -50,7 +51,7 @@ def test_report_has_its_files_and_lists_them(made):
 
 def test_a_line_per_study_tells_the_progress_where_there_is_no_terminal(made):
     lines = re.findall(r"^study \d of \d, (.*)", made[1].stderr, re.M)  # without those of every ten seconds, and of compilation
-    assert lines == [name.replace("_", " ") for name in studies.MAIN]
+    assert lines == [name.replace("_", " ") for name in MAIN]
 
 
 def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
@@ -73,16 +74,16 @@ def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
 
 def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_everything():
     default, full = plan_report(), plan_report(full=True)
-    assert default.names == ("random", *studies.MAIN)
-    assert set(full.names) == set(studies.MAKERS) - set(studies.ENGINES)
+    assert default.names == ("random", *MAIN)
+    assert set(full.names) == set(studies.STUDIES) - set(ENGINES)
     assert set(default.methods) < set(full.methods)
     left_out = {"exact", "precise", "substepped", "textbook"}
     assert {method.family for method in default.methods} == set(registry.list_methods()) - left_out
     assert "textbook" in {method.family for method in full.methods}
-    assert plan_report(bodies=2).names == ("random", *studies.MAIN)
-    assert plan_report(quick=True).names == plan_report(bodies=0).names == studies.MAIN
-    assert plan_report(engines=["scipy"]).names == ("random", *studies.MAIN, *studies.ENGINES)
-    assert set(plan_report(["lagrange_top"], full=True).names) == {*studies.MAIN, *studies.MORE}
+    assert plan_report(bodies=2).names == ("random", *MAIN)
+    assert plan_report(quick=True).names == plan_report(bodies=0).names == MAIN
+    assert plan_report(engines=["scipy"]).names == ("random", *MAIN, *ENGINES)
+    assert set(plan_report(["lagrange_top"], full=True).names) == set(FULL)
 
 
 def test_methods_of_other_packages_are_part_of_the_default_report(monkeypatch):
@@ -112,7 +113,7 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     stored = json.loads((folder / "measurements.json").read_text())
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
-    assert set(studies.MAIN) == set(table["study"])
+    assert set(MAIN) == set(table["study"])
     assert stored["schema"] == SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]

@@ -4,6 +4,7 @@ import csv
 import json
 from concurrent.futures import Future
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 
 from conservative import BadInput
 from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import hard_cases, on_cluster, stability, studies
 from conservative.integration.pickling import dump, load
 from conservative.reports.cli.main import main
@@ -93,7 +95,7 @@ def test_arguments_that_do_not_fit_the_study_are_refused(arguments, argument):
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("name", studies.MAKERS)
+@pytest.mark.parametrize("name", studies.STUDIES)
 def test_every_study_has_scenes_and_methods_of_its_own(name):
     planned = plan_study(name, skip_missing=True, bodies=1 if name == "random" else None, engines=("scipy",))
     assert planned.name == name
@@ -157,10 +159,12 @@ def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
     assert told == [(0.0, "brick_flip"), (0.5, "symmetric_body")]
 
 
-def test_every_study_is_timed_or_is_not():
-    timed = {"speed", "work_precision", "each_step", *studies.ENGINES, "random", "throughput", "price", "long_time"}
-    assert set(on_cluster.UNTIMED) | timed == set(studies.MAKERS)
-    assert not set(on_cluster.UNTIMED) & timed
+@pytest.mark.parametrize("name", [name for name, each in studies.STUDIES.items() if not each.timed])
+def test_a_study_that_is_not_timed_has_no_times(name):
+    planned = plan_study(name, () if studies.STUDIES[name].scenes else ("brick_flip",), ("reduced:order=4",), quick=True)
+    found = studies.findings(replace(planned, scenes=planned.scenes[:1]))
+    measures = {each.measure for each in found if isinstance(each, Measurement)}
+    assert not {measure for measure in measures if measure.text.startswith(("time", "prepar"))}
 
 
 @pytest.mark.parametrize(("name", "words"), [("speed", "got one for the study 'speed'"), ("long_runs", "got 'nowhere'")])
