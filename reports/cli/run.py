@@ -64,16 +64,12 @@ def run(
     require_extra("conservative run", "report", "rich")
     if parquet is not None:
         require_extra("conservative run --parquet", "parquet", "pyarrow")
-    from ..run.single_run import compare, run_once
+    from ..run.single_run import run_methods
     from ..sections.run import build
     from ..terminal.progress import progress, show_waiting
 
-    if len(methods) > 1:
-        if csv is not None or parquet is not None:
-            raise click.UsageError("--csv and --parquet hold the samples of one method; give --method once.")
-        with progress() as step:
-            summaries = compare(scene, methods, dt, t_end, truth, step)
-    else:
-        with show_waiting(": ".join([scene, *methods])):
-            summaries = [run_once(scene, methods[0] if methods else None, dt, t_end, truth, csv, parquet)]
+    if len(methods) > 1 and (csv is not None or parquet is not None):
+        raise click.UsageError("--csv and --parquet hold the samples of one method; give --method once.")
+    with progress() if len(methods) > 1 else show_waiting(": ".join([scene, *methods])) as step:
+        summaries = run_methods(scene, methods, dt, t_end, truth, step, csv, parquet)
     show(build(summaries), as_json)

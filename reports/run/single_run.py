@@ -19,7 +19,7 @@ from conservative.attitude import angle_between, orthonormality
 from conservative.errors import BadInput, MissingEngine
 from conservative.files import text_file
 from conservative.grid import Grid, grid_for
-from conservative.integration.one import integrate, read_method, require_support
+from conservative.integration.one import interrupt_of, read_method, require_support, warn_of_loads
 from conservative.invariants import sizes
 from conservative.method import Method
 from conservative.methods.search import candidates
@@ -50,38 +50,74 @@ PARTS, MOST_TRIED = (1, 10, 100), 10**6
 """Parts into which steps are divided in the search for an accurate run, and the largest number of steps of a run there."""
 
 
-def run_once(
+def run_methods(
     scene_name: str,
-    method_name: str | None,
-    dt: float | None = None,
-    t_end: float | None = None,
-    truth: bool | None = None,
+    method_names: Sequence[str],
+    dt: float | None,
+    t_end: float | None,
+    truth: bool | None,
+    step: Step,
     csv_file: Path | None = None,
     parquet_file: Path | None = None,
-) -> dict[str, Any]:
-    """Integrate and return the summary, with the errors (`find_errors`); samples go to the files, with every digit.
+) -> list[dict[str, Any]]:
+    """Return the summary of each method on a scene, by default of the one that `integrate` uses, with its errors.
+
+    The errors are those of `find_errors`. Of several methods, `wall_time`, s, is that of the fastest run after a short first
+    one, which compiles. The samples of the last method go to the files, with every digit.
 
     Raises
     ------
     BadInput
-        A name, a setting, dt, t_end or the file cannot be used; raised before the run.
+        A name, a setting, dt, t_end or a file cannot be used, or a method does not support the scene; raised before the first
+        run.
     MissingEngine
-        The method's engine is not installed.
+        The engine of a method is not installed.
     """
     scene = registry.scene(scene_name)
-    method = read_method(method_name or None, scene)
-    grid = bounded_grid(scene, method, dt, t_end)
+    methods = [read_method(name or None, scene) for name in method_names or ("",)]
+    runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in methods]
+    for method in methods:
+        _ = method.label  # raises `MissingEngine`
+    summaries = []
     with ExitStack() as stack:
         stream = stack.enter_context(text_file(csv_file, "csv")) if csv_file else None
         binary = stack.enter_context(text_file(parquet_file, "parquet")).buffer if parquet_file else None
-        trajectory = run_on(scene, method, grid)
+        for number, (method, grid) in enumerate(runs):
+            step(number / len(runs), method.name)
+            timed = {}
+            if len(runs) == 1:
+                trajectory = run_on(scene, method, grid)
+            else:
+                trajectory, timed["wall_time"] = time_run(scene, method, grid)
+            errors = find_errors(trajectory, grid, truth, scene_name, t_end)
+            summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, **timed})
         if stream is not None:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(header(trajectory))
             writer.writerows(samples_of(trajectory).tolist())
         if binary is not None:
             binary.write(trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False))
-    return summarize(trajectory, method, grid.dt) | {"error": find_errors(trajectory, grid, truth, scene_name, t_end)}
+    return summaries
+
+
+def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
+    """Return the trajectory on a grid; a failure ends it early."""
+    warn_of_loads(scene, method, grid.dt)
+    try:
+        return method.solve(scene, grid)
+    except SystemError as failure:
+        raise interrupt_of(failure)  # noqa: B904  # as in `integrate`
+
+
+def time_run(scene: Scene, method: Method, grid: Grid) -> tuple[Trajectory, float]:
+    """Return the trajectory and the wall time, s, of the fastest of the runs that `TIMED` has room for."""
+    run_on(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
+    wall_time, begin = math.inf, perf_counter()
+    while wall_time == math.inf or perf_counter() - begin < TIMED:
+        start = perf_counter()
+        trajectory = run_on(scene, method, grid)
+        wall_time = min(wall_time, perf_counter() - start)
+    return trajectory, wall_time
 
 
 def find_errors(
@@ -152,38 +188,6 @@ def status_of(summary: dict[str, Any]) -> str:
     return str(summary["outcome"])
 
 
-def compare(
-    scene_name: str, method_names: Sequence[str], dt: float | None, t_end: float | None, truth: bool | None, step: Step
-) -> list[dict[str, Any]]:
-    """Return the summary of each method on a scene, with its wall time and its errors (`find_errors`).
-
-    `wall_time`, s, is that of the fastest run after a short first one, which compiles.
-
-    Raises
-    ------
-    BadInput
-        A name, a setting, dt or t_end cannot be used, or a method does not support the scene; raised before the first run.
-    MissingEngine
-        The engine of a method is not installed.
-    """
-    scene = registry.scene(scene_name)
-    runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in map(registry.method, method_names)]
-    for method, _ in runs:
-        _ = method.label  # raises `MissingEngine`
-    summaries = []
-    for number, (method, grid) in enumerate(runs):
-        step(number / len(runs), method.name)
-        run_on(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
-        wall_time, begin = math.inf, perf_counter()
-        while wall_time == math.inf or perf_counter() - begin < TIMED:
-            start = perf_counter()
-            trajectory = run_on(scene, method, grid)
-            wall_time = min(wall_time, perf_counter() - start)
-        errors = find_errors(trajectory, grid, truth, scene_name, t_end)
-        summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, "wall_time": wall_time})
-    return summaries
-
-
 def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
     """Return the grid. Invalid arguments raise here, before a file is opened."""
     dt = scene.dt if dt is None else dt
@@ -195,11 +199,6 @@ def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | 
     if grid.n_steps > STEPS:
         raise BadInput("dt", f"{grid.dt:g}, for more than {STEPS:.0e} steps", "a longer step, or a shorter run (--t-end)")
     return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
-
-
-def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
-    """Return the trajectory on a grid; a failure ends it early."""
-    return integrate(scene, grid.dt, method, grid.dt * grid.n_steps, grid.every, on_failure="return")
 
 
 def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:

@@ -52,10 +52,13 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str) -> Iterator[None]:
-    """Show a bar if a piece of work takes longer than `DELAY`."""
+def show_waiting(what: str) -> Iterator[Step]:
+    """Show a bar if a piece of work takes longer than `DELAY`. Yield what takes the place of a step, and does nothing."""
+
+    def ignore(share: float, what: str) -> None: ...
+
     if not has_terminal() or find_spec("rich") is None:
-        yield
+        yield ignore
         return
     from .bars import Bar
 
@@ -65,7 +68,7 @@ def show_waiting(what: str) -> Iterator[None]:
     timer.daemon = True
     timer.start()
     try:
-        yield
+        yield ignore
     finally:
         timer.cancel()
         timer.join()
