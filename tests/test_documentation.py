@@ -109,7 +109,11 @@ def test_unknown_commands_are_found(line):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("from_body_to_verdict", ("moser_veselov", "mujoco")), ("satellite_with_loads", ("momentum balance", "Animation"))],
+    [
+        ("from_body_to_verdict", ("moser_veselov", "mujoco")),
+        ("satellite_with_loads", ("momentum balance", "Animation")),
+        ("figures_of_the_paper", ("0.0696", "0.0206", "0.0051")),
+    ],
 )
 def test_a_notebook_runs_and_is_checked_in_without_outputs(name, expected, tmp_path):
     notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)

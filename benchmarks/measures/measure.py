@@ -47,9 +47,6 @@ class Measure(Enum):
     TURNS_OVER = "turns over", "1"
     TURNS_OVER_TRUE = "turns over of the exact motion", "1"
     PRECISION = "precision of numbers", "bit"
-    PERIOD = "whole number of steps next to one period", "s"
-    PERIOD_X1 = "error of x1 after one period", "m"
-    PERIOD_DISTANCE = "distance after one period", "m"
 
     def __init__(self, text: str, unit: str) -> None:
         self.text, self.unit = text, unit

@@ -21,7 +21,6 @@ from . import (
     long_time,
     motion,
     paper,
-    paper_figures,
     random,
     speed,
     stability,
@@ -32,7 +31,7 @@ from .declaration import Declaration
 from .study import Finding, Progress, Study
 
 _IN_ORDER = (
-    *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time, paper_figures),
+    *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time),
     *(engines_at_one_step, engines_over_steps, stability, hard_cases, throughput),
 )
 STUDIES: Mapping[str, Declaration] = {each.STUDY.name: each.STUDY for each in _IN_ORDER}

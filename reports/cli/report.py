@@ -43,8 +43,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
 @click.option(
     "--full",
     is_flag=True,
-    help="Measure all methods, and add random bodies, many bodies, hard cases, longest steps, runs with every step stored, "
-    "and the paper's figures.",
+    help="Measure all methods, and add random bodies, many bodies, hard cases, longest steps, and runs with every step stored.",
 )
 @quick_option
 @skip_missing_option

@@ -10,8 +10,7 @@ import pandas as pd
 from conservative.attitude import from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import convergence, motion, paper_figures
-from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
+from conservative.benchmarks.studies import convergence, motion
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -21,13 +20,11 @@ from .names import of_measure, of_study, with_outcome
 ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
 SURE = 0.5
 """Largest standard error of an order in a short table. Above it, the fit does not tell the order from the next one."""
-ANALYTICAL = "analytical"
-"""Name of the exact motion in the paper's figure 2."""
 
 
 def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the relative drifts of the study of motions: columns scene, method, family, name, t (s), quantity, drift."""
-    rows = samples[samples["study"] == "motion"].rename(columns={"value": "drift"})
+    rows = samples[samples["study"] == motion.STUDY.name].rename(columns={"value": "drift"})
     rows = rows[rows["quantity"].str.startswith(motion.SIGNED)]
     rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=rows["line"])
     return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
@@ -35,7 +32,7 @@ def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
 
 def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
     """Return the motion of each method over the first duration of a scene, by the name of the method."""
-    rows = samples[(samples["study"] == "motion") & (samples["scene"] == scene.name)]
+    rows = samples[(samples["study"] == motion.STUDY.name) & (samples["scene"] == scene.name)]
     points = _points(rows, ["method", "name", "t"], motion.STATES)
     return {
         str(method): Trajectory(
@@ -52,7 +49,7 @@ def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
     keys = ["scene", "method", "family", "name", "t"]
-    rows = samples[samples["study"] == "motion"]
+    rows = samples[samples["study"] == motion.STUDY.name]
     return _points(rows.assign(name=rows["line"]), keys, motion.AXES)
 
 
@@ -61,30 +58,6 @@ def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) ->
     wide = rows[rows["quantity"].isin(quantities)].pivot(index=keys, columns="quantity", values="value").reset_index()
     order = rows[keys].drop_duplicates()
     return order.merge(wide, on=keys).reindex(columns=[*keys, *quantities])
-
-
-def body_rates(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the paper's figure 1(a): columns t (s), component, rate (rad/s) of the brick's body rates."""
-    rows = _of_figure(samples, BRICK)
-    rows = rows[rows["quantity"].isin(RATES)].rename(columns={"quantity": "component", "value": "rate"})
-    return rows[["t", "component", "rate"]].reset_index(drop=True)
-
-
-def conservation_errors(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return figures 1(b) and 1(c): columns t (s), method, energy and momentum, errors of energy and |L|, relative, signed."""
-    return _points(_of_figure(samples, BRICK), ["t", "method"], (ENERGY, MOMENTUM))
-
-
-def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return figures 2(b) and 2(c): columns t (s), run, x1, x2 (m), the top's centre of mass for two steps, and exact."""
-    rows = _of_figure(samples, TOP)
-    methods = zip(rows["method"], rows["dt"], strict=True)
-    runs = [ANALYTICAL if method == EXACT else f"Δt = {dt:g} s" for method, dt in methods]
-    return _points(rows.assign(run=pd.Series(runs, index=rows.index, dtype="string")), ["t", "run"], (X1, X2))
-
-
-def _of_figure(samples: pd.DataFrame, scene: str) -> pd.DataFrame:
-    return samples[(samples["study"] == paper_figures.STUDY.name) & (samples["scene"] == scene)]
 
 
 def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:

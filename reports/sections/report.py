@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.studies import random
 
-from ..document.model import Document, Paragraph, Section, filled
+from ..document.model import Document, Paragraph, Section
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -22,7 +22,6 @@ from . import (
     hard_cases,
     long_time,
     many_bodies,
-    paper,
     provenance,
     random_bodies,
     ratios,
@@ -56,7 +55,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         if name in plan.names:
             details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
     details += hard_cases.sections(measured.rows)
-    details += filled(paper.section(rows, measured.samples), failures.section(rows))
+    details.append(failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
     blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]
     tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]

@@ -13,7 +13,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
-from conservative.benchmarks.studies import motion, paper_figures, speed, studies
+from conservative.benchmarks.studies import motion, speed, studies
 from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
@@ -90,14 +90,6 @@ def test_a_motion_that_fails_has_rows_with_the_outcome():
     rows, lines = findings("motion", cv.Lame())
     assert {row.outcome.kind for row in rows} == {OutcomeKind.UNSUPPORTED}
     assert {line.method for line in lines} == {"exact"}
-
-
-def test_the_papers_figures_are_those_of_its_scenes():
-    rows, lines = findings("paper_figures", cv.Reduced())
-    assert rows == []
-    rates = {line.quantity for line in lines if line.method == paper_figures.PAPER_MAP}
-    assert rates == {*paper_figures.RATES, paper_figures.ENERGY, paper_figures.MOMENTUM}
-    assert findings("paper_figures", cv.Reduced(), scenes=(registry.scene("needle"),)) == ([], [])
 
 
 def test_speed_has_the_minimum_and_the_median():

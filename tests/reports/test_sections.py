@@ -51,10 +51,9 @@ def nothing_is_measured(monkeypatch):
 
 @pytest.fixture(scope="module")
 def report():
-    """Plan, measurements and origin of a report of both scenes: the paper's figures, curves and imports are measured."""
+    """Plan, measurements and origin of a report of both scenes: curves are measured."""
     plan = plan_report([], ["reduced"], quick=True)
     found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
-    found += studies.findings(Study("paper_figures", plan.scenes, plan.methods))
     samples = [finding for finding in found if isinstance(finding, Samples)]
     return plan, Measurements(measurements().table, measurement.samples_frame(samples)), provenance(["report"])
 
@@ -67,8 +66,6 @@ def texts(document, folder):
 
 def test_building_and_rendering_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):
     text, page = texts(build(*report), tmp_path)
-    assert {"paper_figure_1.svg", "paper_figure_2.svg"} < {path.name for path in tmp_path.iterdir()}
-    assert "paper_figure_2.svg" in text
     assert 'data-figure="sphere_lagrange_top"' in page
     assert "The motion itself" not in text  # its figures are on the page alone
 
@@ -100,9 +97,9 @@ def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_method
     "measure",
     [
         lambda: curves(registry.scene("brick_flip"), Reduced()),
-        lambda: list(studies.findings(Study("paper_figures", (registry.scene("brick_flip"),), (Reduced(),)))),
+        lambda: list(studies.findings(Study("paper", (registry.scene("brick_flip"),), (Reduced(),)))),
     ],
-    ids=["curves", "figures of the paper"],
+    ids=["curves", "a study"],
 )
 def test_measuring_would_be_noticed(measure, nothing_is_measured):
     with pytest.raises(pytest.fail.Exception, match=r"runs on|a process starts"):
