@@ -2,7 +2,7 @@
 
 Each panel draws the body as its inertia box, the box of constant density with the same moments, centred at the fixed point. An
 arrow is the angular momentum, relative to its initial size. A rod along one axis of the body leaves a trace.
-`player.js` draws with three.js, which `.ci/three/build` bundles.
+`player.js` draws with `vendor/three.js`, which `.ci/three/build` bundles.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Animation:
 
 def script() -> str:
     """Return the style, the packed library and the player of all animations of a page, for the end of the page."""
-    style, library, player = ((_HERE / name).read_bytes() for name in ("player.css", "three.js", "player.js"))
+    style, library, player = ((_HERE / name).read_bytes() for name in ("player.css", "vendor/three.js", "player.js"))
     packed = base64.b64encode(gzip.compress(library, mtime=0)).decode()
     three = f'<script type="application/gzip" id="three">{packed}</script>'
     return f"<style>\n{style.decode()}</style>\n{three}\n<script>\n{player.decode()}</script>\n"
