@@ -19,7 +19,7 @@ from functools import partial
 from typing import Any
 
 from conservative.errors import IntegrationFailed
-from conservative.integration.pickling import NotTransferable
+from conservative.pickling import NotTransferable
 from conservative.references.worker.calls import python_worker, run_within
 
 from .timing import Key, Timing, time_interleaved

@@ -6,9 +6,9 @@ from functools import cache, partial
 from weakref import WeakKeyDictionary
 
 from conservative.grid import Grid
-from conservative.integration.pickling import NotTransferable
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.pickling import NotTransferable
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, time_limit

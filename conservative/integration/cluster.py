@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..check import describe
 from ..errors import BadInput, require_extra
+from ..pickling import dump, load
 from ..version import VERSION
-from .pickling import dump, load
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from conservative.integration.pickling import NotTransferable, dump, load
+from conservative.pickling import NotTransferable, dump, load
 
 from .client import Worker, time_limit
 

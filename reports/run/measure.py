@@ -19,9 +19,9 @@ from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
-from conservative.integration.pickling import NotTransferable
 from conservative.kernels import is_first_use
 from conservative.method import Role
+from conservative.pickling import NotTransferable
 from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import kill_workers
 

@@ -10,9 +10,9 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.integration import blocks
 from conservative.integration.blocks import run_block
 from conservative.integration.inputs import read_bodies
-from conservative.integration.pickling import dump, load
 from conservative.integration.shared_choice import pick_hardest
 from conservative.invariants import sizes
+from conservative.pickling import dump, load
 
 BODY = cv.RigidBody([[13, 0.5, 0.2], [0.5, 5, 0.3], [0.2, 0.3, 10]], rotor_momentum=(3.0, -4.0, 2.0))
 GRAVITY = cv.UniformGravity(3.0, (0.1, 0.2, 0.3))

@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 import conservative as cv
-from conservative.integration.pickling import NotTransferable, dump, load
+from conservative.pickling import NotTransferable, dump, load
 from conservative.references.worker import client
 from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, close_workers

@@ -15,7 +15,7 @@ from conservative import BadInput
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import hard_cases, on_cluster, stability, studies
-from conservative.integration.pickling import dump, load
+from conservative.pickling import dump, load
 from conservative.reports.cli.main import main
 from conservative.reports.run import single_study
 from conservative.reports.run.measure import Measurements

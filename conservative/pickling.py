@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ..check import PickledByFields, read_only
-from ..errors import require_extra, restore
+from .check import PickledByFields, read_only
+from .errors import require_extra, restore
 
 LOCK = threading.Lock()
 """Held by `dump`, because the list of modules that are pickled by value belongs to the whole process."""
