@@ -27,9 +27,9 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from .collocation import collocate
-from .engines.scipy import SciPy
 from .exact.method import Exact
 from .precise import Precise
+from .solvers.scipy import SciPy
 
 CHECKED_RADIANS = 100.0
 """A closed form is checked over this angle only, rad: multi-precision integration takes seconds for it."""

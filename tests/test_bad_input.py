@@ -13,12 +13,12 @@ from click.testing import CliRunner
 import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
-from conservative.references.engines.catalogue import MuJoCo
-from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.model_files import body_from_mjcf
-from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.catalogue import MuJoCo
 from conservative.references.exact import method
+from conservative.references.importers.model_files import body_from_mjcf
 from conservative.references.precise import Precise
+from conservative.references.solvers.heyoka import Heyoka
+from conservative.references.solvers.scipy import SciPy
 from conservative.reports.cli.main import main
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400

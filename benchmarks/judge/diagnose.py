@@ -22,7 +22,7 @@ from conservative.needs import IN_TIME, Need, join
 from conservative.potentials.load import FRAMES
 from conservative.potentials.turning import Turning, static_part
 from conservative.references.engine import principal_axes
-from conservative.references.engines.scipy import Derivative, state_derivative, wheel_rates
+from conservative.references.solvers.scipy import Derivative, state_derivative, wheel_rates
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from conservative.attitude import Array, from_quaternion, hat
 from conservative.references.engine import principal_axes
-from conservative.references.engines.scipy import Derivative, list_derivatives, solve_pieces, wheel_rates
 from conservative.references.exact.method import Exact, free_body, lagrange_top
+from conservative.references.solvers.scipy import Derivative, list_derivatives, solve_pieces, wheel_rates
 from conservative.scene import Scene
 
 Motion = tuple[Array | None, Array | None]

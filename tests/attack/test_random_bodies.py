@@ -23,11 +23,11 @@ from conservative.grid import Grid
 from conservative.invariants import kept_sizes, sizes
 from conservative.methods.bounds import LOOSEST
 from conservative.methods.units import bound_rate
-from conservative.references.engines.catalogue import MuJoCo, Pinocchio
-from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
+from conservative.references.solvers.heyoka import Heyoka
+from conservative.references.solvers.scipy import SciPy
 
 from .effort import tries
 

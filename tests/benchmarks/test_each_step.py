@@ -14,7 +14,7 @@ from conservative.benchmarks.studies.line import LinePoint
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import grid_for
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.engines.heyoka import Heyoka
+from conservative.references.solvers.heyoka import Heyoka
 from conservative.registry import method
 
 from .generic_study import SCENE, truth

@@ -13,8 +13,8 @@ from conservative.benchmarks.recommendation import growth
 from conservative.benchmarks.recommendation.growth import ErrorLaw, amplification_of, fit_law
 from conservative.benchmarks.recommendation.recommend import ask, list_engines, recommend
 from conservative.grid import Grid
-from conservative.references.engines.heyoka import Heyoka
 from conservative.references.exact.method import Exact
+from conservative.references.solvers.heyoka import Heyoka
 
 R_BP = from_quaternion(np.array([0.8, 0.1, -0.5, 0.3]) / np.linalg.norm([0.8, 0.1, -0.5, 0.3]))
 R_WB = from_quaternion(np.array([0.2, 0.7, 0.4, -0.3]) / np.linalg.norm([0.2, 0.7, 0.4, -0.3]))
@@ -97,7 +97,7 @@ def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
 
 
 def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
-    from conservative.references.engines.catalogue import MuJoCo
+    from conservative.references.environments.catalogue import MuJoCo
 
     def missing(self):
         raise cv.MissingEngine("MuJoCo", "mujoco")

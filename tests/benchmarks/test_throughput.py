@@ -15,9 +15,9 @@ from conservative.benchmarks.studies.selection import Missing
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
-from conservative.references.engines.catalogue import MuJoCo
-from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.catalogue import MuJoCo
 from conservative.references.precise import Precise
+from conservative.references.solvers.scipy import SciPy
 from conservative.references.truth import TIGHTEST, Disagreement, reference
 
 

@@ -11,7 +11,7 @@ import conservative as cv
 from conservative.attitude import angle_between, hat, orthonormality, rotation_about
 from conservative.card import Card
 from conservative.invariants import JACOBI_INTEGRAL
-from conservative.references.engines.scipy import SciPy
+from conservative.references.solvers.scipy import SciPy
 from conservative.scenes import satellites
 
 TURN = rotation_about((1, -2, 0.5), 1.1)

@@ -18,16 +18,16 @@ from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.grid import Grid
 from conservative.references import engine
 from conservative.references.engine import principal_axes
-from conservative.references.engines import heyoka
-from conservative.references.engines.catalogue import MuJoCo, Pinocchio
-from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.scipy import SciPy
 from conservative.references.engines.shared import compile_models, sample
+from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.start import _BLOCK
 from conservative.references.precise import Precise
 from conservative.references.samples import QUATERNION, States
+from conservative.references.solvers import heyoka
+from conservative.references.solvers.heyoka import Heyoka
+from conservative.references.solvers.scipy import SciPy
 from conservative.scenes.tops import cone
 from conservative.trajectory import Counters
 

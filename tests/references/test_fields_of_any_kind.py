@@ -22,12 +22,12 @@ from conservative.potentials.potential import torque_W
 from conservative.references import precise
 from conservative.references.engine import principal_axes
 from conservative.references.engines import pinocchio
-from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.scipy import SciPy
 from conservative.references.environments.plain_numbers import describe
 from conservative.references.heyoka_equations import formulations
 from conservative.references.heyoka_equations.accelerations import READERS, express_field
 from conservative.references.precise import Precise
+from conservative.references.solvers.heyoka import Heyoka
+from conservative.references.solvers.scipy import SciPy
 from conservative.references.truth import reference
 from conservative.scenes.random_body import random_body
 

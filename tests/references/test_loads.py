@@ -14,7 +14,7 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.errors import measure_errors
 from conservative.grid import Grid
 from conservative.references.collocation import collocate
-from conservative.references.engines.scipy import SciPy
+from conservative.references.solvers.scipy import SciPy
 from conservative.references.truth import difference, reference
 from tests.conservative.test_loads import SCENES
 

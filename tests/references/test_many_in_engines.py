@@ -9,9 +9,10 @@ from conservative.benchmarks.studies.ensembles import draw
 from conservative.grid import Grid
 from conservative.potentials.point_to_point import PointAttraction
 from conservative.references.engine import principal_axes
-from conservative.references.engines import heyoka, mujoco
+from conservative.references.engines import mujoco
 from conservative.references.environments.plain_numbers import describe_many, read_many
 from conservative.references.heyoka_equations import formulations
+from conservative.references.solvers import heyoka
 from conservative.references.worker.program import Runs
 
 GRID = Grid(0.01, 50, 20)

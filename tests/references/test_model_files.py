@@ -4,8 +4,8 @@ import pytest
 import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.attitude import from_quaternion, rotation_about
-from conservative.references.engines import model_files
-from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
+from conservative.references.importers import model_files
+from conservative.references.importers.model_files import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
 
 # One body of generic parameters, written in every way that a format has.

@@ -10,8 +10,8 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.grid import Grid
-from conservative.references.engines.scipy import SciPy
 from conservative.references.precise import Precise
+from conservative.references.solvers.scipy import SciPy
 
 from .exact_trials import states_in_digits
 

@@ -7,8 +7,8 @@ import conservative as cv
 from conservative.attitude import from_quaternion
 from conservative.grid import Grid
 from conservative.potentials.turning import Orbit
-from conservative.references.engines.heyoka import FRAMES, Heyoka
 from conservative.references.samples import MATRIX, QUATERNION, ROWS, States, to_body_axes
+from conservative.references.solvers.heyoka import FRAMES, Heyoka
 
 BODIES, SAMPLES = 3, 5
 DRAW = np.random.default_rng(4)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.references.engines.catalogue import MuJoCo, Pinocchio
-from conservative.references.engines.heyoka import FRAMES, Heyoka
-from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.heyoka_equations import formulations
 from conservative.references.precise import Precise
+from conservative.references.solvers.heyoka import FRAMES, Heyoka
+from conservative.references.solvers.scipy import SciPy
 
 
 @pytest.mark.parametrize(

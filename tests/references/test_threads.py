@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.references.engines.catalogue import MuJoCo
-from conservative.references.engines.heyoka import Heyoka
+from conservative.references.environments.catalogue import MuJoCo
 from conservative.references.exact.method import Exact
 from conservative.references.heyoka_equations import forms, formulations
 from conservative.references.precise import Precise
+from conservative.references.solvers.heyoka import Heyoka
 
 from .exact_trials import states_in_digits
 

@@ -8,7 +8,7 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.judge.diagnose import TEXTBOOK
 from conservative.benchmarks.judge.motion import Case
 from conservative.references.engine import principal_axes
-from conservative.references.engines.scipy import state_derivative
+from conservative.references.solvers.scipy import state_derivative
 
 BODY = cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.0, 0.3], [-0.2, 0.3, 4.0]])
 START = Rotation.from_rotvec([0.4, -0.7, 0.3]), [0.7, -1.1, 1.6]

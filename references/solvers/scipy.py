@@ -27,9 +27,9 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import limit_reason, load, principal_axes, version
+from ..engines.shared import compile_derivative, pack_field
 from ..environments.plain_numbers import FIELDS, describe_field
 from ..samples import QUATERNION, States
-from .shared import compile_derivative, pack_field
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
