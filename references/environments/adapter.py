@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -109,29 +109,21 @@ AnyAdapted = TypeVar("AnyAdapted", bound="AdapterMethod")
 @cache
 def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]:
     """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
-    data = EngineData(**module.ENGINE)
-    family = module.__name__.rpartition(".")[2]
-    words = {"flight": Need.FLIGHT, "rotors": Need.ROTOR}
-    takes = {need for kind in FIELDS if kind.__name__ in data.fields for need in NEEDS[kind]}
-    takes |= {need for word, need in words.items() if data.card.get(word)}
-    card = Card(**{name: value for name, value in data.card.items() if name not in words}, takes=frozenset(takes))
-    described = {"family": family, "data": data, "adapter": module, "card": card}
-    described |= {"__module__": module.__name__, "__doc__": module.__doc__}
-    if "precision" not in data.settings:
-        described["precision"] = data.precision
-    settings = [(name, type(default), field(default=default)) for name, default in data.settings.items()]
-    return make_dataclass(family.capitalize(), settings, bases=(base,), namespace=described, frozen=True)
+    name = module.__name__.rpartition(".")[2].capitalize()
+    settings = [(name, type(default), field(default=default)) for name, default in module.ENGINE.get("settings", {}).items()]
+    described = {"adapter": module, "__module__": module.__name__, "__doc__": module.__doc__}
+    return make_dataclass(name, settings, bases=(base,), namespace=described, frozen=True)
 
 
 class AdapterMethod(Method):
-    """An engine with an adapter. `method_class` creates the subclasses: frozen dataclasses of the settings.
+    """An engine with an adapter. Subclasses are frozen dataclasses of the settings; the rest is read from `adapter`.
 
     Attributes
     ----------
-    data
-        The data in the file of the engine.
     adapter
-        The file of the engine, as a module.
+        The file of the engine, as a module. Its name is the family.
+    data
+        The data in that file.
 
     Raises
     ------
@@ -142,9 +134,24 @@ class AdapterMethod(Method):
     """
 
     role: ClassVar[Role] = Role.ENGINE
-    data: ClassVar[EngineData]
     adapter: ClassVar[ModuleType]
+    data: ClassVar[EngineData]
     precision: str
+    if TYPE_CHECKING:
+
+        def __init__(self, *settings: Any, **named: Any) -> None: ...  # of a class that `method_class` returns
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "adapter" not in vars(cls):
+            return
+        cls.family, cls.data = cls.adapter.__name__.rpartition(".")[2], EngineData(**cls.adapter.ENGINE)
+        card, words = cls.data.card, {"flight": Need.FLIGHT, "rotors": Need.ROTOR}
+        takes = {need for kind in FIELDS if kind.__name__ in cls.data.fields for need in NEEDS[kind]}
+        takes |= {need for word, need in words.items() if card.get(word)}
+        cls.card = Card(**{name: value for name, value in card.items() if name not in words}, takes=frozenset(takes))
+        if "precision" not in cls.data.settings:
+            cls.precision = cls.data.precision
 
     def __post_init__(self) -> None:
         """Check the settings, and that the engine is installed."""

@@ -1,21 +1,41 @@
-"""The classes of engines, made from their files: `exudyn`, in an environment, from `exudyn.py`."""
+"""The classes of engines: those that run in this process, and `exudyn`, in an environment, from `exudyn.py` in `engines`."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
 
 from .. import engines
-from ..engines import mujoco as _mujoco
+from ..engines import mujoco as _mujoco  # the name without a dash at the front is that of the class in an environment
 from ..engines import pinocchio as _pinocchio
-from .adapter import SCRIPTS, LocalEngine, method_class, read_script
+from .adapter import SCRIPTS, LocalEngine, read_script
 from .engine_method import EngineMethod, engine_class
 
-MuJoCo = method_class(_mujoco, LocalEngine)
-Pinocchio = method_class(_pinocchio, LocalEngine)
+
+@dataclass(frozen=True)
+class MuJoCo(LocalEngine):
+    """MuJoCo in this process. `conservative.references.engines.mujoco` describes its loop and its settings."""
+
+    integrator: str = "RK4"
+    threads: int = 1
+
+    adapter: ClassVar[ModuleType] = _mujoco
+
+
+@dataclass(frozen=True)
+class Pinocchio(LocalEngine):
+    """Pinocchio in this process. `conservative.references.engines.pinocchio` describes its loop and its settings."""
+
+    scheme: str = "RK4"
+
+    adapter: ClassVar[ModuleType] = _pinocchio
 
 
 def __getattr__(name: str) -> type[EngineMethod]:
+    """Return the class of an engine that runs in an environment, such as `exudyn`."""
     if name.startswith("_"):
         raise AttributeError(name)
     scripts = (Path(engines.__file__).with_name(name + suffix) for suffix in SCRIPTS)

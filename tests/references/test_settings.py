@@ -1,11 +1,13 @@
 """Labels, bad settings, formulations and degenerate scenes."""
 
+from dataclasses import fields
 from importlib.metadata import version
 
 import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.references.environments import catalogue
 from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.heyoka_equations import formulations
 from conservative.references.precise import Precise
@@ -27,6 +29,16 @@ from conservative.references.solvers.scipy import SciPy
 )
 def test_labels_have_version_and_setting(method, package, setting):
     assert method.label == f"{package}=={version(package)}/{setting}"
+
+
+@pytest.mark.parametrize("family", [MuJoCo, Pinocchio])
+def test_the_settings_of_a_class_are_those_in_the_file_of_the_engine(family):
+    """Editors and mypy read the class, an environment of the same engine the file."""
+    assert {field.name: (field.type, field.default) for field in fields(family)} == {
+        name: (type(value).__name__, value) for name, value in family.adapter.ENGINE["settings"].items()
+    }
+    apart = getattr(catalogue, family.family)
+    assert (family.data, family.card, family().precision) == (apart.data, apart.card, apart.precision)
 
 
 BAD = [
