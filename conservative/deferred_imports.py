@@ -9,7 +9,7 @@ from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .errors import BadInput, MissingEngine, NotLoadable, nearest
+from .errors import REINSTALL, BadInput, MissingEngine, NotLoadable, nearest
 from .programs import list_programs
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
 ENGINES = "conservative.engines"
 """Groups of entry points; see `conservative.registry`."""
+ROOMS = "conservative.rooms"
+"""Group of what this room uses of the rooms above it, which it cannot import."""
 DEFAULT_METHOD = "reduced"
 """Name of the default method of `integrate`, `Reduced()`."""
 _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "conservative engines list"}
@@ -36,11 +38,21 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
     from importlib.metadata import EntryPoint, entry_points  # here: it takes 20 ms, often unneeded
 
     entries = list(entry_points(group=group))
-    if group == ENGINES:
-        entries += [
-            EntryPoint(name, f"{__package__}.references.environments.programs:{name}", group) for name in list_programs()
-        ]
+    if group == ENGINES and (programs := list_programs()):
+        module = find_entry(ROOMS, ROOMS, "programs").value
+        entries += [EntryPoint(name, f"{module}:{name}", group) for name in programs]
     return {entry.name: entry for entry in sorted(entries, key=lambda entry: entry.name)}
+
+
+def find_entry(group: str, argument: str, name: str) -> EntryPoint:
+    """Return the entry point of a name in a group. `argument` is the name of the argument in messages. Raise `BadInput`."""
+    known = list_entries(group)
+    if name in known:
+        return known[name]
+    if group == ROOMS:
+        raise BadInput(argument, f"no entry point {name!r}", REINSTALL)
+    files = "; or give a file whose name ends with .toml" if group == SCENES else ""
+    raise BadInput(argument, repr(name), nearest(name, known, _LISTS.get(group, "")) + files)
 
 
 def load_entry(group: str, argument: str, name: str) -> Any:
@@ -49,13 +61,10 @@ def load_entry(group: str, argument: str, name: str) -> Any:
     Raise `BadInput` for an unknown name, `NotLoadable` if the import of the object fails, and `MissingEngine` if it needs an
     engine that is not installed.
     """
-    known = list_entries(group)
-    if name not in known:
-        files = "; or give a file whose name ends with .toml" if group == SCENES else ""
-        raise BadInput(argument, repr(name), nearest(name, known, _LISTS.get(group, "")) + files)
+    entry = find_entry(group, argument, name)
     try:
-        return known[name].load()
+        return entry.load()
     except MissingEngine:
         raise
     except Exception as error:
-        raise NotLoadable(argument, name, known[name].value, error) from error
+        raise NotLoadable(argument, name, entry.value, error) from error

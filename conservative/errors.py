@@ -48,13 +48,18 @@ class Unsupported(BadInput):
     """The method does not support the scene."""
 
 
+REINSTALL = "the entry points of these files: run pip install -e . again in their folder, or reinstall conservative-rotation"
+"""What to do if the installation is older than the files: entry points are copied when a package is installed."""
+
+
 class NotLoadable(BadInput):
     """A registered scene, method or reader cannot be imported. Attribute: `place`, the value of its entry point."""
 
     def __init__(self, argument: str, name: str, place: str, cause: Exception) -> None:
         self.place = place
         got = f"{name!r}, registered as {place!r}, which cannot be loaded ({type(cause).__name__}: {cause})"
-        super().__init__(argument, got, "an entry point that can be imported")
+        stale = place.startswith(f"{__package__}.") and isinstance(cause, ModuleNotFoundError | AttributeError)
+        super().__init__(argument, got, REINSTALL if stale else "an entry point that can be imported")
 
 
 class NotWritten(BadInput):

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe
+from .deferred_imports import ROOMS, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
 from .grid import Grid
 from .invariants import Invariant, sizes
@@ -202,8 +202,8 @@ class Trajectory:
         if truth is not None and not any(each is truth for each in shown):
             shown.append(truth)
         index = next((number for number, each in enumerate(shown) if each is truth), None)
-        room = import_module(f"{__package__}.reports.animation")  # a room above this one, only when a user asks for it
-        return room.Animation(shown, labels or [each.label for each in shown], index)
+        animation = load_entry(ROOMS, ROOMS, "animation")
+        return animation(shown, labels or [each.label for each in shown], index)
 
     def _repr_html_(self) -> str:
         rows = [

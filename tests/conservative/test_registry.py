@@ -1,5 +1,10 @@
 """Names of methods and scenes: read back, nearest names, entry points, labels."""
 
+import ast
+import re
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
 import pytest
 
 import conservative as cv
@@ -47,3 +52,31 @@ def test_the_label_has_the_package_of_a_method():
 
     assert Own().label == f"pytest=={pytest.__version__}/reduced"
     assert Local().label == "my_script/reduced"
+
+
+def test_an_installation_that_is_older_than_the_files_is_named(monkeypatch):
+    """Entry points are copied when a package is installed: a name may be missing, or a module may have moved since."""
+    trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1)
+    moved = EntryPoint("moved", "conservative.references.gone:Moved", deferred_imports.METHODS)
+    old = {deferred_imports.ROOMS: {}, deferred_imports.METHODS: {"moved": moved}, deferred_imports.ENGINES: {}}
+    for module in (deferred_imports, registry):
+        monkeypatch.setattr(module, "list_entries", old.get)
+    with pytest.raises(BadInput, match=r"no entry point 'animation'; expected .*pip install -e \. again"):
+        trajectory.animate()
+    with pytest.raises(BadInput, match=r"'moved', registered as .*pip install -e \. again"):
+        registry.method("moved")
+
+
+def test_the_core_names_no_room_above_it():
+    """Contracts see imports only, and an import by a text is none."""
+    core = Path(deferred_imports.__file__).parent
+    rooms = ("references", "benchmarks", "reports")
+    files = [path for path in core.rglob("*.py") if path.relative_to(core).parts[0] not in rooms]
+    texts = [
+        (path.name, node.value)
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    assert len(files) > 80
+    assert [each for each in texts if re.match(rf"(conservative)?\.({'|'.join(rooms)})\b", each[1])] == []
