@@ -1,52 +1,128 @@
-"""README.md is generated from measurements and is current."""
+"""README.md and the generated parts of other pages are current: of measurements, and of what the code declares."""
 
 import csv
+import importlib
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import conservative as cv
 from conservative.benchmarks.measures import measurement
+from conservative.needs import Need
 
-from .pages import ROOT
+from .pages import ROOT, pages
 from .reports.rows import row
 
 FOLDER = ROOT / ".ci" / "readme"
 
 
+@pytest.fixture(autouse=True)
+def _beside(monkeypatch):
+    """The files of the program import each other by their names."""
+    monkeypatch.syspath_prepend(FOLDER)
+
+
 def load(name):
-    spec = importlib.util.spec_from_file_location(f"readme_{name.strip('_')}", FOLDER / f"{name}.py")
+    """Return a file of the program, and `__main__` under another name."""
+    if name != "__main__":
+        return importlib.import_module(name)
+    spec = importlib.util.spec_from_file_location("readme_main", FOLDER / "__main__.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def test_the_readme_is_current():
+@pytest.fixture
+def copied(tmp_path):
+    """Return a folder with a copy of all pages."""
+    for page in pages():
+        copy = tmp_path / "copy" / page.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(page, copy)
+    return tmp_path / "copy"
+
+
+@pytest.fixture
+def check(monkeypatch):
+    """Return a function that checks the pages of a folder and returns what is not current."""
+
+    def ask(folder):
+        monkeypatch.setattr(sys, "argv", ["readme", "--check"])
+        try:
+            load("__main__").main(folder)
+        except SystemExit as ended:
+            return ended.code
+        return ""
+
+    return ask
+
+
+def parts(page):
+    """Return the generated parts of a page by name."""
+    return {match[2]: match[3] for match in load("marks").PART.finditer(page.read_text(encoding="utf-8"))}
+
+
+def edit(page, old, new):
+    text = page.read_text(encoding="utf-8")
+    assert old in text
+    page.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def test_all_pages_are_current():
     done = subprocess.run([sys.executable, FOLDER, "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize(
+    ("page", "word"),
+    [
+        ("conservative/reference.md", "| `Gauss("),
+        ("conservative/reference.md", "✓"),
+        ("conservative/reference.md", "| `check.py`"),
+        ("conservative/extending.md", "| `usual_dt` |"),
+        ("references/README.md", "| [`drake`]"),
+        ("benchmarks/README.md", "| `hard_cases` |"),
+        ("reports/README.md", "| `watch` |"),
+    ],
+)
+def test_a_page_that_differs_from_the_code_is_found(page, word, copied, check):
+    assert check(copied) == ""
+    edit(copied / page, word, "| `another")
+    assert check(copied) == f"{page} is not current. Run: python .ci/readme"
+
+
+def test_a_method_that_takes_more_makes_the_pages_stale(copied, check, monkeypatch):
+    monkeypatch.setattr(cv.Gauss, "card", replace(cv.Gauss.card, takes=cv.Gauss.card.takes | {Need.SPRING}))
+    assert check(copied).startswith("conservative/reference.md is not current")
+
+
+def test_a_part_that_no_page_has_is_found(copied, check):
+    edit(copied / "conservative" / "reference.md", "<!-- generated support: ", "<!-- made of: ")
+    assert check(copied) == "no page has the part 'support'. Run: python .ci/readme"
+
+
 def test_a_changed_measurement_makes_it_stale(tmp_path, monkeypatch):
-    program = load("__main__")
+    program = load("measured")
     text = program.ROWS.read_text(encoding="utf-8")
     (line,) = [line for line in text.splitlines() if line.startswith("brick_flip,MuJoCo,time,")]
     fields = line.split(",")
     fields[3] = str(3 * float(fields[3]))
     (tmp_path / "measured.csv").write_text(text.replace(line, ",".join(fields)), encoding="utf-8")
     monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
-    monkeypatch.setattr(sys, "argv", ["readme", "--check"])
-    with pytest.raises(SystemExit, match=r"python \.ci/readme"):
-        program.main()
+    assert program.render_readme() != (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
     ("value", "text"), [(4e-16, "< 1e-15"), (3.2e-12, "3e-12"), (1.7e-6, "2e-6"), (0.0547, "0.05"), (0.72, "0.7"), (3.1, "3")]
 )
 def test_small_numbers(value, text):
-    assert load("__main__").small(value) == text
+    assert load("measured").small(value) == text
 
 
 def test_the_fastest_setting_of_a_family_and_the_ratio_have_the_times_of_all_processes():
@@ -114,9 +190,9 @@ def test_random_bodies_have_ratios_intervals_and_counts_at_all_errors():
     assert counts == [55, 22, 11, 22]  # of the five bodies two are won, one is open, one is slower and one alone reached
 
 
-def test_the_tables_of_benchmarks_are_made_of_their_studies(tmp_path, monkeypatch):
+def test_the_tables_of_benchmarks_are_made_of_their_studies(copied, tmp_path, monkeypatch):
     """The other rows stay; a side without a time has no column."""
-    program, rows = load("__main__"), []
+    measured, rows = load("measured"), []
     for study, measures in (("work_precision", ("",)), ("each_step", (", each step kept", ""))):
         for name, role, error, time in (("taylor:order=12", "ours", 1e-7, 2e-6), ("heyoka", "engine", 1e-7, 3e-6)):
             common = {"scene": "brick_flip", "role": role, "family": name.partition(":")[0]}
@@ -128,25 +204,23 @@ def test_the_tables_of_benchmarks_are_made_of_their_studies(tmp_path, monkeypatc
                     times["time per simulated second, each step kept, engine's own loop"] = time / 2
                 rows += [row(study, name, each, spent, **common, process=process) for each, spent in times.items()]
     measurement.frame(rows).to_csv(tmp_path / "study.csv", index=False)
-    before = program.ROWS.read_text(encoding="utf-8").splitlines()
-    page = program.BENCHMARKS.read_text(encoding="utf-8")
-    for name, text in (("ROWS", "\n".join(before) + "\n"), ("BENCHMARKS", page), ("README", "")):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-        monkeypatch.setattr(program, name, tmp_path / name)
-    monkeypatch.syspath_prepend(FOLDER)
+    shutil.copyfile(measured.ROWS, tmp_path / "measured.csv")
+    monkeypatch.setattr(measured, "ROWS", tmp_path / "measured.csv")
+    page = copied / "benchmarks" / "README.md"
+    before = parts(page)
     monkeypatch.setattr(sys, "argv", ["readme", "--scenes", str(tmp_path), str(tmp_path)])
-    program.main()
-    tables = (tmp_path / "BENCHMARKS").read_text(encoding="utf-8").split(program.MARK)
-    assert [tables[i] == page.split(program.MARK)[i] for i in (1, 3, 5, 7)] == [True, False, True, True]
-    header, _, at_1e_3, *_ = tables[3].splitlines()
+    load("__main__").main(copied)
+    tables = parts(page)
+    assert {name for name in tables if tables[name] != before[name]} == {"three scenes"}
+    header, _, at_1e_3, *_ = tables["three scenes"].splitlines()
     assert header.startswith("| scene | error, rad | our general integrators | heyoka 7.13.2 | heyoka / general |")
     assert re.match(r"\| brick_flip \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", at_1e_3)
-    (own,) = [line for line in tables[3].splitlines() if "without the conversion" in line]
+    (own,) = [line for line in tables["three scenes"].splitlines() if "without the conversion" in line]
     assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
 
 
 def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
-    program, measure = load("__main__"), load("measure")
+    program, measure = load("measured"), load("measure")
     texts = dict.fromkeys(measure.COLUMNS, "")
     with program.ROWS.open(encoding="utf-8", newline="") as file:
         rows = [each for each in csv.DictReader(file) if each["name"] != "random bodies"]
@@ -156,8 +230,8 @@ def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
         writer.writeheader()
         writer.writerows(rows)
     monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
-    text = " ".join(program.render().split())
+    text = " ".join(program.render_readme().split())
     assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
     assert "Of these 22 cases, heyoka is faster beyond the interval" in text
     assert "in none; 11 are open" in text
-    assert program.render_table().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")
+    assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")

@@ -1,4 +1,4 @@
-"""The work-precision study: error and wall time over step sizes, and over tolerances of adaptive methods."""
+"""The study of work against precision: error and wall time over step sizes, and over tolerances of adaptive methods."""
 
 from __future__ import annotations
 

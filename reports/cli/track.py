@@ -58,7 +58,8 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
-    Versions that have no environment are installed first, each in its own.
+    Versions that have no environment are installed first, each in its own. With --against, the exit code is 1 if an order, an
+    invariant or the end of a run is lost.
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")

@@ -1,1 +1,1 @@
-"""The pages of public names, and a notebook."""
+"""The site of the documentation, its own pages and the notebooks."""

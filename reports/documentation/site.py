@@ -2,8 +2,8 @@
 
     python -m conservative.reports.documentation.site
 
-It is built from a checkout, without a network, and opens from disk. `contents.md` arranges the pages. Each section of a README
-is a page of its own, so that no text exists twice.
+It is built from a checkout, without a network, and opens from disk. `contents.md` arranges the pages. Each section of a long
+page is a page of its own, so that no text exists twice.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "reports" / "documentation"
 CONTENTS = "reports/documentation/contents.md"
 ROOMS = (".github", "conservative", "references", "benchmarks", "reports")
-READMES = ("README.md", *(f"{room}/README.md" for room in ROOMS[1:]))
+DIVIDED = ("README.md", *(f"{room}/README.md" for room in ROOMS[1:]), "conservative/extending.md", "conservative/reference.md")
 SETTINGS = {
     "project": "conservative",
     "version": VERSION,
@@ -80,9 +80,9 @@ def anchors(text: str) -> set[str]:
 
 
 def sections(path: str) -> dict[str, str]:
-    """Return the pages of the site that a README becomes, by name: one for each heading of the second level.
+    """Return the pages of the site that a divided page becomes, by name: one for each heading of the second level.
 
-    Their headings move up by one level. Only the first README contributes the text above them.
+    Their headings move up by one level. Only the first page contributes the text above them.
     """
     text, folder = (ROOT / path).read_text(encoding="utf-8"), posixpath.dirname(path)
     starts = [match.start() for match in HEADING.finditer(text) if match[0].startswith("## ")]
@@ -121,9 +121,9 @@ def written(source: Path) -> None:
     """Write the pages of the site into a folder."""
     from conservative.reports.cli.main import main
 
-    pages = {path: sections(path) for path in READMES}
+    pages = {path: sections(path) for path in DIVIDED}
     whole = [ROOT / "CHANGELOG.md", *(page for room in ROOMS for page in (ROOT / room).rglob("*.md")), *HERE.glob("*.ipynb")]
-    for path in sorted({page.relative_to(ROOT).as_posix() for page in whole} - {*READMES, CONTENTS}):
+    for path in sorted({page.relative_to(ROOT).as_posix() for page in whole} - {*DIVIDED, CONTENTS}):
         pages[path] = {posixpath.splitext(path)[0].lstrip("."): (ROOT / path).read_text(encoding="utf-8")}
     paper = pages["reports/documentation/paper.md"]  # its title is a field, above headings of the first level
     for name, text in paper.items():

@@ -1,7 +1,5 @@
 """Symmetry, symplecticity and conservation of every method whose card declares its structure, measured."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -122,16 +120,3 @@ def test_conservation(method):
             drifts[invariant.name] = max(drifts.get(invariant.name, 0.0), np.abs(run.drift(invariant)).max())
     kept = {name for name, drift in drifts.items() if drift < 1e-12}  # measured: at most 3e-15, or at least 4e-11
     assert kept == method.conserves & set(drifts)
-
-
-def test_the_table_of_methods_agrees_with_the_cards():
-    page = (Path(__file__).parents[2] / "conservative" / "README.md").read_text(encoding="utf-8")
-    table = page.partition("| method |")[2].partition("\n\n")[0]
-    rows = {line.split("(")[0][3:]: [cell.strip() for cell in line.split("|")] for line in table.splitlines()[2:]}
-    for family in {type(case.values[0]) for case in METHODS} - {cv.Substepped}:
-        methods = [family.configure(text) for text in family.card.variants]
-        found = [method.card.structure(method) for method in methods]
-        symmetric, symplectic, conserved = rows[family.__name__][4:7]
-        assert {"yes": {True}, "no": {False}}.get(symmetric, {True, False}) == {each.symmetric for each in found}, family
-        assert {"yes": {True}, "no": {False}}.get(symplectic, {True, False}) == {each.symplectic for each in found}, family
-        assert ("imposed" in conserved) == any(each.imposed for each in found), family

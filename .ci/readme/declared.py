@@ -1,0 +1,168 @@
+"""Tables of what the code declares: methods, the parts of scenes that each takes, cards, engines, studies and commands."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import os
+import re
+import tomllib
+from collections.abc import Callable, Iterator
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from code_map import ROOMS, ROOT, map_of, summary
+from marks import table
+
+GROUPS = ("conservative.methods", "conservative.engines")
+
+
+def entries(group: str) -> Iterator[tuple[str, Any]]:
+    """Yield names and objects of a group of entry points of pyproject.toml, in its order; what is installed does not matter."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for name, place in project["entry-points"][group].items():
+        module, _, attribute = place.partition(":")
+        yield name, getattr(import_module(module), attribute)
+
+
+def methods() -> str:
+    """Return a row for each method that is not an engine."""
+    header = ["method", "order", "symmetric", "symplectic", "conserves to round-off", "what it is"]
+    kinds = [kind for _, kind in entries(GROUPS[0]) if kind.role != "engine"]
+    return table(header, [_method_row(kind) for kind in kinds])
+
+
+def _method_row(kind: Any) -> list[str]:
+    default, variants = kind(), dict(zip(kind.card.variants, kind.settings_for("variants"), strict=True))
+    orders = sorted({each.order for each in variants.values() if each.order})
+    order = [" to ".join(str(each) for each in dict.fromkeys([*orders[:1], *orders[-1:]]))] if orders else []
+    if None in {each.order for each in variants.values()}:
+        order += ["exact"] if kind.card.exact else ["adaptive"] if orders else ["–"]
+    structures = {text: kind.card.structure(each) for text, each in variants.items()}
+    found = [each for each in structures.values() if each]
+    kept = [word for word in ("energy", "momentum", "axial momentum") if any(map(_is(word), default.conserves))]
+    how = "imposed" if any(each.imposed for each in found) else "inherited"
+    symmetric = _which({text: each.symmetric for text, each in structures.items() if each})
+    symplectic = _which({text: each.symplectic for text, each in structures.items() if each})
+    settings = ", ".join(f"{each.name}={getattr(default, each.name)}" for each in dataclasses.fields(kind))
+    conserved = ", ".join(kept) + f"; {how}" * bool(kept and found)
+    return [f"`{kind.__name__}({settings})`", ", ".join(order), symmetric, symplectic, conserved, summary(kind.__doc__)]
+
+
+def _is(word: str) -> Callable[[str], bool]:
+    """Return whether a name of an invariant is meant by a word: the vertical momentum is one, the axial momentum is not."""
+    return lambda name: name == word or (word == "momentum" and "momentum" in name and "axial" not in name)
+
+
+def _which(answers: dict[str, bool]) -> str:
+    """Return yes, no, or the settings for which the answer is yes; a dash if none has an answer."""
+    if len({*answers.values()}) < 2:
+        return {True: "yes", False: "no", None: "–"}[next(iter(answers.values()), None)]
+    return ", ".join(f"`{text}`" for text, yes in answers.items() if yes)
+
+
+def support() -> str:
+    """Return a row for the methods and engines that take the same parts of scenes, and a column for each part."""
+    from conservative.needs import Need
+
+    rows: dict[frozenset[Need], list[str]] = {}
+    for group in GROUPS:
+        for name, kind in entries(group):
+            rows.setdefault(kind.card.takes, []).append(f"`{name}`")
+    lines = [
+        [", ".join(dict.fromkeys(names)), *("✓" if need in takes else "" for need in Need)]
+        for takes, names in sorted(rows.items(), key=lambda row: -len(row[0]))
+    ]
+    words = [f"*{need.name.lower()}*: {need.value}" for need in Need]
+    return table(["", *(need.name.lower() for need in Need)], lines) + f"\n{'; '.join(words)}.\n"
+
+
+def card() -> str:
+    """Return the entries of `Card` with their defaults, from its docstring."""
+    from conservative.card import Card
+
+    attributes = inspect.cleandoc(Card.__doc__ or "").partition("Attributes\n----------\n")[2]
+    meanings = re.findall(r"^(\w+)\n((?:    .*\n?)+)", attributes, re.MULTILINE)
+    defaults = {each.name: each.default for each in dataclasses.fields(Card)}
+    return table(
+        ["entry", "default", "meaning"],
+        [[f"`{name}`", _default(defaults.pop(name)), " ".join(text.split())] for name, text in meanings],
+    ) + "".join(f"| `{name}` | | |\n" for name in defaults)
+
+
+def _default(value: object) -> str:
+    return f"`{value!r}`" if value is None or isinstance(value, (bool, str, tuple, float)) else ""
+
+
+def engines(group: str, page: Path) -> str:
+    """Return a row for each engine of a group of entry points, with links from a page."""
+    return table(
+        ["name", "package", "settings", "bits", "what it is"],
+        [_engine_row(name, kind, page) for name, kind in entries(group) if kind.role == "engine"],
+    )
+
+
+def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
+    data = getattr(kind, "data", None)  # none: the engine is a class of its own
+    file = kind.adapter.__file__ if data else inspect.getfile(kind)
+    package = f"{data.package} ≥ {data.oldest}" if data and data.oldest else data.package if data else name
+    origin = {"npm": "npm", "apt": "Debian"}.get(data.kind) if data else None
+    texts = [_settings(each.name, each.default, data) for each in dataclasses.fields(kind) if each.name != "precision"]
+    precision = dict(data.settings).get("precision") if data else None
+    bits = "64 or 32" if precision else "32" if data and data.precision == "f32" else "64"
+    link = os.path.relpath(os.path.realpath(file), page.parent)
+    package += f" ({origin})" if origin else ""
+    return [f"[`{name}`]({link})", package, "; ".join(texts), bits, summary(kind.__doc__)]
+
+
+def _settings(name: str, default: object, data: Any) -> str:
+    """Return a setting with its default first, then its other values."""
+    first = data and next(iter(data.settings), "") == name
+    values = [*(data.choices.get(name) or (data.orders if first else ()))] if data else []
+    values = [f"`{each}`" for each in dict.fromkeys([default, *values]) if each != ""]
+    if first and data.orders:
+        return ", ".join(values)
+    return f"`{name}`" if isinstance(default, bool) else f"`{name}` = {', '.join(values)}" if values else f"`{name}`"
+
+
+def studies() -> str:
+    """Return a row for each study, from its declaration."""
+    from conservative.benchmarks.studies.declaration import Extent, Named
+    from conservative.benchmarks.studies.studies import STUDIES
+
+    extents = {Extent.EVERY: "every", Extent.FULL: "full", Extent.LONG: "full, not quick"}
+    rows = []
+    for name, each in STUDIES.items():
+        report = extents[each.extent] + ", with random bodies" * bool(each.draw)
+        report = "with `--engines`" if each.named is Named.ONLY else report
+        rows.append([f"`{name}`", each.about[0].upper() + each.about[1:], report, "yes" if each.timed else ""])
+    return table(["study", "what it measures", "in reports", "measures times"], rows)
+
+
+def commands() -> str:
+    """Return a row for each command, with the sentence about exit codes of its help."""
+    from conservative.reports.cli.main import main
+
+    rows = []
+    for name, command in main.commands.items():
+        below = {f"{name} {each}": command.commands[each] for each in getattr(command, "commands", ())}
+        for words, each in {name: command, **below}.items():
+            sentences = re.split(r"(?<=\.) ", " ".join((each.help or "").split()))
+            codes = [sentence for sentence in sentences if "exit code" in sentence]
+            rows.append([f"`{words}`", each.get_short_help_str(200), " ".join(codes)])
+    return table(["command", "purpose", "exit code"], rows)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "methods": methods,
+    "support": support,
+    "card": card,
+    "engines": partial(engines, GROUPS[0], ROOT / "references" / "README.md"),
+    "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
+    "studies": studies,
+    "commands": commands,
+    **{f"code of {room}": partial(map_of, ROOT / room) for room in ROOMS},
+}
+"""Tables by the name of their mark."""

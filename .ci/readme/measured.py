@@ -1,0 +1,156 @@
+"""README.md and the tables of times, from measured.csv and README.md.j2, which are beside this file."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import jinja2
+from marks import table
+
+HERE = Path(__file__).resolve().parent
+ROWS = HERE / "measured.csv"
+REPORT, BODIES, SCENES, MANY, PRICE = "report", "random bodies", "three scenes", "many bodies", "price"
+"""Parts of measured.csv, in its order."""
+RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
+VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4", "SciPy": "DOP853"}
+
+
+def read_rows() -> list[dict[str, str]]:
+    """Return the rows of measured.csv."""
+    with ROWS.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def part_of(row: dict[str, str]) -> str:
+    """Return the part to which a row belongs."""
+    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, MANY, PRICE)]
+    return known[0] if known else SCENES if "," in row["scene"] else REPORT
+
+
+def read_values() -> tuple[dict[tuple[str, str, str], float], dict[str, str], str]:
+    """Return the values by scene, name and quantity, the versions by name, and the last date of README's rows."""
+    rows = read_rows()
+    values = {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows}
+    dates = [row["date"] for row in rows if part_of(row) in (REPORT, BODIES)]
+    return values, {row["name"]: row["version"] for row in rows if row["version"]}, max(dates)
+
+
+def interval(values: dict[tuple[str, str, str], float], *place: str) -> list[float]:
+    """Return the ratio of a place and the ends of its interval."""
+    return [values[*place, f"{RATIO}{end}"] for end in ("", ", low", ", high")]
+
+
+def render_readme() -> str:
+    """Return the text of README.md."""
+    values, versions, date = read_values()
+    environment = jinja2.Environment(keep_trailing_newline=True, undefined=jinja2.StrictUndefined)
+    environment.filters |= {"two_digits": two_digits, "small": small, "ratio": ratio_text}
+    return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
+        value=lambda *key: values[key],
+        interval=lambda *place: interval(values, *place),
+        ratios=sorted(interval(values, *key[:2]) for key in values if key[1:] == (BODIES, RATIO)),
+        count=lambda quantity: int(values["all fields", BODIES, quantity]),
+        version=versions,
+        date=date,
+    )
+
+
+def render_bodies() -> str:
+    """Return heyoka's time over ours on random bodies, a row for each error and a column for each field, and the counts."""
+    values, *_ = read_values()
+    places = [place.split(" ")[:2] for place, *key in values if key == [BODIES, RATIO]]
+    fields, errors = (list(dict.fromkeys(each)) for each in zip(*places, strict=True))
+    head = ["error, rad", *(field.replace("_", " ") for field in fields)]
+    cells = [[ratio_text(interval(values, f"{field} {error} rad", BODIES)) for field in fields] for error in errors]
+    lines = [[f"{float(error):.0e}".replace("e-0", "e-"), *row] for error, row in zip(errors, cells, strict=True)]
+    cases, won, undecided, lost = (
+        int(values["all fields", BODIES, f"cases{which}"]) for which in ("", " won", " open", " lost")
+    )
+    counts = f"\nOf these {cases} cases, a body at an error, ours won {won} and lost {lost}; {undecided} are open.\n"
+    return table(head, lines) + counts + origin(BODIES) + "\n"
+
+
+def render_scenes() -> str:
+    """Return the times of all sides on three scenes, a row for each error and kind of run, the fastest in bold."""
+    values, versions, _ = read_values()
+    places = list(dict.fromkeys(place for place, name, _ in values if name == GENERAL))
+    timed = [key[1] for key, value in values.items() if key[0] in places and key[2] == "time" and math.isfinite(value)]
+    sides = list(dict.fromkeys(timed))
+    titles = [" ".join([each, *([versions[each]] if each in versions else [])]) for each in sides]
+    titles = [f"{title}, {VARIANTS[each]}" if each in VARIANTS else title for each, title in zip(sides, titles, strict=True)]
+    lines: list[list[str]] = []
+    before = ""
+    for place in places:
+        scene, _, what = place.partition(", ")
+        times = [values.get((place, side, "time"), math.inf) for side in sides]
+        cells = [two_digits(time) for time in times]
+        if math.isfinite(times[0]):  # all sides
+            fastest = times.index(min(times))
+            cells[fastest] = f"**{cells[fastest]}**"
+        lines.append([scene if scene != before else "", what, *cells, ratio_text(interval(values, place, GENERAL))])
+        before = scene
+    return table(["scene", "error, rad", *titles, "heyoka / general"], lines) + f"\n{origin(SCENES)}\n"
+
+
+def render_many() -> str:
+    """Return heyoka's time over ours for many bodies, a row for each kind and statistic and a column for each error."""
+    values, *_ = read_values()
+    places = [tuple(place.split(", ")) for place, *key in values if key == [MANY, RATIO]]
+    errors = list(dict.fromkeys(error for *_, error in places))
+    lines, before = [], ""
+    for kind, statistic in dict.fromkeys(place[:2] for place in places):
+        ratios = [ratio_text(interval(values, f"{kind}, {statistic}, {error}", MANY), 2) for error in errors]
+        lines.append([kind if kind != before else "", statistic.replace("95 %", "95th percentile"), *ratios])
+        before = kind
+    return table(["bodies", "errors", *errors], lines) + f"\n{origin(MANY)}\n"
+
+
+def render_price() -> str:
+    """Return the rows of the table of prices, one for each side, with the lowest values in bold."""
+    rows, (_, versions, _) = [row for row in read_rows() if part_of(row) == PRICE], read_values()
+    quantities = {row["quantity"]: row["unit"] for row in rows}
+    value = {(row["name"], row["quantity"]): float(row["value"]) for row in rows}
+    sides = list(dict.fromkeys(row["name"] for row in rows))
+    lines = []
+    for side in sides:
+        line = [f"{side} {versions[side]}" if side in versions else side]
+        for name, unit in quantities.items():
+            text = (
+                f"{value[side, name]:.1e}".replace("e-0", "e-")
+                if unit == "rad"
+                else f"{value[side, name]:#.2g}".removesuffix(".")
+            )
+            least = unit != "rad" and value[side, name] == min(value[each, name] for each in sides)
+            line.append(f"**{text}**" if least else text)
+        lines.append(line)
+    header = ["side", *(f"{name}, {unit}" for name, unit in quantities.items())]
+    return table(header, lines) + f"\n{origin(PRICE)}\n"
+
+
+def origin(part: str) -> str:
+    """Return the date and the commands of a part as a sentence."""
+    rows = [row for row in read_rows() if part_of(row) == part]
+    commands = " and ".join(dict.fromkeys(f"`{row['command']}`" for row in rows))
+    return f"Measured on {max(row['date'] for row in rows)} by {commands}."
+
+
+def ratio_text(ratio: list[float], digits: int = 3) -> str:
+    """Return a ratio with its interval, such as `2.67 (2.59 to 2.75)`."""
+    mean, low, high = (f"{each:#.{digits}g}".removesuffix(".") for each in ratio)
+    return f"{mean} ({low} to {high})"
+
+
+def two_digits(value: float) -> str:
+    """Return a number to two digits, `21,000` or `0.037`, as times of two reports differ in the third; a dash for inf."""
+    return f"{float(f'{value:.2g}'):,g}" if math.isfinite(value) else "–"
+
+
+def small(value: float) -> str:
+    """Return an error or a drift to one digit; below 1e-15 it is round-off."""
+    return "< 1e-15" if value < 1e-15 else f"{value:.0e}".replace("e-0", "e-") if value < 0.01 else f"{value:.1g}"
+
+
+TABLES = {BODIES: render_bodies, SCENES: render_scenes, MANY: render_many, PRICE: render_price}
+"""Tables of times by the name of their mark."""
