@@ -172,12 +172,16 @@ def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_p
     assert not (tmp_path / "page.html").exists()
 
 
-def test_progress_on_a_terminal_without_rich_is_silent(monkeypatch):
+def test_progress_on_a_terminal_without_rich_is_a_line_after_a_while(monkeypatch, capsys):
     monkeypatch.setattr(progress, "has_terminal", lambda: True)
     monkeypatch.setitem(sys.modules, "rich", None)
     monkeypatch.delitem(sys.modules, "conservative.reports.terminal.bars", raising=False)
-    with progress.progress() as step:
-        step(0.5, "half")
+    for silence, said in ((60.0, ""), (0.0, "half\n")):
+        monkeypatch.setattr(progress, "SILENCE", silence)
+        with progress.progress() as step:
+            step(0.5, "half")
+        out, err = capsys.readouterr()
+        assert (out, err.rpartition(": ")[2]) == ("", said)
 
 
 @pytest.mark.parametrize("package", ["uv", "heyoka"])

@@ -244,5 +244,11 @@ def test_two_options_cannot_write_one_file(tmp_path):
 
 def test_new_empty_and_special_files_may_be_written(tmp_path):
     (tmp_path / "empty").touch()
-    for name in (tmp_path / "empty", tmp_path / "new", tmp_path / "/dev/null", tmp_path / ("long" * 100)):
-        require_replaceable(name, "mark", "out")
+    (tmp_path / "full").write_text("mine")
+    refused = []
+    for name in ("empty", "new", "/dev/null", "long" * 100, "full"):
+        try:
+            require_replaceable(tmp_path / name, "mark", "out")
+        except BadInput:
+            refused.append(name)
+    assert refused == ["full"]

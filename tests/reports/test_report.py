@@ -133,7 +133,9 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
 
 
 def test_pictures_are_drawings_with_lines(made):
-    for path in made[0].glob("*.svg"):
+    pictures = list(made[0].glob("*.svg"))
+    assert pictures
+    for path in pictures:
         root = ET.parse(path).getroot()
         assert root.tag.endswith("svg")
         assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 20, path.name
