@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -75,8 +76,21 @@ def body_costs(rows: pd.DataFrame) -> pd.DataFrame:
     return reached.astype({"bodies": int})
 
 
-def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[tuple[MethodClass, str, str, int, Contest]]:
-    """Yield class of ours, engine, statistic, number of bodies and contest, whose scene is the kind of the bodies.
+class BatchContest(NamedTuple):
+    """A contest of a class of ours and an engine at a statistic of the errors and a number of bodies.
+
+    The scene of the contest is the kind of the bodies.
+    """
+
+    group: MethodClass
+    engine: str
+    statistic: str
+    bodies: int
+    contest: Contest
+
+
+def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[BatchContest]:
+    """Yield the contests of each class of ours with each engine.
 
     Both sides run bodies at once on one thread, or in their only way. The number of bodies is the largest with times of both
     sides, or of either.
@@ -96,28 +110,30 @@ def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[tuple[Method
                         here["name"].isin([*names, *theirs]) & (here["measure"] == Measure.TIME.text) & here["value"].notna()
                     ]
                     for error in ERRORS:
-                        yield group, str(rival), statistic, *_largest(str(kind), error, sides, timed["bodies"])
+                        size, contest = _largest(str(kind), error, sides, timed["bodies"])
+                        yield BatchContest(group, str(rival), statistic, size, contest)
 
 
 def _largest(kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], timed: pd.Series[float]) -> tuple[int, Contest]:
     """Return the contest among the most bodies at which both sides reach the error; else the one among the fewest."""
+
+    def at(size: int) -> Contest:
+        return Contest(kind, error, *(cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides))
+
     sizes = sorted(map(int, timed.unique()), reverse=True) or [1]
-    for size in sizes:
-        ours, theirs = (cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides)
-        if ours and theirs:
-            break
-    return size, Contest(kind, error, ours, theirs)
+    size = next((each for each in sizes if at(each).ours and at(each).theirs), sizes[-1])
+    return size, at(size)
 
 
-def as_table(compared: Iterable[tuple[MethodClass, str, str, int, Contest]]) -> Table:
+def as_table(compared: Iterable[BatchContest]) -> Table:
     """Return the results of `contests`, a row for each kind, engine and error."""
     header = ["bodies", "our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
     rows: list[Row] = []
-    for group, engine, statistic, size, contest in compared:
+    for group, engine, statistic, bodies, contest in compared:
         sides = (contest.ours, contest.theirs)
         times = [numeric(each.time * 1e6, digits=3) if each else DASH for each in sides]
         names = [each.name if each else "no time" for each in sides]
-        error, count = numeric(contest.error, tolerance(contest.error)), numeric(size, f"{size:,}")
+        error, count = numeric(contest.error, tolerance(contest.error)), numeric(bodies, f"{bodies:,}")
         kind = contest.scene.replace("_", " ")
         ratio = grade_ratio(contest.ratio, interval=contest.interval)
         rows.append([kind, group.value, engine, error, statistic, count, ratio, *times, *names])
