@@ -46,6 +46,11 @@ def list_engines() -> tuple[str, ...]:
     return tuple(list_entries(ENGINES))
 
 
+def partition_version(name: str) -> tuple[str, str, str]:
+    """Return the parts of the name of an engine, `mujoco@3.6.0` or `mujoco==3.6.0`, as `str.partition("@")` returns them."""
+    return name.replace("==", "@", 1).partition("@")
+
+
 def engine(name: str) -> Any:
     """Return the class of an engine that runs in an environment of its own.
 
@@ -86,7 +91,8 @@ def method(text: str) -> Method:
         The engine is not installed.
     """
     name, _, settings = printable_text("method", text, _NAME).partition(":")
-    base, at, version = name.partition("@")
+    base, at, version = partition_version(name)
+    name = base + at + version
     methods, engines = list_entries(METHODS), list_entries(ENGINES)
     known = set(engines) if at else {*engines, *methods}
     if base not in known or bool(at) != bool(version):

@@ -21,7 +21,7 @@ MARKERS = {
     "attack": "searches for failures at random; runs with --attack",
     "late": "runs last, with kernels that other tests have compiled",
 }
-ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
+ENGINES = "exudyn,rapier3d,bsk,mujoco@3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
 ENGINES += ",ode,bullet" * all(Path("/usr/include", name).exists() for name in ("ode", "bullet", "nlohmann"))
 """Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
 
@@ -35,7 +35,7 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 def pytest_addoption(parser):
     parser.addoption("--all", action="store_true", help=f"Also run the tests marked slow and browser, and --engines {ENGINES}.")
     parser.addoption("--browser", action="store_true", help="Also run the tests that need chromium and its driver.")
-    parser.addoption("--engines", metavar="NAME[==VERSION],...", default="", help="Also run the tests of these engines.")
+    parser.addoption("--engines", metavar="NAME[@VERSION],...", default="", help="Also run the tests of these engines.")
     parser.addoption("--attack", action="store_true", help="Also run the tests that search for failures at random.")
 
 
@@ -59,7 +59,7 @@ def pytest_collection_modifyitems(config, items):
         for mark in item.iter_markers():
             if not wanted.get(mark.name, True):
                 item.add_marker(pytest.mark.skip(reason=f"{mark.name}: {MARKERS[mark.name]}"))
-            if mark.name == "engine" and not {mark.args[0], mark.args[0].partition("==")[0]} & engines:
+            if mark.name == "engine" and not {mark.args[0], mark.args[0].partition("@")[0]} & engines:
                 item.add_marker(pytest.mark.skip(reason=f"needs {mark.args[0]}: runs with --engines {mark.args[0]}"))
 
 

@@ -107,7 +107,7 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     if names is not None:
         known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
-            if name.partition(":")[0] not in known:
+            if registry.partition_version(name.partition(":")[0])[0] not in known:
                 raise BadInput("engine", repr(name), nearest(name, known))
         wanted = list(selection.methods(names))
     lines = {selection.series(method): method for method in reversed(wanted)}

@@ -25,7 +25,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     Parameters
     ----------
     names
-        `NAME` for the engine in this environment, or else the newest installed version; `NAME==VERSION`; or `ALL`.
+        `NAME` for the engine in this environment, or else the newest installed version; `NAME@VERSION`; or `ALL`.
     skip_missing
         A `Missing` method for each name that is not installed, instead of an error.
 
@@ -63,7 +63,7 @@ def list_installed() -> tuple[str, ...]:
                 here[name] = family().maker.version
     known = registry.list_engines()
     newest = {each.engine: each for each in list_environments() if each.engine in known}  # older versions come first
-    apart = [f"{name}=={each.version}" for name, each in newest.items() if here.get(name) != each.version]
+    apart = [each.name for name, each in newest.items() if here.get(name) != each.version]
     return (*here, *apart, *list_programs())
 
 

@@ -34,7 +34,7 @@ class MissingEnvironment(MissingEngine):
 
     def __init__(self, engine: str, version: str = "", installed: tuple[str, ...] = ()) -> None:
         self.engine, self.package = engine, engine
-        wanted = f"{engine}=={version}" if version else engine
+        wanted = f"{engine}@{version}" if version else engine
         has = f" (installed: {', '.join(installed)})" if installed else ""
         ImportError.__init__(self, f"{wanted} is not installed{has}. Run: conservative engines install {wanted}")
 
@@ -111,6 +111,11 @@ class Environment:
     packages: tuple[str, ...]
     kind: str = "python"
     words: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Engine and version as in the name of a method, such as `exudyn@1.13.6`."""
+        return f"{self.engine}@{self.version}"
 
     @property
     def is_build(self) -> bool:

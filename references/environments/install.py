@@ -56,7 +56,7 @@ class Installation:
 
 
 def install(requirement: str, source: Source | None = None, force: bool = False) -> Installation:
-    """Return the environment of `NAME` or `NAME==VERSION`, created if it does not exist.
+    """Return the environment of `NAME` or `NAME@VERSION`, created if it does not exist.
 
     With `force` an existing environment is created again with the same packages, from its lock. The old one is replaced when
     the new one is complete. Raise `BadInput` if the engine or the version is unknown, has no wheel for a Python on this
@@ -75,7 +75,7 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
     try:
         text = (old.folder / LOCK).read_text(encoding="utf-8")
     except OSError:
-        raise BadInput("engine", f"{engine}=={old.version} without a lock", "`engines install`") from None
+        raise BadInput("engine", f"{old.name} without a lock", "`engines install`") from None
     return _install(engine, distribution, Lock(old.version, find_python(old.runtime.partition(" ")[2]), text), source, force)
 
 
@@ -133,13 +133,13 @@ def install_releases(
     engine: str, versions: Iterable[str], source: Source, report: Callable[[str], None]
 ) -> tuple[Environment, ...]:
     """Return the environments of versions, in this order. `report` gets a line before each installation. Raise as `install`."""
-    names = [f"{engine}=={version}" for version in versions]
-    for name in names:
+    wanted = [(f"{engine}@{version}", version) for version in versions]
+    for name, _ in wanted:
         check(name)  # all of them, before the first takes minutes
     environments = []
-    for name in names:
+    for name, version in wanted:
         try:
-            environments.append(find_environment(engine, name.partition("==")[2]))
+            environments.append(find_environment(engine, version))
         except MissingEnvironment:
             report(f"installing {name}")
             environments.append(install(name, source).environment)
@@ -174,7 +174,7 @@ def make(engine: str, lock: Lock, folder: Path, source: Source, kind: str = "pyt
                     if read_environment(folder) is None:
                         raise
     except UvFailed as failure:
-        raise BadInput("engine", f"{engine}=={lock.version}", f"a package that uv can install ({failure.summary})") from None
+        raise BadInput("engine", f"{engine}@{lock.version}", f"a package that uv can install ({failure.summary})") from None
     except OSError as error:
         raise BadInput("engines", f"{folder}: {error.strerror}", "a cache folder that can be written, with room") from None
     environment = read_environment(folder)
@@ -192,11 +192,11 @@ def import_trouble(environment: Environment, distribution: Distribution) -> str:
 
 
 def remove(requirement: str) -> tuple[Environment | Program, ...]:
-    """Remove the environment of `NAME==VERSION`, all of `NAME`, or a program, and return them. `BadInput` if there is none."""
+    """Remove the environment of `NAME@VERSION`, all of `NAME`, or a program, and return them. `BadInput` if there is none."""
     if program := list_programs().get(requirement):
         return (register(program, undo=True),)
     engine, version = split_requirement(requirement)
-    installed = {f"{each.engine}=={each.version}": each for each in list_environments()}
+    installed = {each.name: each for each in list_environments()}
     chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))
     if not chosen:
         near = f"an installed engine: {nearest(requirement, installed)}"

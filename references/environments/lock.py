@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
+from conservative.registry import partition_version
 
 from .environment import LOCK, Distribution, interpreter_of, version_key
 from .uv_command import UvFailed, run_uv
@@ -64,10 +65,10 @@ class Lock:
 
 
 def split_requirement(text: str) -> tuple[str, str]:
-    """Return name and version from NAME or NAME==VERSION; the version is empty if there is none. Raise `BadInput`."""
-    name, equals, version = text.partition("==")
-    if not _NAME.fullmatch(name) or bool(equals) != bool(_VERSION.fullmatch(version)):
-        raise BadInput("engine", repr(text), "NAME or NAME==VERSION: letters, digits, '.', '_' and '-'")
+    """Return name and version from NAME, NAME@VERSION or NAME==VERSION; the version is empty without one. Raise `BadInput`."""
+    name, at, version = partition_version(text)
+    if not _NAME.fullmatch(name) or bool(at) != bool(_VERSION.fullmatch(version)):
+        raise BadInput("engine", repr(text), "NAME or NAME@VERSION: letters, digits, '.', '_' and '-'")
     return name, version
 
 

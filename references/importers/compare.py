@@ -233,10 +233,10 @@ def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[
 
 
 class Program:
-    """The process in which an engine loads files; a name such as "mujoco" or "newton==1.0.0". Raise `MissingEngine`."""
+    """The process in which an engine loads files; a name such as "mujoco" or "newton@1.0.0". Raise `MissingEngine`."""
 
     def __init__(self, name: str) -> None:
-        self.engine, _, wanted = name.partition("==")
+        self.engine, _, wanted = registry.partition_version(name)
         choice("engines", self.engine, (*LOADERS, *OTHERS, *list_programs()))
         self.formats: tuple[str, ...] = ()
         self.single = self.engine in SINGLE

@@ -21,7 +21,7 @@ Value = TypeVar("Value")
 @click.group(
     short_help="Install, list and remove engines.",
     epilog=epilog(
-        "conservative engines install exudyn mujoco==3.6.0",
+        "conservative engines install exudyn mujoco@3.6.0",
         "conservative run brick_flip --method exudyn:RK44",
         "conservative engines list",
     ),
@@ -33,8 +33,8 @@ def engines() -> None:
     """
 
 
-@engines.command(short_help="Install engines.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))
-@click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
+@engines.command(short_help="Install engines.", epilog=epilog("conservative engines install drake exudyn@1.13.6"))
+@click.argument("names", nargs=-1, required=True, metavar="NAME[@VERSION]...")
 @find_links_option
 @allow_build_option
 @click.option("--force", is_flag=True, help="Rebuild an existing environment with the same packages.")
@@ -110,11 +110,11 @@ def list_engines(as_json: bool) -> None:
     show(build(), as_json)
 
 
-@engines.command(short_help="Remove engines.", epilog=epilog("conservative engines remove mujoco==3.6.0"))
-@click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
+@engines.command(short_help="Remove engines.", epilog=epilog("conservative engines remove mujoco@3.6.0"))
+@click.argument("names", nargs=-1, required=True, metavar="NAME[@VERSION]...")
 @json_option
 def remove(names: tuple[str, ...], as_json: bool) -> None:
-    """Remove the environment of each NAME==VERSION, or all environments of NAME. A program is not an engine any more."""
+    """Remove the environment of each NAME@VERSION, or all environments of NAME. A program is not an engine any more."""
     require_extra("conservative engines", "environments")
     from conservative.references.environments.install import remove
 

@@ -17,12 +17,12 @@ from .options import FilePath, Output, OutputCommand, epilog, json_option, names
     epilog=epilog(
         "conservative importers my_body.urdf",
         "conservative importers my_body.sdf --engines drake,pybullet --junit importers.xml",
-        "conservative importers --engines newton==1.0.0,newton==1.1.0",
+        "conservative importers --engines newton@1.0.0,newton@1.1.0",
         "conservative importers my_body.urdf --engines my_engine",
     ),
 )
 @click.argument("files", nargs=-1, type=FilePath())
-@names_option("engines", "Engines or programs: NAME or NAME==VERSION.  [default: engines that are installed]", "E,F")
+@names_option("engines", "Engines or programs: NAME or NAME@VERSION.  [default: engines that are installed]", "E,F")
 @json_option
 @click.option("--junit", type=Output('name="conservative importers"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output("# Importers: "), help="Write the tables as Markdown.")

@@ -139,7 +139,7 @@ skip_missing_option = click.option(
 quick_option = click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
 engines_option = names_option(
     "engines",
-    "Add engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`). A report gets a section that "
+    "Add engines: NAME, NAME@VERSION, or `all`, the installed ones (see `conservative engines`). A report gets a section that "
     "compares them.",
     "E,F",
     completion.engine_lists,

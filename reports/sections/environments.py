@@ -16,7 +16,7 @@ def build() -> Document:
     lines = [str(program) for program in programs.values()]
     for engine in (name for name in registry.list_engines() if name not in programs):
         mine = [each for each in environments if each.engine == engine]
-        installed = [f"{engine}=={each.version}: {each.runtime}, {', '.join(each.packages)}" for each in mine]
+        installed = [f"{each.name}: {each.runtime}, {', '.join(each.packages)}" for each in mine]
         lines += installed or [f"{engine}: no environment"]
     data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}
     return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)
@@ -25,12 +25,11 @@ def build() -> Document:
 def installation_line(done: Installation) -> str:
     """Return the result of an installation in one line."""
     environment, how = done.environment, "installed" if done.new else "already installed"
-    name = f"{environment.engine}=={environment.version}"
     trouble = f"; cannot be imported: {done.trouble}" if done.trouble else ""
-    advice = f". Run: conservative engines install --force {name}" if done.trouble and not done.new else ""
-    return f"{name}: {how}, {len(environment.packages)} packages, {environment.runtime}{trouble}{advice}"
+    advice = f". Run: conservative engines install --force {environment.name}" if done.trouble and not done.new else ""
+    return f"{environment.name}: {how}, {len(environment.packages)} packages, {environment.runtime}{trouble}{advice}"
 
 
 def removal_line(gone: Environment | Program) -> str:
     """Return one line about a removed environment or program."""
-    return f"{gone if isinstance(gone, Program) else f'{gone.engine}=={gone.version}'}: removed"
+    return f"{gone if isinstance(gone, Program) else gone.name}: removed"

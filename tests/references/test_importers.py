@@ -228,7 +228,7 @@ def test_a_file_that_is_not_one_rigid_body_is_refused_in_a_sentence(tmp_path, su
 def test_unknown_files_and_engines_are_named():
     assert "none.urdf" in run("none.urdf").stderr
     assert "expected one of" in run(GENERIC, "--engines", "nothing").stderr
-    assert "conservative engines install" in run(GENERIC, "--engines", "mujoco==0.1").stderr
+    assert "conservative engines install" in run(GENERIC, "--engines", "mujoco@0.1").stderr
 
 
 # ------------------------------------------------------------------------------------------------------------ programs of users
@@ -327,22 +327,22 @@ def wrong(answers, words):
     return {name for name, each in answers.items() if each.outcome == "wrong" and words in each.words}
 
 
-@pytest.mark.engine("mujoco==3.13.0")
+@pytest.mark.engine("mujoco@3.13.0")
 def test_mujoco_lost_the_rotation_of_inertial_frames_until_3_14():
     """Issue 3559 of MuJoCo, fixed by its pull request 3560."""
-    before, after = outcomes("mujoco==3.13.0"), outcomes("mujoco==3.14.0")
+    before, after = outcomes("mujoco@3.13.0"), outcomes("mujoco@3.14.0")
     lost = wrong(before, "the rotation of the inertial frame is ignored")
     assert {"turned_inertial_frame", "large_angles", "gimbal_lock", "turned_frame_with_products"} <= lost
     assert not wrong(after, "")
 
 
-@pytest.mark.engine("newton==1.0.0")
+@pytest.mark.engine("newton@1.0.0")
 def test_newton_turned_inertia_on_one_side_until_1_1():
     """Pull request 2245 of Newton. Its first releases need an older Warp than the newest.
 
-    echo warp-lang==1.12.0 > warp.txt; UV_CONSTRAINT=$PWD/warp.txt conservative engines install newton==1.0.0 newton==1.1.0
+    echo warp-lang==1.12.0 > warp.txt; UV_CONSTRAINT=$PWD/warp.txt conservative engines install newton@1.0.0 newton@1.1.0
     """
-    before, after = outcomes("newton==1.0.0"), outcomes("newton==1.1.0")
+    before, after = outcomes("newton@1.0.0"), outcomes("newton@1.1.0")
     turned = {"turned_inertial_frame", "large_angles", "gimbal_lock", "turned_frame_with_products"}
     assert turned <= wrong(before, "")
     assert {"turned_inertial_frame", "turned_frame_with_products"} <= wrong(before, "R I instead of R I R'")

@@ -79,7 +79,7 @@ def test_a_program_describes_its_settings(folder):
     assert (registry.method("p").order, registry.method("p@2.1:euler,substeps=3").order) == (4, 1)
     with pytest.raises(cv.BadInput, match="integrator: got 'rk5'; expected one of 'rk4'"):
         registry.method("p:rk5")
-    with pytest.raises(cv.MissingEngine, match="p==3 is not installed"):
+    with pytest.raises(cv.MissingEngine, match="p@3 is not installed"):
         registry.method("p@3")
 
 

@@ -419,7 +419,7 @@ def cases():
     inside = registry.list_engines()
     for figure in FIGURES:
         family, _, version = figure.method.partition(":")[0].partition("@")
-        engine = f"{family}=={version}" if version else family
+        engine = f"{family}@{version}" if version else family
         marks = [pytest.mark.engine(engine)] if version or family in inside else []
         if figure.expected != "not measured":
             yield pytest.param(figure, id=f"{figure.source}-{figure.name}", marks=marks)

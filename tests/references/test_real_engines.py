@@ -29,12 +29,12 @@ ENERGY_DECAYS = (2.9, -0.17, 0.09, None)
 NO_GYROSCOPIC_MOTION = (1.77, None, 5e-3, None)
 """Without torque, the angular velocity does not change; so the energy does not, although the motion is wrong."""
 ROWS = {
-    ("mujoco==3.6.0", "Euler"): ENERGY_GROWS,
-    ("mujoco==3.6.0", "implicit"): ENERGY_DECAYS,
-    ("mujoco==3.6.0", "implicitfast"): ENERGY_GROWS,
-    ("mujoco==3.6.0", "RK4"): (1.6e-3, -2e-8, 1.6e-5, 2),
-    ("mujoco==4.0.0", "RK4"): (1.3e-6, -2e-8, 7.7e-7, 4),
-    ("mujoco==4.0.0", "implicitfast"): ENERGY_DECAYS,
+    ("mujoco@3.6.0", "Euler"): ENERGY_GROWS,
+    ("mujoco@3.6.0", "implicit"): ENERGY_DECAYS,
+    ("mujoco@3.6.0", "implicitfast"): ENERGY_GROWS,
+    ("mujoco@3.6.0", "RK4"): (1.6e-3, -2e-8, 1.6e-5, 2),
+    ("mujoco@4.0.0", "RK4"): (1.3e-6, -2e-8, 7.7e-7, 4),
+    ("mujoco@4.0.0", "implicitfast"): ENERGY_DECAYS,
     ("exudyn", "RK44"): (1.3e-6, -2e-8, 8e-7, 4),
     ("exudyn", "RK67"): (3e-10, None, None, 6),
     ("exudyn", "ExplicitMidpoint"): (None, None, None, 2),
@@ -153,14 +153,14 @@ def test_samples_of_a_turned_brick(engine):
     assert np.abs(some.R_WB - every.R_WB[[0, 7, 14, 21, 28, 35, 42, 49, 50]]).max() < 1e-12
 
 
-@pytest.mark.engine("mujoco==4.0.0")
+@pytest.mark.engine("mujoco@4.0.0")
 @pytest.mark.parametrize("name", ["brick_flip", "asymmetric_top"])
 @pytest.mark.parametrize("every", [1, 50])
 def test_mujoco_in_its_environment_is_equal_bit_for_bit(name, every):
     inside = registry.method("mujoco")
     if inside.label != "mujoco==4.0.0/RK4":
         pytest.skip(f"in this process it is {inside.label}")
-    install("mujoco==4.0.0")
+    install("mujoco@4.0.0")
     scene = registry.scene(name)
     here, there = (
         cv.integrate(scene, 0.01, method=registry.method(f"{each}:implicit"), sample_every=every)
@@ -191,7 +191,7 @@ DEFAULTS = {
     "bsk": ("RK4", (2.3e-6, -2e-8, 8e-7, 4)),
     "dart": ("semi-implicit Euler", ENERGY_GROWS),
     "mjx": ("Euler,f32", ENERGY_GROWS),
-    "mujoco==4.0.0": ("Euler", ENERGY_GROWS),
+    "mujoco@4.0.0": ("Euler", ENERGY_GROWS),
     "opensim": ("RungeKuttaMerson,accuracy=0.001", (4.4e-2, -2.2e-6, 5.1e-6, None)),
     "jsbsim": ("RectEuler", ENERGY_GROWS),
     "nimble": ("semi-implicit Euler", ENERGY_GROWS),
@@ -244,7 +244,7 @@ EULER = (3.58e-3, 1)
 WITHOUT_GYROSCOPIC = 1.35
 """Error on the heavy top of the exact motion without the gyroscopic torque about the centre of mass."""
 ERRORS = {
-    ("mujoco==4.0.0", "RK4"): (4.31e-11, 4),
+    ("mujoco@4.0.0", "RK4"): (4.31e-11, 4),
     ("exudyn", "RK44"): (4.31e-11, 4),
     ("exudyn", "GeneralizedAlpha"): (1.58e-5, 2),
     ("exudyn", "default"): (4.97e-5, 2),

@@ -296,7 +296,7 @@ def test_a_name_with_a_version_is_read_back():
 @pytest.mark.usefixtures("trial_registered")
 def test_a_version_that_is_not_installed_is_missing():
     with pytest.raises(
-        MissingEngine, match=r"^trial==2.0 is not installed \(installed: 1.0.*\. Run: conservative engines install trial==2.0"
+        MissingEngine, match=r"^trial@2.0 is not installed \(installed: 1.0.*\. Run: conservative engines install trial@2.0"
     ):
         registry.method("trial@2.0")
 

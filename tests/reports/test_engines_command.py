@@ -33,8 +33,8 @@ def test_the_list_shows_environments_and_engines_without_one(cache):
     code, text = run("list")
     assert code == 0
     lines = text.splitlines()
-    place = lines.index("exudyn==1.9.0: Python 3.11.7, exudyn==1.9.0, numpy==2.4.6")
-    assert lines[place + 1].startswith("exudyn==1.10.0: ")
+    place = lines.index("exudyn@1.9.0: Python 3.11.7, exudyn==1.9.0, numpy==2.4.6")
+    assert lines[place + 1].startswith("exudyn@1.10.0: ")
     assert "bsk: no environment" in lines
 
 
@@ -49,10 +49,10 @@ def test_the_list_as_json_has_every_version(cache):
     ("arguments", "message"),
     [
         (("install", "exudin"), "engine: got 'exudin'; expected 'exudyn' (nearest)"),
-        (("install", "exudyn; true"), "expected NAME or NAME==VERSION"),
-        (("install", "exudyn", "drake==1.0 2.0"), "expected NAME or NAME==VERSION"),
+        (("install", "exudyn; true"), "expected NAME or NAME@VERSION"),
+        (("install", "exudyn", "drake==1.0 2.0"), "expected NAME or NAME@VERSION"),
         (("remove", "exudyn==1.9.0"), "expected an installed engine (none is installed)"),
-        (("remove", "../exudyn"), "expected NAME or NAME==VERSION"),
+        (("remove", "../exudyn"), "expected NAME or NAME@VERSION"),
     ],
 )
 def test_a_bad_name_is_one_line_and_exit_code_2(arguments, message):
@@ -64,7 +64,7 @@ def test_a_bad_name_is_one_line_and_exit_code_2(arguments, message):
 
 def test_remove_removes(cache):
     write_record(cache, "1.9.0")
-    assert run("remove", "exudyn") == (0, "exudyn==1.9.0: removed\n")
+    assert run("remove", "exudyn") == (0, "exudyn@1.9.0: removed\n")
     assert environment.list_environments() == ()
 
 
@@ -72,3 +72,47 @@ def test_removed_environments_are_available_as_json(cache):
     write_record(cache, "1.9.0")
     (gone,) = json.loads(run("remove", "exudyn", "--json")[1])
     assert (gone["version"], gone["packages"]) == ("1.9.0", ["exudyn==1.9.0", "numpy==2.4.6"])
+
+
+COMMANDS = {
+    "engines install": ("{}", "--find-links", "."),
+    "engines remove": ("{}",),
+    "importers": ("--engines", "{}"),
+    "recommend": ("brick_flip", "--error", "1e-3", "--engine", "{}"),
+    "report": ("--quick", "--methods", "reduced", "--engines", "{}"),
+    "run": ("brick_flip", "--method", "{}"),
+    "study": ("motion", "--methods", "{}"),
+    "sweep": ("brick_flip", "--spread", "rate=1%", "--starts", "2", "--method", "{}"),
+    "watch": ("brick_flip", "--method", "{}", "--out", "motion.html"),
+}
+"""Commands that take an engine with a version, and their arguments."""
+MORE = [("study", ("engines_at_one_step", "--engines", "{}")), ("report", ("--quick", "--methods", "{}:RK4"))]
+WITHOUT = {"gate", "track", "engines add", "engines check"}
+"""Those that take methods of a project, a version on its own, or a program."""
+
+
+def names_of_commands():
+    groups = {"": main, "engines ": main.get_command(None, "engines")}
+    for start, group in groups.items():
+        for name in group.list_commands(None):
+            parameters = getattr(group.get_command(None, name), "params", ())
+            if {each.name for each in parameters} & {"method", "methods", "engine", "engines", "names", "command"}:
+                yield start + name
+
+
+def test_every_command_with_an_engine_is_known():
+    assert set(names_of_commands()) == {*COMMANDS} | WITHOUT
+
+
+@pytest.mark.parametrize(("command", "arguments"), [*COMMANDS.items(), *MORE])
+def test_both_forms_of_a_version_are_accepted(command, arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def answer(name):
+        done = CliRunner().invoke(main, [*command.split(), *(each.format(name) for each in arguments)])
+        assert done.exit_code == 2
+        return done.output.replace("==", "@").splitlines()[-1]
+
+    others = {"engines install": "expected a package that", "engines remove": "none is installed"}
+    assert others.get(command, "mujoco@0.1 is not installed") in answer("mujoco@0.1")
+    assert answer("mujoco@0.1") == answer("mujoco==0.1")
