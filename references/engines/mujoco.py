@@ -28,7 +28,7 @@ from threading import Lock
 
 import numpy as np
 
-from .shared import FIELDS, compile_torque, pack_field
+from .shared import FIELDS, compile_torque, mujoco_moments, pack_field
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 ENGINE = {
@@ -130,9 +130,7 @@ def _model(mj, given):
     off = (*SWITCHED_OFF, *("GRAVITY",) * (given.gravity == 0), *PASSIVE * (not field.any()))
     spec.option.disableflags = sum(int(getattr(mj.mjtDisableBit, f"mjDSBL_{name}", 0)) for name in off)
     body = spec.worldbody.add_body(name="body", explicitinertial=True, mass=given.mass, ipos=given.com)
-    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
-    moments = given.moments_com
-    body.inertia = np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
+    body.inertia = mujoco_moments(given)
     body.iquat = given.q_com  # scalar first
     body.add_joint(type=mj.mjtJoint.mjJNT_FREE if given.free else mj.mjtJoint.mjJNT_BALL)
     if given.stiffness and not given.turn.any():

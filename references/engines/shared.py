@@ -111,11 +111,15 @@ def compile_derivative():
     return derivative
 
 
+def mujoco_moments(given):
+    """Return the moments (3,). MuJoCo refuses those of a planar body that exceed the sum of the others by a rounding unit."""
+    moments = given.moments_com
+    return np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
+
+
 def write_mjcf(given, option="", shape=""):
     """Return the body as an MJCF file, on a free joint or on a ball joint at the fixed point."""
-    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
-    moments = np.minimum(given.moments_com, np.roll(given.moments_com, 1) + np.roll(given.moments_com, 2))
-    inertial = {"mass": np.array([given.mass]), "pos": given.com, "quat": given.q_com, "diaginertia": moments}
+    inertial = {"mass": np.array([given.mass]), "pos": given.com, "quat": given.q_com, "diaginertia": mujoco_moments(given)}
     attributes = " ".join(f'{name}="{" ".join(map(repr, values.tolist()))}"' for name, values in inertial.items())
     return f"""
         <mujoco>
