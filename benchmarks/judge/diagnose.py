@@ -26,7 +26,7 @@ from conservative.references.solvers.scipy import Derivative, state_derivative, 
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .motion import Case, Motion
+from .motion import Compared, States
 from .table import Recording
 
 NUMERICAL, LONGEST, NEAR = 1000.0, 100.0, 3.0  # rad: angles that are compared without a closed form, explained, fitted first
@@ -80,7 +80,7 @@ TEXTBOOK: dict[str, tuple[int, Callable[..., Array]]] = {
 
 
 @dataclass(frozen=True)
-class Finding:
+class Explanation:
     """A hypothesis that was tried: its name, the sentence that it states about the file, and its fitted numbers in SI units.
 
     `left` and `plain` are the largest errors with it and without it, over the rows that it was tried on: of attitudes, rad, and
@@ -138,7 +138,7 @@ def judge(scene: Scene, recording: Recording, from_row: bool, allowed: float) ->
     return {"error": error, "units": units, **found}, rows
 
 
-def _read(scene: Scene, recording: Recording, from_row: bool) -> tuple[Case, list[str]]:
+def _read(scene: Scene, recording: Recording, from_row: bool) -> tuple[Compared, list[str]]:
     """Return the case of a recording, and notes on its rows."""
     (R, w), t, first = recording.data, recording.t, float(recording.t[0])
     timed = bool(scene.loads or scene.needs & IN_TIME)
@@ -148,7 +148,7 @@ def _read(scene: Scene, recording: Recording, from_row: bool) -> tuple[Case, lis
         scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
     elif from_row:  # sums of steps and a large time would lose digits
         t = t - first
-    whole = Case(scene, t, (None, None), from_row, float(t[0]) if from_row else 0.0)
+    whole = Compared(scene, t, (None, None), from_row, float(t[0]) if from_row else 0.0)
     case, notes = whole.read(R, w), [f"{len(t):,} of {recording.rows:,} rows are compared."]
     if first != 0 and not from_row:
         notes.append(f"The first row is compared with the motion of the scene at {first:g} s.")
@@ -162,7 +162,7 @@ def _read(scene: Scene, recording: Recording, from_row: bool) -> tuple[Case, lis
     return case, notes
 
 
-def _drifts(case: Case) -> dict[str, Array]:
+def _drifts(case: Compared) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
     energy = None if case.scene.potential else find_energy(case.scene.invariants)  # rates alone determine that of a free body
@@ -175,7 +175,7 @@ def _drifts(case: Case) -> dict[str, Array]:
     return drifts
 
 
-def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Finding]]:
+def diagnose(whole: Compared, quaternion: bool) -> tuple[Explanation | None, list[Explanation]]:
     """Return the hypothesis that explains the error, if any, and all that were tried, best first.
 
     The best hypothesis is named if it leaves at most half of the error. One that needs fewer numbers is preferred if it leaves
@@ -184,7 +184,7 @@ def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Findin
     """
     case = whole.first(LONGEST, FEWEST)
     case = case.take(slice(None, None, -(-len(case.t) // MOST)))
-    tried: list[Finding] = []
+    tried: list[Explanation] = []
     if case.error.max() <= ROUND_OFF:
         return None, tried
     parts = list(_parts(case))
@@ -209,25 +209,25 @@ def diagnose(whole: Case, quaternion: bool) -> tuple[Finding | None, list[Findin
     return min(good, key=lambda each: (len(each.values), each.share), default=None), sorted(tried, key=lambda each: each.share)
 
 
-def _finding(case: Case, name: str, text: str, values: dict[str, float], read: Case, motion: Motion) -> Finding:
-    """Return the finding of a hypothesis: a reading of the case, and the motion next to it."""
+def _explain(case: Compared, name: str, text: str, values: dict[str, float], read: Compared, motion: States) -> Explanation:
+    """Return the explanation by a hypothesis: a reading of the file, and the motion next to it."""
     left, plain = read.errors(motion).max(axis=1).tolist(), case.error.max(axis=1).tolist()
     moments, given = np.sort(read.scene.body.moments), case.scene.body.moments
     moments = moments * (sum(given) / sum(moments) if case.torque_free else 1.0)
     listed = ", ".join(f"{each:.6g}" for each in moments) + " kg m^2" + ", or multiples" * case.torque_free
     more = ", in addition to the damping of the scene" * (Need.DAMPING in case.scene.needs)
     text = text.format(**values, moments=listed, more=more)
-    return Finding(name, text, values, left, plain, max(left) / max(*plain, FLOOR))
+    return Explanation(name, text, values, left, plain, max(left) / max(*plain, FLOOR))
 
 
-def _fitted(case: Case, name: str) -> Finding:
+def _fitted(case: Compared, name: str) -> Explanation:
     """Return the finding of a hypothesis of `FITTED`, whose numbers are fitted over the near rows, then over all."""
     text, names = FITTED[name]
     exact = {"time shift": max(1, len(case.t) // 10), "phase drift": max(1, len(case.t) // 10), "first row": 1}
     case = case.take(slice(exact.get(name, 0), None))  # an exact first row is not shifted, and times stay after the start
     units = np.array([{"shift": 1 / case.scale, "damping": case.scale}.get(each, 1.0) for each in names])
 
-    def build(p: Array, of: Case) -> tuple[Case, Motion]:
+    def build(p: Array, of: Compared) -> tuple[Compared, States]:
         part, scene = np.split(np.clip(p, -LIMIT, LIMIT), [3]), of.scene
         if name == "body axes":
             turn = Rotation.from_rotvec(p).as_matrix().T
@@ -250,11 +250,11 @@ def _fitted(case: Case, name: str) -> Finding:
             return of, of.move(of.t, name == "damped", float(sum(part[0] * units)))
         return of, of.truth(of.t)
 
-    def residuals(p: Array, of: Case) -> Array:
+    def residuals(p: Array, of: Compared) -> Array:
         read, motion = build(p, of)
         return read.differences(motion).ravel()
 
-    def fit(p: Array) -> Finding:
+    def fit(p: Array) -> Explanation:
         coarse = replace(case, tolerance=FITTING)
         for of in (coarse.first(NEAR, 10), coarse) if names else ():
             better: Array | None = p
@@ -264,7 +264,7 @@ def _fitted(case: Case, name: str) -> Finding:
                 steps = (np.linalg.lstsq(slopes, -now, rcond=cut)[0] for cut in (CHANGE, 0.01, 0.1, 0.5))
                 trials = (p + share * step for step in steps for share in (1.0, 0.3))
                 better = next((q for q in trials if np.linalg.norm(residuals(q, of)) < 0.9 * np.linalg.norm(now)), None)
-        return _finding(case, name, text, dict(zip(names, (p * units).tolist(), strict=True)), *build(p, case))
+        return _explain(case, name, text, dict(zip(names, (p * units).tolist(), strict=True)), *build(p, case))
 
     if name != "body axes" or case.error.max() <= FAR:
         return fit(np.zeros(len(names)))
@@ -273,7 +273,7 @@ def _fitted(case: Case, name: str) -> Finding:
     return min(map(fit, turns[:4]), key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
 
 
-def _readings(case: Case, quaternion: bool) -> Iterator[Finding]:
+def _readings(case: Compared, quaternion: bool) -> Iterator[Explanation]:
     """Yield other readings of attitudes and rates."""
     R, w = case.data
     if R is None:
@@ -286,10 +286,10 @@ def _readings(case: Case, quaternion: bool) -> Iterator[Finding]:
         names = [each for each in (name, world) if each]
         read = case.read(attitudes[name], (w[:, None] @ attitudes[name])[:, 0] if world and w is not None else w)
         text = ". ".join(READINGS[each] for each in names)
-        yield _finding(case, ", ".join(names), text, {}, read, read.truth(read.t))
+        yield _explain(case, ", ".join(names), text, {}, read, read.truth(read.t))
 
 
-def _parts(case: Case) -> Iterator[Finding]:
+def _parts(case: Compared) -> Iterator[Explanation]:
     """Yield motions without parts of the scene, with the other sign of one, and in the other axes."""
     scene, body, torque = case.scene, case.scene.body, case.scene.torque
     gone: dict[str, dict[str, Any]] = {
@@ -315,10 +315,10 @@ def _parts(case: Case) -> Iterator[Finding]:
     for name, (text, change) in others.items():
         other = replace(case, scene=scene.rename(scene.name, **change))
         if other.scene.key != scene.key:
-            yield _finding(case, name, text, {}, other, other.truth(other.t))
+            yield _explain(case, name, text, {}, other, other.truth(other.t))
 
 
-def _no_motion(of: Case) -> Motion:
+def _no_motion(of: Compared) -> States:
     return np.full((len(of.t), 3, 3), np.nan), np.full((len(of.t), 3), np.nan)
 
 
@@ -337,7 +337,7 @@ def _stretched(scene: Scene, stretch: Array) -> Scene:
     return scene.rename(scene.name, body=replace(scene.body, inertia=inertia), potential=field)
 
 
-def _steps(case: Case) -> Iterator[Finding]:
+def _steps(case: Compared) -> Iterator[Explanation]:
     """Yield motions by textbook methods, with a step that divides the distance of the rows."""
     gap, exact, wheel = float(np.ptp(case.t)) / (len(case.t) - 1), state_derivative(case.scene), wheel_rates(case.scene)
     axes = principal_axes(case.scene)
@@ -345,7 +345,7 @@ def _steps(case: Case) -> Iterator[Finding]:
     if np.ptp(case.t - case.start - numbers * gap) > 1e-3 * gap or numbers[0] > FEWEST:
         return
 
-    def march(step: Callable[..., Array], parts: int, of: Case) -> Motion:
+    def march(step: Callable[..., Array], parts: int, of: Compared) -> States:
         y, h, t = np.append(axes.q0, axes.w0 + wheel(case.start)), gap / parts, case.start
         kept, before = [y], exact(t, y)
         with np.errstate(all="ignore"):
@@ -369,4 +369,4 @@ def _steps(case: Case) -> Iterator[Finding]:
         if few.errors(found).max() <= EXPLAINED * few.error.max():
             some, h = case.take(slice(0, STEPS // parts[-1])), gap / parts[-1]
             text = f"The rows follow {name} with a step of {h:.4g} s"
-            yield _finding(some, name, text, {"step": h}, some, march(step, parts[-1], some))
+            yield _explain(some, name, text, {"step": h}, some, march(step, parts[-1], some))

@@ -13,13 +13,13 @@ from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.references.solvers.scipy import Derivative, list_derivatives, solve_pieces, wheel_rates
 from conservative.scene import Scene
 
-Motion = tuple[Array | None, Array | None]
+States = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
 TOLERANCE, COARSER = 2.3e-14, 20.0  # the smallest relative one of SciPy; its multiple that shows the error of a motion
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Compared:
     """A recorded motion at times t (n,), s, and the scene whose motion it should be.
 
     If `from_row` is True, the scene starts in the first row, otherwise as the user's scene does. `start` is the time of that
@@ -29,23 +29,23 @@ class Case:
 
     scene: Scene
     t: Array
-    data: Motion
+    data: States
     from_row: bool
     start: float = 0.0
     tolerance: float = TOLERANCE
 
-    def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Case:
+    def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Compared:
         """Return the case of other attitudes and rates. The scene keeps the part of its initial state that they do not have."""
         data = {"R_WB0": R_WB, "w_WB_B0": w_WB_B}
         start = {name: values[0] for name, values in data.items() if self.from_row and values is not None}
         return replace(self, scene=self.scene.rename(self.scene.name, **start), data=(R_WB, w_WB_B))
 
-    def take(self, rows: slice) -> Case:
+    def take(self, rows: slice) -> Compared:
         """Return some of the rows, with the same initial state."""
         R, w = (None if each is None else each[rows] for each in self.data)
         return replace(self, t=self.t[rows], data=(R, w))
 
-    def first(self, angle: float, least: int) -> Case:
+    def first(self, angle: float, least: int) -> Compared:
         """Return the rows in which the body turns by an angle, rad, or at least so many."""
         return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
 
@@ -77,7 +77,7 @@ class Case:
         coarse = replace(self, data=self.truth(self.t), tolerance=COARSER * self.tolerance)
         return np.maximum.accumulate(coarse.error.max(axis=0))
 
-    def truth(self, t: Array) -> Motion:
+    def truth(self, t: Array) -> States:
         """Return the exact motion at ascending times (n,), s, from `start` on."""
         body, field, R0, w0 = self.scene.body, self.scene.potential, self.scene.R_WB0, self.scene.w_WB_B0
         if not self.closed:
@@ -85,7 +85,7 @@ class Case:
         elapsed = t - self.start
         return free_body(body, R0, w0, elapsed) if field is None else lagrange_top(body, field, R0, w0, elapsed)  # type: ignore[arg-type]
 
-    def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> Motion:
+    def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> States:
         """Return the motion by integration, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
         axes, wheel, states = principal_axes(self.scene), wheel_rates(self.scene), np.full((len(t), 7), np.nan)
         rotor = hat(axes.rotor * (self.scene.body.motor is None))  # the state has the momentum of a rotor with a motor
@@ -107,12 +107,12 @@ class Case:
             states[: len(found)] = found
             return self.motion(states)
 
-    def motion(self, y: Array) -> Motion:
+    def motion(self, y: Array) -> States:
         """Return the motion of states (n, 7): quaternions, scalar first, and rates, rad/s, in principal axes."""
         R_FB = principal_axes(self.scene).R_BF.T
         return from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)) @ R_FB, y[:, 4:] @ R_FB
 
-    def differences(self, motion: Motion) -> Array:
+    def differences(self, motion: States) -> Array:
         """Return a motion minus the data (n, 12), in rad and relative to `scale`; 0 for what the file does not have."""
         out = [np.zeros((len(self.t), n)) for n in (9, 3)]
         for i, unit in enumerate((np.sqrt(2), self.scale)):
@@ -120,7 +120,7 @@ class Case:
                 out[i] = (made - data).reshape(out[i].shape) / unit
         return np.clip(np.nan_to_num(np.concatenate(out, axis=1), nan=1e3), -1e3, 1e3)
 
-    def errors(self, motion: Motion) -> Array:
+    def errors(self, motion: States) -> Array:
         """Return the sizes (2, n) of `differences`: angles between attitudes, rad, and differences of rates."""
         d = self.differences(motion)
         return np.stack([2 * np.arcsin(np.minimum(np.linalg.norm(d[:, :9], axis=1) / 2, 1)), np.linalg.norm(d[:, 9:], axis=1)])

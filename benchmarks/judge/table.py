@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array
 from conservative.errors import BadInput, MissingEngine
 
-from .motion import Motion
+from .motion import States
 
 ROWS, CHUNK = 2000, 100_000  # rows that are kept, evenly chosen: this to twice as many; rows that are read at a time
 UNITS = {
@@ -43,7 +43,7 @@ class Recording:
     """
 
     t: Array
-    data: Motion
+    data: States
     norm: Array | None
     order_known: bool
     degrees: bool

@@ -16,7 +16,7 @@ from conservative.outcome import Outcome
 
 from ..measures.convergence_order import Order
 from ..measures.errors import CONSERVED, SMALL
-from .engine import EngineComparison, Observation, Spread, StepTimes, differ, ratio
+from .engine import EngineComparison, Observation, Range, StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
 """Orders differ if their difference exceeds the first, and this number of standard errors."""
@@ -45,8 +45,8 @@ class Change:
     """
 
     aspect: Aspect
-    was: Outcome | Order | Spread
-    now: Outcome | Order | Spread
+    was: Outcome | Order | Range
+    now: Outcome | Order | Range
     quantity: str = ""
     lost: bool = False
 
@@ -64,7 +64,7 @@ def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_t
     if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
         changes.append(Change(Aspect.ERROR, was.error, now.error))
     if differ(was_times, now_times):
-        changes.append(Change(Aspect.TIME, Spread.of(was_times), ratio(was_times, now_times)))
+        changes.append(Change(Aspect.TIME, Range.of(was_times), ratio(was_times, now_times)))
     return tuple(changes)
 
 
@@ -97,7 +97,7 @@ def _drifts(was: Observation, now: Observation) -> Iterator[Change]:
             yield Change(Aspect.DRIFT, before, after, quantity, lost=other > grade)
 
 
-def direction(was: Spread, now: Spread) -> int:
+def direction(was: Range, now: Range) -> int:
     """Return 1 if all sizes grew by more than `FACTOR`, -1 if they shrank by as much, else 0."""
     before, after = was.sizes, now.sizes
     return int(after[0] > FACTOR * before[1]) - int(before[0] > FACTOR * after[1])

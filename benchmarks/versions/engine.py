@@ -50,7 +50,7 @@ NO_ORDER = Order()
 
 
 @dataclass(frozen=True)
-class Spread:
+class Range:
     """A value, and its smallest and largest value under changes that should not matter.
 
     For errors (rad) and drifts (relative) the change is one or two more steps in the run; for times (s) it is a repetition.
@@ -61,7 +61,7 @@ class Spread:
     high: float
 
     @classmethod
-    def of(cls, values: Iterable[float]) -> Spread:
+    def of(cls, values: Iterable[float]) -> Range:
         """Return the spread of values; the first is the measured value, and NaN are ignored."""
         first, *rest = values
         known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
@@ -74,7 +74,7 @@ class Spread:
         return (0.0 if self.low < 0 < self.high else ends[0]), ends[1]
 
 
-NOTHING = Spread(math.nan, math.nan, math.nan)
+NOTHING = Range(math.nan, math.nan, math.nan)
 """The spread of a value that could not be measured."""
 
 
@@ -103,8 +103,8 @@ class Observation:
     points: tuple[LinePoint, ...] = ()
     attitude_order: Order = NO_ORDER
     rates_order: Order = NO_ORDER
-    error: Spread = NOTHING
-    drifts: Mapping[str, Spread] = field(default_factory=dict)
+    error: Range = NOTHING
+    drifts: Mapping[str, Range] = field(default_factory=dict)
 
 
 def observe(study: Study, scene: Scene, method: Method, version: str) -> Observation:
@@ -122,11 +122,11 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     return replace(
         observation,
         points=tuple(_points(study, scene, method)),
-        error=Spread.of(
+        error=Range.of(
             float(angle_between(study.truth(scene, case.grid).trajectory.R_WB, run.R_WB).max())
             for run, case in zip(runs, cases, strict=False)
         ),
-        drifts={invariant.name: Spread.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
+        drifts={invariant.name: Range.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
     )
 
 
@@ -180,9 +180,9 @@ def differ(was: StepTimes, now: StepTimes) -> bool:
     return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
 
 
-def ratio(was: StepTimes, now: StepTimes) -> Spread:
+def ratio(was: StepTimes, now: StepTimes) -> Range:
     """Return the ratio of the shortest times (n,), s, with the spread of the ratios of single repeats."""
-    return Spread.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])
+    return Range.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])
 
 
 @dataclass

@@ -19,7 +19,7 @@ from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
-from .between import SampleTimes, divide_step, sample_between, spread
+from .between import SampleTimes, divide_step, sample_between, stride_of
 from .search import even_grid, find_cheapest, step_factor, stops_falling
 from .trials import ASYMPTOTIC, Estimate, parts_for, trials_of
 
@@ -99,7 +99,7 @@ def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Gr
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"one that takes {t_end / dt:.3g} steps", f"one that takes at most {MOST_STEPS:g} steps")
     if samples.at is not None:
-        return even_grid(t_end, dt, spread(int(t_end / dt)), parts)
+        return even_grid(t_end, dt, stride_of(int(t_end / dt)), parts)
     if samples.spacing is None:
         require_memory("sample_every", math.ceil(t_end / dt), samples.every)
         return even_grid(t_end, dt, samples.every, parts)

@@ -95,7 +95,7 @@ def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
     """Return the grid of steps dt, s, from which samples at times t (n,), s, are computed."""
     dt = divide_step(scene, method, dt)
     n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
-    return Grid(dt, n_steps, spread(n_steps))
+    return Grid(dt, n_steps, stride_of(n_steps))
 
 
 def divide_step(scene: Scene, method: Method, dt: float) -> float:
@@ -103,7 +103,7 @@ def divide_step(scene: Scene, method: Method, dt: float) -> float:
     return dt if method.order is not None else dt / max(1, math.ceil(dt * bound_rate(scene) / LONGEST))
 
 
-def spread(n_steps: int) -> int:
+def stride_of(n_steps: int) -> int:
     """Return the number of steps between stored ones in a run of `n_steps` steps."""
     return max(1, n_steps // MOST_KEPT)
 

@@ -31,7 +31,7 @@ from .digits import (
     multiply,
     rotation_phase,
 )
-from .start import InitialState, Motion
+from .start import InitialState, Solution
 from .theta import Lattice, Points, jacobi, theta
 
 
@@ -53,7 +53,7 @@ def order_axes(start: InitialState) -> tuple[Vector, Vector, Matrix]:
     return moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP
 
 
-def free_motion(start: InitialState) -> Motion:
+def free_motion(start: InitialState) -> Solution:
     """Return the motion of an initial state that is not steady."""
     J, L, R_BP = order_axes(start)
     # 1/J_i - 1/J_j: all have one sign, so that no sum of them cancels.

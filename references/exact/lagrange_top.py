@@ -42,7 +42,7 @@ from .digits import (
     rotation_phase,
     unit,
 )
-from .start import SYMMETRIC, InitialState, Motion
+from .start import SYMMETRIC, InitialState, Solution
 from .theta import Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
@@ -181,7 +181,7 @@ def nutation_phase(start: Top, roots: Nutation) -> Phase:
     return Phase(v if rising else -v, mp.sqrt(start.k * (u3 - u1) / 2), 2 * roots.lattice.K)
 
 
-def top_motion(start: Top) -> Motion:
+def top_motion(start: Top) -> Solution:
     """Return the motion of an initial state that is not upright."""
     roots = nutation(start)
     lattice, u_E = roots.lattice, max(min(start.u_E, roots.u3), roots.u2)

@@ -31,7 +31,7 @@ from conservative.trajectory import Counters, Trajectory
 from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
-from .start import InitialState, Motion, in_blocks, steady_turn
+from .start import InitialState, Solution, in_blocks, steady_turn
 
 
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
@@ -173,7 +173,7 @@ def _reason(body: RigidBody, potential: AnyPotential | None) -> str | None:
     return None
 
 
-def _motion(start: InitialState, potential: AnyPotential | None) -> Motion:
+def _motion(start: InitialState, potential: AnyPotential | None) -> Solution:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
         return steady_turn(start) if start.steady else free_motion(start)

@@ -65,14 +65,14 @@ class InitialState:
         return bool(mp.norm(cross(w, L)) <= _PARALLEL * mp.norm(w) * mp.norm(L))
 
 
-Motion = Callable[[Array], tuple[Array, Array]]
+Solution = Callable[[Array], tuple[Array, Array]]
 """A motion in closed form: maps any times (n,), s, to `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
 
 _BLOCK = 16384
 """Samples evaluated together, so that they fit into a cache."""
 
 
-def in_blocks(motion: Motion, t: Array) -> tuple[Array, Array]:
+def in_blocks(motion: Solution, t: Array) -> tuple[Array, Array]:
     """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at t (n,), block after block."""
     R_WB, w_WB_B = np.empty((len(t), 3, 3)), np.empty((len(t), 3))
     for begin in range(0, len(t), _BLOCK):
@@ -81,7 +81,7 @@ def in_blocks(motion: Motion, t: Array) -> tuple[Array, Array]:
     return R_WB, w_WB_B
 
 
-def steady_turn(start: InitialState) -> Motion:
+def steady_turn(start: InitialState) -> Solution:
     """Return the motion with the constant rates of a start: a turn about an axis fixed in body and world, or rest."""
     w = start.rates(mp.eye(3))
     speed = mp.norm(w)

@@ -25,7 +25,7 @@ from ..environments.environment import find_environment, list_environments
 from ..worker.calls import python_worker
 from ..worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
 from . import loaders
-from .description import Link, Part, join_links, kind_of, make_pose, read_links, steiner
+from .description import Link, Piece, join_links, kind_of, make_pose, read_links, steiner
 from .loaders import LOADERS
 
 LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
@@ -44,7 +44,7 @@ CATALOGUE = Path(__file__).parent / "models"
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class FileAnswer:
     """The answer of an engine for a file.
 
     The outcome is "right", "wrong", "refused", "crashed", or "" if the engine has no loader for the format, with `words`.
@@ -128,7 +128,7 @@ MISTAKES: dict[str, Mistake] = {
 """Known mistakes of loaders, as functions from the links of a file to the links that a loader makes of them."""
 
 
-def accelerations(part: Part, cases: Array) -> Array:
+def accelerations(part: Piece, cases: Array) -> Array:
     """Return the accelerations (n, 6) of a body for velocities and forces (n, 2, 6), as in `loaders`.
 
     Newton and Euler about the centre of mass c: m a_c = F, J w' = T - c x F - w x J w, a = a_c - w' x c - w x (w x c).
@@ -139,7 +139,7 @@ def accelerations(part: Part, cases: Array) -> Array:
     return np.hstack([force / part.mass - np.cross(turn, part.com) - np.cross(w, np.cross(w, part.com)), turn])
 
 
-def make_cases(part: Part) -> Array:
+def make_cases(part: Piece) -> Array:
     """Return generic rates, velocities, forces and torques (n, 2, 6) for a body, so that all terms are of one order."""
     rng, size = np.random.default_rng(2026), np.sqrt(np.trace(part.inertia) / part.mass)
     w, force, torque = (
@@ -151,7 +151,7 @@ def make_cases(part: Part) -> Array:
     return np.hstack([-np.cross(w, part.com), w, force, torque + np.cross(part.com, force)]).reshape(-1, 2, 6)
 
 
-def identify(cases: Array, measured: Array, near: Part) -> Part:
+def identify(cases: Array, measured: Array, near: Piece) -> Piece:
     """Return the body that explains accelerations (n, 6) best, by least squares about the centre of mass of a body `near` it.
 
     With a the acceleration of the point P, d = c - P, and L = m d: F = m a + w' x L + w x (w x L), and
@@ -173,10 +173,10 @@ def identify(cases: Array, measured: Array, near: Part) -> Part:
     x = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0]
     mass, d = x[0] * units[0], x[1:4] / x[0] * size
     inertia = x[4:].reshape(3, 3) * units[2] - steiner(mass, d)
-    return Part(float(mass), near.com + d, inertia)
+    return Piece(float(mass), near.com + d, inertia)
 
 
-def distance(part: Part, other: Part, scale: Part | None = None) -> float:
+def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
     """Return the largest difference of mass, centre of mass and inertia, relative to those of `scale`, by default `part`."""
     unit = scale or part
     size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass))
@@ -189,7 +189,7 @@ def _list(values: Array) -> str:
     return ", ".join(f"{value:.3g}" for value in values.ravel())
 
 
-def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
+def explain(path: Path, links: list[Link], seen: Piece, tolerance: float) -> str:
     """Return the mistake, or the pair of mistakes, that turns the links of a file into the body that an engine has."""
     wanted = join_links(links)
     for names in [*combinations(MISTAKES, 1), *combinations(MISTAKES, 2)]:
@@ -213,7 +213,7 @@ def explain(path: Path, links: list[Link], seen: Part, tolerance: float) -> str:
     return f"no known mistake explains {found} instead of {wanted.mass:.4g}, {_list(wanted.com)}, {_list(wanted.inertia)}"
 
 
-def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[[float, str], None]) -> list[Finding]:
+def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[[float, str], None]) -> list[FileAnswer]:
     """Return the answers of engines, by default of those that are installed, for files, by default for the catalogue.
 
     Raise `BadInput` for a file that is not one rigid body, before any engine starts, and `MissingEngine`.
@@ -221,7 +221,7 @@ def compare_files(files: Sequence[Path], engines: Sequence[str], tell: Callable[
     paths = list(files) or sorted(path for path in CATALOGUE.iterdir() if path.suffix != ".obj")
     models = [(path, read_links(path)) for path in paths]
     installed = {each.engine for each in list_environments()} | {name for name in LOCAL if find_spec(name)}
-    findings: list[Finding] = []
+    findings: list[FileAnswer] = []
     with ExitStack() as stack:
         programs = [Program(name) for name in engines or [name for name in LOADERS if name in installed]]
         for program in programs:
@@ -257,10 +257,10 @@ class Program:
             self.worker = environment.start_worker({"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": "1"}, MEMORY)
             self._adapter = str(Path(loaders.__file__).resolve())
 
-    def check(self, path: Path, links: list[Link]) -> Finding:
+    def check(self, path: Path, links: list[Link]) -> FileAnswer:
         """Return the answer of the engine for a file, whose links are given."""
         wanted = join_links(links)
-        cases, flaw, answer = make_cases(wanted), wanted.flaw, partial(Finding, self.label, path.name)
+        cases, flaw, answer = make_cases(wanted), wanted.flaw, partial(FileAnswer, self.label, path.name)
         folder = f"{path.resolve().parent}/"  # which the words of engines may contain
         try:
             with time_limit(LIMIT):

@@ -34,21 +34,21 @@ ONE = "one free rigid body, whose parts are on fixed joints"
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Piece:
     """Mass, kg, centre of mass (3,), m, and inertia about it (3, 3), kg m^2."""
 
     mass: float
     com: Array
     inertia: Array
 
-    def place(self, pose: Array) -> Part:
+    def place(self, pose: Array) -> Piece:
         """Return the part in other axes, in which its own have a pose (4, 4)."""
         R = pose[:3, :3]
-        return Part(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T)
+        return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T)
 
-    def scale(self, factor: float) -> Part:
+    def scale(self, factor: float) -> Piece:
         """Return the part with another density."""
-        return Part(factor * self.mass, self.com, factor * self.inertia)
+        return Piece(factor * self.mass, self.com, factor * self.inertia)
 
     @property
     def flaw(self) -> str:
@@ -71,19 +71,19 @@ class Link:
     mass: float = 0.0
     frame: Array = field(default_factory=lambda: np.eye(4))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    geometry: Part = Part(0.0, np.zeros(3), np.zeros((3, 3)))
+    geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
 
-    def filled(self, part: Part) -> Link:
+    def filled(self, part: Piece) -> Link:
         """Return the link with mass and inertia of a part in its axes."""
         return replace(self, mass=part.mass, frame=make_pose(part.com), inertia=part.inertia)
 
 
-def join_links(links: Iterable[Link]) -> Part:
+def join_links(links: Iterable[Link]) -> Piece:
     """Return links as one part, in the axes of the root link."""
-    return join(Part(each.mass, np.zeros(3), each.inertia).place(each.frame).place(each.pose) for each in links)
+    return join(Piece(each.mass, np.zeros(3), each.inertia).place(each.frame).place(each.pose) for each in links)
 
 
-def join(parts: Iterable[Part]) -> Part:
+def join(parts: Iterable[Piece]) -> Piece:
     """Return several parts as one: J = sum J_i + m_i (d_i.d_i 1 - d_i d_i'), d_i = c_i - c (Steiner)."""
     parts = list(parts)
     mass = sum(part.mass for part in parts)
@@ -92,7 +92,7 @@ def join(parts: Iterable[Part]) -> Part:
     for part in parts:
         d = part.com - com
         inertia = inertia + part.inertia + steiner(part.mass, d)
-    return Part(mass, com, inertia)
+    return Piece(mass, com, inertia)
 
 
 def steiner(mass: float, d: Array) -> Array:
@@ -169,7 +169,7 @@ class _File:
         unit = self.angles * (math.pi / 180 if element.get("degrees") in ("true", "1") else 1.0)
         return make_pose(values[:3], Rotation.from_euler("xyz", unit * np.array(values[3:] or [0, 0, 0])))
 
-    def weigh(self, element: ElementTree.Element, place: Array, density: float = DENSITY) -> list[Part]:
+    def weigh(self, element: ElementTree.Element, place: Array, density: float = DENSITY) -> list[Piece]:
         """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane."""
         form = element[0]
         values = _values(form)
@@ -190,7 +190,7 @@ class _File:
         return weigh(form.tag, sizes, place, density)
 
 
-def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Part]:
+def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
     """Return the part of a shape after an affine map `pose` (4, 4), which may scale it; none for another kind.
 
     Shapes are centred and about the third axis: "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" and
@@ -218,7 +218,7 @@ def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Part]:
         return []
     A, size = pose[:3, :3], density * abs(np.linalg.det(pose[:3, :3])) * math.copysign(1, volume)  # a mesh may be inside out
     second = size * A @ second @ A.T
-    return [Part(size * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]
+    return [Piece(size * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]
 
 
 def _numbers(text: str | None) -> list[float]:
@@ -308,7 +308,7 @@ def _read_usd(file: _File) -> list[Link]:
         attributes = [prim.GetAttribute(name) for name in names]
         return [each.Get() if each and each.HasAuthoredValue() else None for each in attributes]
 
-    def form(prim: Any, pose: Array, density: float) -> list[Part]:
+    def form(prim: Any, pose: Array, density: float) -> list[Piece]:
         kind = prim.GetTypeName().lower()
         if kind == "mesh":
             points, counts, corners = map(np.array, read(prim, "points", "faceVertexCounts", "faceVertexIndices"))
@@ -374,9 +374,9 @@ def _read_mjcf(file: _File) -> list[Link]:
     data, links = mujoco.MjData(model), []
     mujoco.mj_kinematics(model, data)
 
-    def part(model: Any, body: int) -> Part:
+    def part(model: Any, body: int) -> Piece:
         place = make_pose(model.body_ipos[body], Rotation.from_quat(model.body_iquat[body], scalar_first=True))
-        return Part(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body])).place(place)
+        return Piece(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body])).place(place)
 
     for body in range(1, model.nbody):
         link = Link(make_pose(data.xpos[body], data.xmat[body].reshape(3, 3))).filled(part(model, body))

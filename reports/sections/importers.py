@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Table, filled
 
 if TYPE_CHECKING:
-    from conservative.references.importers.compare import Finding
+    from conservative.references.importers.compare import FileAnswer
 
 
-def build(findings: Sequence[Finding]) -> Document:
+def build(findings: Sequence[FileAnswer]) -> Document:
     """Return the document of `compare_files`: a table of files and engines, and what is not right."""
     engines = list(dict.fromkeys(each.engine for each in findings))
     files = list(dict.fromkeys(each.file for each in findings))

@@ -8,7 +8,7 @@ from typing import Any
 
 from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
-from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Spread, ratio
+from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Range, ratio
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, outcome_text
@@ -139,7 +139,7 @@ def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
     )
 
 
-def _ratio(line: EngineLine, seen: Observation) -> Spread | None:
+def _ratio(line: EngineLine, seen: Observation) -> Range | None:
     """Return the time of a step divided by that in the first version that has one."""
     times = line.times or {}
     first = next((times[each.version] for each in _seen(line) if each.version in times), None)
@@ -172,15 +172,15 @@ def _change_text(change: Change) -> str:
         case Order() as was, Order() as now:
             orders = (f"none ({fit.reason})" if math.isnan(fit.slope) else order_text(fit.slope) for fit in (was, now))
             return f"{name} {' → '.join(orders)}"
-        case Spread(), Spread() as now if change.aspect is Aspect.TIME:
+        case Range(), Range() as now if change.aspect is Aspect.TIME:
             return f"{name} {_spread_text(now)} times as long"
-        case Spread(before), Spread(after):
+        case Range(before), Range(after):
             drift = change.aspect is Aspect.DRIFT
             return f"{name} {' → '.join(map(drift_text if drift else number, (before, after)))}{'' if drift else ' rad'}"
     raise AssertionError(change)
 
 
-def _spread_text(spread: Spread) -> str:
+def _spread_text(spread: Range) -> str:
     return f"{number(spread.value)} ({number(spread.low)} to {number(spread.high)})"
 
 

@@ -24,7 +24,7 @@ from conservative.references.importers.compare import (
     identify,
     make_cases,
 )
-from conservative.references.importers.description import Part, join_links, read_links, weigh
+from conservative.references.importers.description import Piece, join_links, read_links, weigh
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
@@ -67,7 +67,7 @@ def test_the_body_of_a_urdf_file_is_that_of_pinocchio_and_yourdfpy(tmp_path):
         path = write_urdf(rng, tmp_path / "body.urdf")
         links = read_links(path)
         inertia = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()).inertias[1]
-        assert distance(join_links(links), Part(inertia.mass, inertia.lever, inertia.inertia)) < 1e-12  # measured: 1.2e-15
+        assert distance(join_links(links), Piece(inertia.mass, inertia.lever, inertia.inertia)) < 1e-12  # measured: 1.2e-15
         robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False).robot
         for link, other in zip(links, robot.links, strict=True):
             assert np.abs(link.frame - other.inertial.origin).max() < 1e-12
@@ -103,7 +103,7 @@ def test_shapes_have_the_inertia_of_their_points():
         mass = 700 * 8 * chosen.mean() * abs(np.linalg.det(pose[:3, :3]))
         d = x - x.mean(axis=0)
         sampled = mass * ((d**2).sum(axis=1).mean() * np.eye(3) - d.T @ d / len(d))
-        assert distance(part, Part(mass, x.mean(axis=0), sampled)) < 0.02, kind  # measured: 3e-3 to 9e-3
+        assert distance(part, Piece(mass, x.mean(axis=0), sampled)) < 0.02, kind  # measured: 3e-3 to 9e-3
 
 
 # ------------------------------------------------------------------------------------- the body that an engine's motion shows
@@ -113,7 +113,7 @@ def test_accelerations_obey_momentum_and_give_the_body_back():
     rng = np.random.default_rng(5)
     for scale in 10.0 ** rng.uniform(-15, 3, 50):
         R = Rotation.random(random_state=rng).as_matrix()
-        part = Part(rng.uniform(0.5, 2) * scale**0.6, rng.normal(size=3) * scale**0.2, scale * (R * (1.1, 2.0, 2.7)) @ R.T)
+        part = Piece(rng.uniform(0.5, 2) * scale**0.6, rng.normal(size=3) * scale**0.2, scale * (R * (1.1, 2.0, 2.7)) @ R.T)
         cases = make_cases(part)
         found = accelerations(part, cases)
         _, w, _, torque = np.reshape(cases, (-1, 4, 3)).transpose(1, 0, 2)
@@ -305,7 +305,7 @@ def test_mujoco_for_javascript_answers_like_mujoco_of_the_same_version():
     assert {name: each.outcome for name, each in here.items()} == {name: each.outcome for name, each in there.items()}
     for name, each in here.items():
         if each.seen:
-            parts = [Part(**{key: np.array(value) for key, value in seen.items()}) for seen in (each.seen, there[name].seen)]
+            parts = [Piece(**{key: np.array(value) for key, value in seen.items()}) for seen in (each.seen, there[name].seen)]
             assert distance(*parts) < 1e-12, name
     assert sum(each.outcome == "right" for each in here.values()) >= 40
 

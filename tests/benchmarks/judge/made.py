@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.judge.diagnose import TEXTBOOK
-from conservative.benchmarks.judge.motion import Case
+from conservative.benchmarks.judge.motion import Compared
 from conservative.references.engine import principal_axes
 from conservative.references.solvers.scipy import state_derivative
 
@@ -25,7 +25,7 @@ T = np.linspace(0, 6, 121)
 
 
 def exact(scene, t=T):
-    return Case(scene, t, (None, None), True).truth(t)
+    return Compared(scene, t, (None, None), True).truth(t)
 
 
 def late(scene, shift):
@@ -60,8 +60,8 @@ def stepped(scene, name, parts, t=T):
         y, before = step(f, (number - 1) * h, y, h, before), f((number - 1) * h, y)
         y[:4] /= np.linalg.norm(y[:4])
         rows += [y] * (number % parts == 0)
-    return Case(scene, t, (None, None), True).motion(np.array(rows))
+    return Compared(scene, t, (None, None), True).motion(np.array(rows))
 
 
 def without(scene, damping=0.0, gyroscopic=False):
-    return Case(scene, T, (None, None), True).move(T, gyroscopic, damping)
+    return Compared(scene, T, (None, None), True).move(T, gyroscopic, damping)

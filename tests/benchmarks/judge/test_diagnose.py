@@ -6,7 +6,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.judge.diagnose import diagnose
-from conservative.benchmarks.judge.motion import Case
+from conservative.benchmarks.judge.motion import Compared
 
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
 
@@ -15,7 +15,7 @@ IMPLICIT = "semi-implicit Euler with an implicit gyroscopic term"
 
 
 def diagnosed(scene, R, w, t=T):
-    return diagnose(Case(scene, t, (None, None), True).read(R, w), quaternion=True)[0]
+    return diagnose(Compared(scene, t, (None, None), True).read(R, w), quaternion=True)[0]
 
 
 FAULTS = {

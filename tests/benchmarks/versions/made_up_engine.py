@@ -5,7 +5,7 @@ from pathlib import Path
 
 from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.comparison import Comparison, Line
-from conservative.benchmarks.versions.engine import Observation, Spread
+from conservative.benchmarks.versions.engine import Observation, Range
 from conservative.benchmarks.versions.version import Version
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.environment import Environment
@@ -16,7 +16,7 @@ TIMES = (1e-6, 1.02e-6, 1.01e-6)
 
 def near(value, relative=0.01):
     """Return a spread about a value."""
-    return Spread(value, *sorted((value * (1 - relative), value * (1 + relative))))
+    return Range(value, *sorted((value * (1 - relative), value * (1 + relative))))
 
 
 GOOD = Observation(

@@ -13,7 +13,7 @@ from conservative.benchmarks.versions.changes import Aspect, find_changes, list_
 from conservative.benchmarks.versions.engine import (
     ERRORS,
     NO_STEP,
-    Spread,
+    Range,
     differ,
     fit_orders,
     plan_versions,
@@ -77,9 +77,9 @@ ALIKE = {
     "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
     "drifts close to the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-3)}),
     "errors within a factor": replace(GOOD, error=near(6e-3)),
-    "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
+    "an error that differs as much by one step more": replace(GOOD, error=Range(3e-1, 4e-3, 4e-1)),
     "no order where the error is the same": replace(GOOD, rates_order=Order(reason="no descent")),
-    "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-3)}),
+    "nothing known of a drift": replace(GOOD, drifts={"energy": Range.of([np.nan]), "momentum": near(9e-3)}),
 }
 
 
@@ -118,7 +118,7 @@ def test_a_time_differs_if_all_repeats_do():
 
 def test_a_ratio_is_that_of_the_shortest_times():
     result = ratio((1.0, 2.0, 4.0), (4.0, 2.0, 3.0))
-    assert result == Spread(2.0, 0.75, 4.0)
+    assert result == Range(2.0, 0.75, 4.0)
     assert not differ((1.0, 2.0), (2.1, 3.0))
     assert differ((1.0, 2.0), (2.6, 3.0))
 
