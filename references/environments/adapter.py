@@ -109,10 +109,10 @@ AnyAdapted = TypeVar("AnyAdapted", bound="AdapterMethod")
 @cache
 def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]:
     """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
-    name = module.__name__.rpartition(".")[2].capitalize()
-    settings = [(name, type(default), field(default=default)) for name, default in module.ENGINE.get("settings", {}).items()]
+    family = module.__name__.rpartition(".")[2]
+    settings = [(name, type(default), default) for name, default in module.ENGINE.get("settings", {}).items()]
     described = {"adapter": module, "__module__": module.__name__, "__doc__": module.__doc__}
-    return make_dataclass(name, settings, bases=(base,), namespace=described, frozen=True)
+    return make_dataclass(family.capitalize(), settings, bases=(base,), namespace=described, frozen=True)
 
 
 class AdapterMethod(Method):
