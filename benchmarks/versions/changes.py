@@ -16,7 +16,8 @@ from conservative.outcome import Outcome
 
 from ..measures.convergence_order import Order
 from ..measures.errors import CONSERVED, SMALL
-from .engine import EngineComparison, Observation, Range, StepTimes, differ, ratio
+from .engine import TIME_FACTOR, EngineComparison, Observation, Range, StepTimes, ratio
+from .times import Ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
 """Orders differ if their difference exceeds the first, and this number of standard errors."""
@@ -46,7 +47,7 @@ class Change:
 
     aspect: Aspect
     was: Outcome | Order | Range
-    now: Outcome | Order | Range
+    now: Outcome | Order | Range | Ratio
     quantity: str = ""
     lost: bool = False
 
@@ -63,8 +64,8 @@ def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_t
     changes = [*_orders(was, now), *_drifts(was, now)]
     if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
         changes.append(Change(Aspect.ERROR, was.error, now.error))
-    if differ(was_times, now_times):
-        changes.append(Change(Aspect.TIME, Range.of(was_times), ratio(was_times, now_times)))
+    if (times := ratio(was_times, now_times)).beyond(TIME_FACTOR):
+        changes.append(Change(Aspect.TIME, Range.of(was_times), times))
     return tuple(changes)
 
 

@@ -30,6 +30,7 @@ from ..studies.line import LinePoint, measure_line
 from ..studies.speed import keep_end, make_timed, shorten
 from ..studies.study import Progress, Study
 from .comparison import TIMING, Comparison, Line, compare
+from .times import Ratio, ratio_of
 from .version import Version
 
 MORE_STEPS = (0, 1, 2)
@@ -41,7 +42,7 @@ REPEATS = 3
 ROUNDS = 3
 """Rounds of a repeat; the fastest call counts."""
 TIME_FACTOR = 1.25
-"""Smallest ratio of times that differ."""
+"""Smallest ratio of times that differ: of the whole interval."""
 ERRORS = (Measure.ATTITUDE_MAX, Measure.RATES_MAX)
 """Errors to which orders are fitted."""
 NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
@@ -53,7 +54,7 @@ NO_ORDER = Order()
 class Range:
     """A value, and its smallest and largest value under changes that should not matter.
 
-    For errors (rad) and drifts (relative) the change is one or two more steps in the run; for times (s) it is a repetition.
+    For errors (rad) and drifts (relative) the change is one or two more steps in the run.
     """
 
     value: float
@@ -173,16 +174,9 @@ EngineLine = Line[Observation, Mapping[str, StepTimes]]
 EngineComparison = Comparison[Observation, Mapping[str, StepTimes]]
 
 
-def differ(was: StepTimes, now: StepTimes) -> bool:
-    """Return whether every time (n,), s, of one version is longer than every time of the other by `TIME_FACTOR`."""
-    if not was or not now:
-        return False
-    return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
-
-
-def ratio(was: StepTimes, now: StepTimes) -> Range:
-    """Return the ratio of the shortest times (n,), s, with the spread of the ratios of single repeats."""
-    return Range.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])
+def ratio(was: StepTimes, now: StepTimes) -> Ratio:
+    """Return the ratio of the times (n,), s, of two versions in the same repeats, with its interval; NaN if one has none."""
+    return ratio_of(list(zip(was, now, strict=True)) if was and now else [])
 
 
 @dataclass
@@ -267,7 +261,7 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     }
     ready = {version: run[1] for version, run in timed.items() if not isinstance(run, Outcome)}
     times = _repeat(study, ready, range(REPEATS))
-    if any(differ(was, now) for was, now in pairwise(times.values())):
+    if any(ratio(was, now).beyond(TIME_FACTOR) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))
         return {version: times[version] + again[version] for version in ready}
     return times

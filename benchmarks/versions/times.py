@@ -67,6 +67,10 @@ class Ratio:
         """True if the whole interval is above the limit."""
         return self.low > 1 + SLOWER
 
+    def beyond(self, factor: float) -> bool:
+        """Return whether the whole interval is above a factor, or below its inverse."""
+        return self.low > factor or self.high < 1 / factor
+
     @property
     def open(self) -> bool:
         """True if the interval contains the limit, so that more processes are needed."""
@@ -184,10 +188,10 @@ def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int) -> tuple[float
 
 
 def ratio_of(times: Sequence[tuple[float, float]], seed: int = 0) -> Ratio:
-    """Return the ratio of times (n, 2), s, of n processes, with its interval; NaN for fewer than two processes."""
+    """Return the ratio of times (n, 2), s, of n processes, with its interval; NaN for fewer than two, or without a time."""
     from scipy.stats import bootstrap
 
-    if len(times) < 2:
+    if len(times) < 2 or not np.isfinite(times).all():
         return Ratio(math.nan, math.nan, math.nan, len(times))
     was, now = np.log(np.array(times)).T
     interval = bootstrap(

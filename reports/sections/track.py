@@ -9,6 +9,7 @@ from typing import Any
 from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
 from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Range, ratio
+from conservative.benchmarks.versions.times import Ratio
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, outcome_text
@@ -24,7 +25,7 @@ _FITTED = ("slope", "stderr", "reason")
 """Fields of an order in the JSON."""
 _WORDS = (
     "Orders are fitted over a range of steps; everything else is at the step of the scene. A time ratio is relative to the "
-    "first version, from rounds that interleave all versions; in parentheses, the variation between repeats."
+    "first version, from rounds that interleave all versions; in parentheses, its interval (as in `gate --against`)."
 )
 
 
@@ -126,7 +127,7 @@ def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
     drifts = [seen.drifts[name].value if name in seen.drifts else math.nan for name in quantities]
     slopes = [fit.slope for fit in (seen.attitude_order, seen.rates_order)]
     time, step_time = _ratio(line, seen), min((line.times or {}).get(seen.version, (math.nan,)))
-    varies = time is not None and time.low != time.high
+    varies = time is not None and number(time.low) != number(time.high)
     return (
         seen.setting or "default",
         seen.version,
@@ -134,12 +135,12 @@ def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
         *(grade(abs(drift), drift_text(drift)) for drift in drifts),
         numeric(seen.error.value),
         outcome_cell(Outcome(seen.outcome.kind)),  # its reason is in the list of unfinished runs
-        DASH if time is None else numeric(time.value, _spread_text(time) if varies else number(time.value)),
+        DASH if time is None else numeric(time.value, _ratio_text(time) if varies else number(time.value)),
         numeric(1e6 * step_time),
     )
 
 
-def _ratio(line: EngineLine, seen: Observation) -> Range | None:
+def _ratio(line: EngineLine, seen: Observation) -> Ratio | None:
     """Return the time of a step divided by that in the first version that has one."""
     times = line.times or {}
     first = next((times[each.version] for each in _seen(line) if each.version in times), None)
@@ -172,16 +173,16 @@ def _change_text(change: Change) -> str:
         case Order() as was, Order() as now:
             orders = (f"none ({fit.reason})" if math.isnan(fit.slope) else order_text(fit.slope) for fit in (was, now))
             return f"{name} {' → '.join(orders)}"
-        case Range(), Range() as now if change.aspect is Aspect.TIME:
-            return f"{name} {_spread_text(now)} times as long"
+        case Range(), Ratio() as now:
+            return f"{name} {_ratio_text(now)} times as long"
         case Range(before), Range(after):
             drift = change.aspect is Aspect.DRIFT
             return f"{name} {' → '.join(map(drift_text if drift else number, (before, after)))}{'' if drift else ' rad'}"
     raise AssertionError(change)
 
 
-def _spread_text(spread: Range) -> str:
-    return f"{number(spread.value)} ({number(spread.low)} to {number(spread.high)})"
+def _ratio_text(ratio: Ratio) -> str:
+    return f"{number(ratio.value)} ({number(ratio.low)} to {number(ratio.high)})"
 
 
 def order_text(order: float) -> str:
