@@ -64,19 +64,23 @@ def _which(answers: dict[str, bool]) -> str:
 
 
 def support() -> str:
-    """Return a row for the methods and engines that take the same parts of scenes, and a column for each part."""
+    """Return a row for the methods and engines that take the same parts of scenes, and a column for parts taken by the same."""
     from conservative.needs import Need
 
     rows: dict[frozenset[Need], list[str]] = {}
     for group in GROUPS:
         for name, kind in entries(group):
             rows.setdefault(kind.card.takes, []).append(f"`{name}`")
+    columns: dict[tuple[bool, ...], list[Need]] = {}
+    for need in Need:
+        columns.setdefault(tuple(need in takes for takes in rows), []).append(need)
+    header = ["", *(", ".join(need.name.lower() for need in needs) for needs in columns.values())]
     lines = [
-        [", ".join(dict.fromkeys(names)), *("✓" if need in takes else "" for need in Need)]
+        [", ".join(dict.fromkeys(names)), *("✓" if needs[0] in takes else "" for needs in columns.values())]
         for takes, names in sorted(rows.items(), key=lambda row: -len(row[0]))
     ]
     words = [f"*{need.name.lower()}*: {need.value}" for need in Need]
-    return table(["", *(need.name.lower() for need in Need)], lines) + f"\n{'; '.join(words)}.\n"
+    return table(header, lines) + f"\n{'; '.join(words)}.\n"
 
 
 def card() -> str:
@@ -106,7 +110,7 @@ def engines(group: str, page: Path) -> str:
 
 def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
     data = getattr(kind, "data", None)  # none: the engine is a class of its own
-    file = kind.adapter.__file__ if data else inspect.getfile(kind)
+    file, words = (kind.adapter.__file__, kind.adapter.__doc__) if data else (inspect.getfile(kind), kind.__doc__)
     package = f"{data.package} ≥ {data.oldest}" if data and data.oldest else data.package if data else name
     origin = {"npm": "npm", "apt": "Debian"}.get(data.kind) if data else None
     texts = [_settings(each.name, each.default, data) for each in dataclasses.fields(kind) if each.name != "precision"]
@@ -114,7 +118,7 @@ def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
     bits = "64 or 32" if precision else "32" if data and data.precision == "f32" else "64"
     link = os.path.relpath(os.path.realpath(file), page.parent)
     package += f" ({origin})" if origin else ""
-    return [f"[`{name}`]({link})", package, "; ".join(texts), bits, summary(kind.__doc__)]
+    return [f"[`{name}`]({link})", package, "; ".join(texts), bits, summary(words)]
 
 
 def _settings(name: str, default: object, data: Any) -> str:

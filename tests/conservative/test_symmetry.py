@@ -154,6 +154,9 @@ def test_symmetries_hold(method, kind, data):
     for symmetry in SYMMETRIES:
         if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
             continue  # equal moments have no axes of their own, and its error depends on the axes
+        structure = method.card.structure(method)
+        if symmetry is reversed_time and not (structure and structure.symmetric) and (method.order or 8) < 8:
+            continue  # twice its truncation error remains
         R, w = symmetry(method, case, plain)
         assert angle_between(plain.R_WB, R).max() < bound, symmetry.__name__
         assert np.abs(plain.w_WB_B - w).max() < bound, symmetry.__name__
