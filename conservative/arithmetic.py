@@ -1,9 +1,9 @@
 """Arithmetic of laws and kernels, written once for floats, for arrays and for numbers of compiled code.
 
 A number is a float, a NumPy array with one element per body, or a `Traced` number, whose operations emit machine instructions
-(`conservative.kernels.traced`). Vectors and quaternions are tuples of numbers, so that compiled code keeps them in registers.
-No function branches on the value of a number. Sums of products state with `fuse` which product is not rounded. Otherwise the
-compiler chooses, and it can choose differently for one body and for several.
+(`conservative.kernels.compiler.traced`). Vectors and quaternions are tuples of numbers, so that compiled code keeps them in
+registers. No function branches on the value of a number. Sums of products state with `fuse` which product is not rounded.
+Otherwise the compiler chooses, and it can choose differently for one body and for several.
 """
 
 from __future__ import annotations

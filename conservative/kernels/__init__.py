@@ -1,11 +1,13 @@
 """Compiled kernels. Importing this package imports numba; `import conservative` alone does not.
 
-`protocol` says what a kernel that takes steps is given and what it returns.
+`protocol` says what a kernel that takes steps is given and what it returns. `compiler` contains all that relies on internals of
+numba and llvmlite.
 
-Numba compares cached code with the file of the outermost function only, so an edit to an inner kernel would run stale code.
-A digest of the files of this folder, of `conservative.potentials` and of `conservative.arithmetic` lies beside the cached code,
-in `__pycache__` and under NUMBA_CACHE_DIR alike; where it is not that of the files as they are, the code is dropped on import.
-Fields of other packages (`fields`) are not part of the digest: after an edit to one, clear the cache.
+Numba compares cached code with the file of the outermost function only, so an edit to an inner kernel would run stale code. A
+digest is therefore stored next to the cached code, in `__pycache__` or in the folder NUMBA_CACHE_DIR. It is made from all files
+of this folder and its subfolders, of `conservative.potentials`, and of `conservative.arithmetic`. If the files have another
+digest at the time of import, all cached code of this folder is deleted. Fields of other packages are not part of the digest.
+After an edit of one, clear the cache.
 
 With NUMBA_DISABLE_JIT=1 nothing is compiled and all kernels run as plain Python, a thousand times slower, for a debugger or a
 coverage report. Results then differ by round-off, as products are not fused with sums, and a division by zero raises.
@@ -16,15 +18,17 @@ from __future__ import annotations
 import hashlib
 import warnings
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from numba import njit
 
 from ..files import write_text
-
-COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
-"""True if kernels are machine code, False if they are plain Python."""
+from .compiler import COMPILED as COMPILED
+from .compiler.parts import SMALL as SMALL
+from .compiler.parts import kernel as kernel
+from .compiler.parts import small as small
 
 
 def _can_cache() -> bool:
@@ -48,32 +52,14 @@ brief: Any = partial(njit, cache=CACHED, error_model="numpy")
 """Compile a function that Python calls and that takes microseconds. It keeps the interpreter's lock: giving it up and taking it
 again is expensive where many threads want it."""
 
-SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
-"""Options of small functions in inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
-
-
-def kernel(function: Any, **options: Any) -> Any:
-    """Compile a function that only kernels call (`parts`).
-
-    IEEE arithmetic as written: no fastmath, as compensated sums must survive.
-    """
-    if not COMPILED:
-        return function
-    from .parts import as_part
-
-    return as_part(function, error_model="numpy", **options)
-
-
-small: Any = partial(kernel, **SMALL)
-"""Compile a small function in an inner loop. Contraction is safe in compensated sums: they have no product to contract with."""
-
 
 def digest(package: Path) -> str:
     """Return a digest of all source files that kernels are compiled from."""
     found = hashlib.sha256()
-    for file in (package / "arithmetic.py", *sorted(package.glob("kernels/*.py")), *sorted(package.glob("potentials/*.py"))):
+    folders = (sorted((package / folder).rglob("*.py")) for folder in ("kernels", "potentials"))
+    for file in (package / "arithmetic.py", *chain(*folders)):
         content = file.read_bytes()
-        found.update(f"{file.name} {len(content)} ".encode() + content)
+        found.update(f"{file.relative_to(package).as_posix()} {len(content)} ".encode() + content)
     return found.hexdigest()
 
 

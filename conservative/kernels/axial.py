@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arithmetic import add, choose, cosine, cross, dot, fuse, root, scale, sine, times
-from .series import HIGHEST, Series, sum_to_order
-from .series import add as add_product
-from .traced import add_lanes, lanes_like
+from .compiler.series import HIGHEST, Series, sum_to_order
+from .compiler.series import add as add_product
+from .compiler.traced import add_lanes, lanes_like
 
 _X, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 NODES, WEIGHTS = 0.5 + 0.5 * _X, 0.5 * _WEIGHTS

@@ -11,11 +11,11 @@ import math
 import numpy as np
 
 from . import entry, kernel
+from .compiler.lanes import FOUR
+from .compiler.signals import call_handlers
 from .fields import no_supply
-from .lanes import FOUR
 from .projected import near_unit, sum_supply, take_step
 from .protocol import record_supply
-from .signals import call_handlers
 
 AGREED = 2.0**-44
 """Largest difference of two crossings, relative: of the finer one a 256th is left."""

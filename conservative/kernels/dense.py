@@ -16,15 +16,15 @@ from typing import Any, NamedTuple
 from ..arithmetic import cosine, root, sine
 from . import entry, kernel
 from .axial import TINY
-from .lanes import REGISTER, load, save_columns
+from .compiler.lanes import REGISTER, load, save_columns
+from .compiler.series import recall
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.traced import trace
+from .compiler.vector import accumulate, dot, every, fill_like, fuse
 from .protocol import Result, find_ends, loosen
-from .series import recall
-from .signals import call_handlers, end_of_block
 from .taylor import BETWEEN, ENOUGH, LEFT, Model, begin, correct, expand, find_sample, project
 from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
-from .traced import trace
-from .vector import accumulate, dot, every, fill_like, fuse
 
 SAFETY, SHORTEST = 0.8, 2.0**-30
 """Factor between a step and the longest that the tolerance allows, and the shortest step, in distances of the grid's times."""

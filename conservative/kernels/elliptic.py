@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from . import kernel
-from .lanes import WIDTH, load, save
-from .vector import choose, fill_like, fuse, some
+from .compiler.lanes import WIDTH, load, save
+from .compiler.vector import choose, fill_like, fuse, some
 
 ROUND = 6755399441055744.0
 """1.5 2^52: adding and subtracting it rounds to the nearest integer."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from . import small
-from .lanes import load_rows, save_rows
-from .traced import trace
-from .vector import accumulate, add, dot, subtract
+from .compiler.lanes import load_rows, save_rows
+from .compiler.traced import trace
+from .compiler.vector import accumulate, add, dot, subtract
 
 
 @trace

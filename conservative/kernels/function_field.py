@@ -20,7 +20,7 @@ if COMPILED:
     from numba.core import cgutils
     from numba.core.registry import cpu_target
 
-    from .traced import DOUBLE, INDEX, INTEGER, Symbol
+    from .compiler.traced import DOUBLE, INDEX, INTEGER, Symbol
 
 BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY, TORQUES, DAMPING, WHEEL = range(7)
 

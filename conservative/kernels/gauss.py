@@ -30,13 +30,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .compiler.lanes import FOUR, lane_of, load, save, splat
+from .compiler.signals import call_handlers
+from .compiler.traced import trace
+from .compiler.vector import accumulate, add, cross, dot, fuse, product, scale, subtract, times, vertical
 from .fields import whole
-from .lanes import FOUR, lane_of, load, save, splat
 from .protocol import Result, Workspace, find_ends, loosen, record
-from .signals import call_handlers
 from .taylor import shortest_move
-from .traced import trace
-from .vector import accumulate, add, cross, dot, fuse, product, scale, subtract, times, vertical
 
 FAILURE = "the step is too long for the iteration"
 """Why a step fails."""

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .lanes import WIDTH, load, load_rows, save_columns, save_rows
+from .compiler.lanes import WIDTH, load, load_rows, save_columns, save_rows
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import add, choose, cross, product
+from .compiler.vector import scale as scale_vector
 from .protocol import Result, Workspace, find_ends, loosen, record
-from .signals import call_handlers, end_of_block
 from .twofold import minus, over, plus, scale, times, two
-from .vector import add, choose, cross, product
-from .vector import scale as scale_vector
 
 TERMS = 22
 SERIES_RADIUS = 0.125

@@ -26,11 +26,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import brief, entry, kernel, small
+from .compiler.lanes import WIDTH, load_rows, save, save_columns, save_rows
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import choose, dot, fill_like, fuse, product
 from .elliptic import find_means, jacobi, sine_and_cosine
-from .lanes import WIDTH, load_rows, save, save_columns, save_rows
 from .protocol import Result, Workspace, find_ends, loosen, record
-from .signals import call_handlers, end_of_block
-from .vector import choose, dot, fill_like, fuse, product
 
 NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.legendre.leggauss(16), strict=True) if x > 0)
 """Nodes and weights of Gauss's quadrature with 16 nodes on [-1, 1], those above 0."""

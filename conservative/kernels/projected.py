@@ -21,6 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .compiler.lanes import FOUR, join, lane_of, load, load_rows, save, save_rows, splat
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import add, cross, dot, fuse, in_body, product, scale, subtract, times
 from .fields import (
     add_supply,
     at_time,
@@ -35,10 +38,7 @@ from .fields import (
     whole,
     with_motor,
 )
-from .lanes import FOUR, join, lane_of, load, load_rows, save, save_rows, splat
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
-from .signals import call_handlers, end_of_block
-from .vector import add, cross, dot, fuse, in_body, product, scale, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""

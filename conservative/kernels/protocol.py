@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from . import small
-from .lanes import save_rows
+from .compiler.lanes import save_rows
 
 
 class Workspace(NamedTuple):

@@ -33,11 +33,9 @@ from typing import Any, NamedTuple
 
 from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
-from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
-from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
-from .signals import call_handlers, end_of_block
-from .vector import (
+from .compiler.lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import (
     accumulate,
     add,
     apply,
@@ -54,6 +52,8 @@ from .vector import (
     times,
     turn,
 )
+from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
+from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 
 FAILURE = "no continuous solution"
 """Why a step fails."""

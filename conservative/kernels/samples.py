@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from . import entry
-from .signals import call_handlers, end_of_block
-from .vector import product
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import product
 
 BLOCK = 2**18
 """Samples between two calls of handlers of signals."""

@@ -44,12 +44,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import add, apply, cross, dot, fuse, invert, scale, subtract, times, turn
 from .elliptic import sine_and_cosine
 from .fields import at_time, body_torque, own, whole
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import add_momentum, turn_attitude
-from .signals import call_handlers, end_of_block
-from .vector import add, apply, cross, dot, fuse, invert, scale, subtract, times, turn
 
 FAILURE = "no solution for c on the branch that begins at a step of length 0, or a free rotation of more than 1,000 rad"
 """Why a step fails."""

@@ -27,12 +27,12 @@ from typing import Any, NamedTuple
 from ..potentials.turning import Turned
 from . import entry, kernel, small
 from .axial import FLAT, TINY, significant
-from .lanes import REGISTER, gather_numbers, load_rows, save_columns, save_rows
+from .compiler.lanes import REGISTER, gather_numbers, load_rows, save_columns, save_rows
+from .compiler.series import Series, Vectors, sum_orders, sum_to_order
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.traced import trace
+from .compiler.vector import accumulate, add, apply, choose, cross, dot, product, scale, some, subtract, times
 from .protocol import Result, Workspace, loosen, record
-from .series import Series, Vectors, sum_orders, sum_to_order
-from .signals import call_handlers, end_of_block
-from .traced import trace
-from .vector import accumulate, add, apply, choose, cross, dot, product, scale, some, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""

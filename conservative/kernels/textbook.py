@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .compiler.signals import call_handlers, end_of_block
+from .compiler.vector import add, apply, cross, dot, in_body, inverse, product, scale, subtract, times
 from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import Model
-from .signals import call_handlers, end_of_block
 from .symplectic import torque
-from .vector import add, apply, cross, dot, in_body, inverse, product, scale, subtract, times
 
 FAILURE = "no solution within 100 corrections"  # of generalised-alpha
 PAUSE = 2**13  # steps between two calls of handlers of signals

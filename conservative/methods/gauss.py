@@ -126,6 +126,6 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
 @lru_cache(maxsize=256)
 def find_coefficients(stages: int, dt: float) -> Any:
     """Return the kernel's coefficients of a step dt, s: stages are filled up with zeros to a multiple of `FOUR`."""
-    table, extra = tableau(stages), (0, -stages % kernels("lanes").FOUR)
+    table, extra = tableau(stages), (0, -stages % kernels("compiler.lanes").FOUR)
     A, E = (np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E))
     return kernels("gauss").Coefficients(stages, A, E, np.pad(table.b, extra), np.pad(table.b_low, extra), dt)

@@ -307,7 +307,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
     )
     motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
-    width, like = kernels("lanes").REGISTER, (zeros_like(start), zeros_like(motion))
+    width, like = kernels("compiler.lanes").REGISTER, (zeros_like(start), zeros_like(motion))
     columns, motions = (stack_columns(list(flatten(each, n)), width) for each in (start, motion))
     m = columns.shape[1]
     spin = np.where(symmetric, spin_rate(moments[:, 0], moments[:, 2], w[:, 2] * moments[:, 2]), 0.0)

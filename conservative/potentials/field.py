@@ -11,7 +11,7 @@ and quaternions q of any length, a field has the functions
     finite_slope(q0, q1)         (D, B), with dV*[j] / dq1[k] = D[j][k] B, for base vectors j and k
     find_constants(J_inverse)    arguments of the next two: all that depends on field and body only
     slope(constants, g)          V and dV/dg, J
-    series(constants, g, series) a function that returns coefficient n of J^-1 T (`kernels.series`)
+    series(constants, g, series) a function that returns coefficient n of J^-1 T (`kernels.compiler.series`)
 
 and for arrays, where numbers are (...) and vectors (..., 3)
 

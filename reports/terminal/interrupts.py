@@ -1,8 +1,8 @@
 """Ctrl-C, SIGTERM and SIGHUP end a command by an exception, so that its temporary files and processes are removed.
 
-Kernels call handlers of signals between blocks of steps (`kernels/signals.py`). During a call of an engine's compiled code a
-signal waits until that call returns. It waits for llvmlite too: an exception between a call of LLVM and the line of Python that
-notes which of the two owns the result makes both free it.
+Kernels call handlers of signals between blocks of steps (`kernels/compiler/signals.py`). During a call of an engine's compiled
+code a signal waits until that call returns. It waits for llvmlite too: an exception between a call of LLVM and the line of
+Python that notes which of the two owns the result makes both free it.
 """
 
 from __future__ import annotations

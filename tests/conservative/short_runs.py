@@ -27,7 +27,7 @@ from conservative.methods.many import Block
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-OTHER = ("conservative.kernels", "conservative.kernels.parts", "conservative.kernels.signals")
+OTHER = ("conservative.kernels.compiler", "conservative.kernels.compiler.parts", "conservative.kernels.compiler.signals")
 """Modules that short runs in plain Python do not call: how kernels are compiled, and what long runs reach."""
 
 
@@ -131,7 +131,7 @@ def numbers(found: cv.Trajectory | Block | None) -> np.ndarray:
 def functions() -> dict[str, str]:
     """Return the names of all functions of the kernels by file and name of their code."""
     found = {}
-    for module in pkgutil.iter_modules(kernels.__path__, "conservative.kernels."):
+    for module in pkgutil.walk_packages(kernels.__path__, "conservative.kernels."):
         if module.name in OTHER:
             continue
         for name, value in vars(importlib.import_module(module.name)).items():

@@ -14,7 +14,8 @@ from numba import njit
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.grid import Grid
-from conservative.kernels import gauss, moser_veselov, reduced, twofold, vector
+from conservative.kernels import gauss, moser_veselov, reduced, twofold
+from conservative.kernels.compiler import vector
 from conservative.methods import reduced as reduced_method
 from conservative.methods.coefficients.gauss_legendre import tableau
 from conservative.methods.gauss import convert, find_coefficients

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -11,12 +12,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.deferred_imports import kernels
 from conservative.kernels import digest
+from conservative.kernels.compiler import TRIED
 from conservative.kernels.protocol import Result, Workspace
 from conservative.registry import list_families
 
@@ -56,7 +59,7 @@ MANY = """
 import sys
 import numpy as np
 import conservative as cv
-from conservative.kernels.lanes import REGISTER
+from conservative.kernels.compiler.lanes import REGISTER
 from conservative.batch import Batch
 from conservative.registry import method
 top, w = cv.scenes.asymmetric_top(), np.random.default_rng(3).normal(size=(11, 3))
@@ -75,6 +78,47 @@ def test_registers_of_four_and_of_eight_floats_agree(method: str, tmp_path: Path
     haswell = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx2,+fma"}
     assert python(["-c", MANY, method, str(short)], **haswell, NUMBA_CACHE_DIR=str(tmp_path)) == "4"
     np.testing.assert_allclose(np.load(short), np.load(own), rtol=0, atol=1e-15)
+
+
+OTHER_VERSION = """
+import sys, warnings
+import numba
+numba.__version__ = sys.argv[1]
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    from conservative.kernels import compiler
+print(len(told), compiler.LINKED, *(each.message for each in told))
+if len(sys.argv) > 2:
+    import numpy as np
+    import conservative as cv
+    top, w = cv.scenes.asymmetric_top(), np.random.default_rng(3).normal(size=(5, 3))
+    runs = {name: cv.integrate(top, 0.02, name, t_end=1.0) for name in ("convected", "reduced", "gauss", "taylor")}
+    runs["moser_veselov"] = cv.integrate(cv.scenes.brick_flip(), 0.02, "moser_veselov", t_end=1.0)
+    runs["lame"] = cv.integrate(cv.scenes.lagrange_top(), 0.02, "lame", t_end=1.0)
+    for name in ("reduced", "taylor"):
+        runs[f"many, {name}"] = cv.integrate_many(top, dt=0.02, w_WB_B0=w, t_end=1.0, method=name)
+    np.savez(sys.argv[2], **{name: run.R_WB for name, run in runs.items()})
+"""
+
+
+@pytest.mark.slow
+def test_kernels_on_a_version_of_numba_that_was_not_tried(tmp_path: Path) -> None:
+    """Measured: the same bits, for `Lame` 7e-16."""
+    plain, ours = tmp_path / "plain.npz", tmp_path / "ours.npz"
+    told = python(["-c", OTHER_VERSION, "99.1.0rc1", str(plain)], NUMBA_CACHE_DIR=str(tmp_path))
+    assert told.startswith("1 False numba 99.1.0rc1 is not one of the tried versions")
+    assert python(["-c", OTHER_VERSION, numba.__version__, str(ours)]) == "0 True"
+    with np.load(plain) as found, np.load(ours) as expected:
+        assert len(found.files) == 8
+        for name in found:
+            np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=3e-15 * (name == "lame"), err_msg=name)
+
+
+def test_the_tried_versions_of_numba_are_those_of_the_project() -> None:
+    """From the oldest one that can be installed to the one that CI installs."""
+    project, pins = ((PACKAGE.parent / name).read_text() for name in ("pyproject.toml", ".ci/constraints.txt"))
+    found = re.search(r'"numba>=(\d+)\.(\d+)"', project), re.search(r"^numba==(\d+)\.(\d+)", pins, re.MULTILINE)
+    assert tuple(tuple(map(int, each.groups())) for each in found if each) == TRIED
 
 
 QUARTER_TURN = """
@@ -110,7 +154,9 @@ def test_an_edit_of_an_inner_function_runs_new_code(tmp_path: Path, setting: str
     assert python(["-c", QUARTER_TURN], **environment) == "-1 1"
 
 
-@pytest.mark.parametrize("file", ["arithmetic.py", "kernels/fields.py", "potentials/point_to_point.py"])
+@pytest.mark.parametrize(
+    "file", ["arithmetic.py", "kernels/fields.py", "kernels/compiler/traced.py", "potentials/point_to_point.py"]
+)
 def test_compiled_code_belongs_to_all_files_that_it_is_made_from(tmp_path: Path, file: str) -> None:
     shutil.copytree(PACKAGE, tmp_path / "copy", ignore=shutil.ignore_patterns("references", "benchmarks", "reports"))
     before = digest(tmp_path / "copy")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..arithmetic import Traced as _Traced
-from ..arithmetic import (
+from ...arithmetic import Traced as _Traced
+from ...arithmetic import (
     accumulate,
     add,
     apply,

@@ -17,7 +17,7 @@ from functools import partial
 
 import numpy as np
 
-from .. import arithmetic
+from ... import arithmetic
 from . import COMPILED, traced
 from .traced import FOUR as FOUR
 from .traced import REGISTER as REGISTER
@@ -30,32 +30,29 @@ Kernels that have no room for two use `REGISTER`."""
 if COMPILED:
     from llvmlite import ir
     from numba.core import cgutils, types
-    from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-    from numba.extending import intrinsic, lower_builtin
+    from numba.extending import intrinsic, lower_builtin, type_callable
 
     from .traced import DOUBLE, INDEX, Lanes, Mask, Symbol, floats_in_register, pack, unpack
 
     def _register(symbol, operation, first, result):
         """Let numba compile `symbol` for lanes as the operation on their symbols."""
+        unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
 
-        class Operator(AbstractTemplate):
-            """The type of the result, for numba."""
+        def result_of(*kinds):
+            widths = {kind.width for kind in kinds if isinstance(kind, first)}
+            others = [kind for kind in kinds if not isinstance(kind, first)]
+            fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
+            return result(*widths) if len(widths) == 1 and fits else None
 
-            def generic(self, args, kws):
-                """Return the signature, None for arguments of other kinds."""
-                widths = {kind.width for kind in args if isinstance(kind, first)}
-                others = [kind for kind in args if not isinstance(kind, first)]
-                fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
-                return signature(result(*widths), *args) if len(widths) == 1 and fits else None
+        # numba passes the arguments of a function with *kinds as one tuple
+        type_callable(symbol)(lambda _: (lambda a: result_of(a)) if unary else (lambda a, b: result_of(a, b)))
 
         def lower(context, builder, sig, args):
             # No flags: the function that is compiled says whether products may be fused.
             numbers = (unpack(builder, *each, ()) for each in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
 
-        infer_global(symbol)(Operator)
         pairs = ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes))
-        unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
         for kinds in [(first,)] if unary else [(Mask, Mask)] if first is Mask else pairs:
             lower_builtin(symbol, *kinds)(lower)
 

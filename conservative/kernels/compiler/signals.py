@@ -11,7 +11,8 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from . import COMPILED, kernel
+from . import COMPILED
+from .parts import kernel
 
 
 @intrinsic

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from ..arithmetic import Traced
+from ...arithmetic import Traced
 from . import COMPILED
 
 FOUR = 4
@@ -31,10 +31,8 @@ if not COMPILED:
 else:
     from llvmlite import ir
     from numba.core import cgutils, types
-    from numba.core.datamodel.registry import register_default
     from numba.core.registry import cpu_target
-    from numba.core.typing.templates import infer, infer_global, make_intrinsic_template
-    from numba.extending import models
+    from numba.extending import lower_builtin, models, register_model, type_callable
 
     DOUBLE, BIT, INTEGER, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
     REGISTER = 2 * FOUR if "+avx512f" in str(cpu_target.target_context.codegen().magic_tuple()) else FOUR
@@ -59,8 +57,8 @@ else:
             self.width = width
             super().__init__(name=f"Mask({width})")
 
-    @register_default(Lanes)
-    @register_default(Mask)
+    @register_model(Lanes)
+    @register_model(Mask)
     class _RegistersModel(models.PrimitiveModel):
         """Lanes and masks in memory: whole registers."""
 
@@ -251,24 +249,22 @@ else:
     def trace(function):
         """Register a function with numba and return it unchanged."""
 
-        def traced(typing, *kinds):
-            # A value that may be None by its type is not None here: numba's cast checks it.
-            kinds = tuple(kind.type if isinstance(kind, types.Optional) else kind for kind in kinds)
-            kinds = tuple(types.int64 if isinstance(kind, types.Integer) else kind for kind in kinds)
-            found = _find_type(function, kinds)
+        @type_callable(function)
+        def find_type(_):
+            def signature_of(*kinds):
+                # A value that may be None by its type is not None here: numba's cast checks it.
+                kinds = tuple(kind.type if isinstance(kind, types.Optional) else kind for kind in kinds)
+                kinds = tuple(types.int64 if isinstance(kind, types.Integer) else kind for kind in kinds)
+                return _find_type(function, kinds)(*kinds)
 
-            def build(context, builder, sig, args):
-                numbers = (unpack(builder, *each) for each in zip(sig.args, args, strict=True))
-                return pack(context, builder, found, function(*numbers))
+            signature_of.pysig = inspect.signature(function)
+            return signature_of
 
-            return found(*kinds), build
+        @lower_builtin(function, types.VarArg(types.Any))
+        def build(context, builder, signature, arguments):
+            numbers = (unpack(builder, *each) for each in zip(signature.args, arguments, strict=True))
+            return pack(context, builder, signature.return_type, function(*numbers))
 
-        parameters = inspect.signature(function).parameters.values()
-        context = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        traced.__signature__ = inspect.Signature([context, *(each.replace(annotation=each.empty) for each in parameters)])
-        template = make_intrinsic_template(function, traced, function.__name__)
-        infer(template)
-        infer_global(function, types.Function(template))
         return function
 
 

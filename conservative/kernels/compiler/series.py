@@ -28,8 +28,8 @@ differential equations by the method of Taylor series (1971).
 
 from __future__ import annotations
 
-from ..arithmetic import Axes, Traced, fuse
-from . import COMPILED
+from ...arithmetic import Axes, Traced, fuse
+from . import COMPILED, LINKED
 from .traced import join
 
 LOWEST, HIGHEST = 4, 18
@@ -45,6 +45,8 @@ if COMPILED:
 
     MOST_STORED = 24 * (HIGHEST + 1)
     """Registers that a step may store."""
+
+if LINKED:
 
     class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
         """A load that LLVM does not move. Otherwise it would keep all coefficients in registers and spill them."""
@@ -66,6 +68,9 @@ if COMPILED:
             """Write the metadata to a list of texts, as llvmlite asks it to."""
             operands = ", ".join([f"!{self.name}", *(each.get_reference() for each in self.operands)])
             buf += (f"distinct !{{ {operands} }}", "\n")
+
+
+if COMPILED:
 
     class Memory:
         """Registers like that of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
@@ -97,7 +102,10 @@ if COMPILED:
 
         def load(self, place):
             """Return the number at a place."""
-            found = VolatileLoad(self.builder.block, self._address(self.count_bytes(place)), "")
+            address = self._address(self.count_bytes(place))
+            if not LINKED:
+                return Symbol(self.builder, [self.builder.load(address, align=self._bytes)])
+            found = VolatileLoad(self.builder.block, address, "")
             self.builder._insert(found)
             return Symbol(self.builder, [found])
 
@@ -276,8 +284,9 @@ class Series:
                 phi.add_incoming(x.registers[0], before)
                 phi.add_incoming(y.registers[0], body)
         branch = builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
-        rolled = builder.module.add_metadata([ir.MetaDataString(builder.module, "llvm.loop.unroll.disable")])
-        branch.set_metadata("llvm.loop", LoopMetadata(builder.module, [rolled]))
+        if LINKED:
+            rolled = builder.module.add_metadata([ir.MetaDataString(builder.module, "llvm.loop.unroll.disable")])
+            branch.set_metadata("llvm.loop", LoopMetadata(builder.module, [rolled]))
         builder.position_at_end(after)
         return [[total] for total in found]
 
