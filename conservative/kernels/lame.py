@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .compiler.lanes import WIDTH, load, load_rows, save_columns, save_rows
+from .compiler.lanes import WIDTH, load, load_rows, save_rows
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import add, choose, cross, product
 from .compiler.vector import scale as scale_vector
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes
 from .twofold import minus, over, plus, scale, times, two
 
 TERMS = 22
@@ -378,7 +378,6 @@ def march_lanes(table, done, last, n_steps, every, q_out, L_out):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                to = i * samples + row
-                save_columns(q_flat, 4 * to, 4 * samples, q)
-                save_columns(L_flat, 3 * to, 3 * samples, (J * w0, J * w1, L2))
+                record_lanes(i, row, samples, q, q_flat)
+                record_lanes(i, row, samples, (J * w0, J * w1, L2), L_flat)
         save_rows(flat, i + CONSTANTS * n, n, q + gamma + (w0, w1, L2))

@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from . import small
-from .compiler.lanes import save_rows
+from .compiler.lanes import save_columns, save_rows
 
 
 class Workspace(NamedTuple):
@@ -68,6 +68,13 @@ def record(row, q, L, q_out, L_out):
     """Store a sample, number by number: for a tuple assigned to a slice numba compiles its text of an error, 2.2 s."""
     q_out[row, 0], q_out[row, 1], q_out[row, 2], q_out[row, 3] = q
     L_out[row, 0], L_out[row, 1], L_out[row, 2] = L
+
+
+@small
+def record_lanes(first, row, samples, values, out):
+    """Store a sample of the bodies in lanes, from number `first` on: `values` of each, in a flat array (bodies, samples, .)."""
+    count = len(values)
+    save_columns(out, count * (first * samples + row), count * samples, values)
 
 
 @small

@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 
 from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .compiler.lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
+from .compiler.lanes import WIDTH, lane_of, load_rows, save_rows, with_lane
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import (
     accumulate,
@@ -53,7 +53,7 @@ from .compiler.vector import (
     turn,
 )
 from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
-from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
+from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes, record_supply
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
@@ -520,8 +520,7 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
             if until_sample == 0 or step == n_steps:
                 until_sample = every_step
                 row += 1
-                to = i * samples + row
-                save_columns(q_flat, 4 * to, 4 * samples, q)
-                save_columns(L_flat, 3 * to, 3 * samples, L)
+                record_lanes(i, row, samples, q, q_flat)
+                record_lanes(i, row, samples, L, L_flat)
         save_rows(all_states, i, n, q + L + q_carry + L_carry + (known,) + newest)
         save_rows(all_states, i + 18 * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH))

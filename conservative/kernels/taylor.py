@@ -27,12 +27,12 @@ from typing import Any, NamedTuple
 from ..potentials.turning import Turned
 from . import entry, kernel, small
 from .axial import FLAT, TINY, significant
-from .compiler.lanes import REGISTER, gather_numbers, load_rows, save_columns, save_rows
+from .compiler.lanes import REGISTER, gather_numbers, load_rows, save_rows
 from .compiler.series import Series, Vectors, sum_orders, sum_to_order
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.traced import trace
 from .compiler.vector import accumulate, add, apply, choose, cross, dot, product, scale, some, subtract, times
-from .protocol import Result, Workspace, loosen, record
+from .protocol import Result, Workspace, loosen, record, record_lanes
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -446,6 +446,6 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
                 needed = (left > ENOUGH) & (failed < 0.5)
                 g1, a1, w1, _, _ = project(bodies.field, body, ENOUGH, g, a, w, left, needed)
                 sample = find_sample(bodies, turn, g1, a1, w1)
-                save_columns(R_WB, 9 * (at * samples + row), 9 * samples, sample[:9])
-                save_columns(w_WB_B, 3 * (at * samples + row), 3 * samples, sample[9:])
+                record_lanes(at, row, samples, sample[:9], R_WB)
+                record_lanes(at, row, samples, sample[9:], w_WB_B)
         save_rows(motions.reshape(-1), at, n, (g, a, w, (failed, defect)))

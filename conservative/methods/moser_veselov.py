@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from ..attitude import Array
 from ..batch import Batch
 from ..card import Card, Structure
 from ..check import choice, set_fields
@@ -32,6 +31,7 @@ SMALLEST_CN = 0.2
 """Lower limit of cn at half a step. At cn = 0, after half a period of the polhode, the quaternion form is singular."""
 BODY_STEP, BODY_SAMPLE = 3e-9, 25e-9
 """Approximate time, s, of a step and of a sample for a body in lanes. They determine how often a run can be stopped."""
+UNIT_VECTORS = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
 """Limit of nu dt of the exact step, with the polhode's frequency nu: cn is above SMALLEST_CN for shorter steps."""
 
@@ -113,20 +113,20 @@ class MoserVeselov(Method):
 
 
 def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, PrincipalStart, Any, Any]:
-    """Return the label of a run, its initial state along `polhode_axes`, the kernel's model, and coefficients of a step dt, s.
+    """Return the label of a run, its start along the polhode's axes, the kernel's model, and coefficients of a step dt, s.
 
     Raise `BadInput` if the quaternion form has no step of this length.
     """
-    kernel, (start, polhode) = kernels("moser_veselov"), scene.derive(find_polhode)
+    kernel, (start, polhode) = kernels("polhode"), scene.derive(find_polhode)
     step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
     if not (math.isfinite(step.r0) and step.C > SMALLEST_CN):
         raise BadInput("dt", f"{dt:g}", "a shorter step")
-    return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
+    return method.label, start, kernels("moser_veselov").Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
 def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | None:
-    """Return the run of many bodies with `march_lanes` of `conservative.kernels.moser_veselov`."""
-    kernel, n, s = kernels("moser_veselov"), len(bodies), grid.n_samples
+    """Return the run of many bodies with `march_lanes` of `conservative.kernels.moser_veselov_lanes`."""
+    kernel, n, s = kernels("moser_veselov_lanes"), len(bodies), grid.n_samples
     time = find_unit_of_time(grid)
     longest = LONGEST_EXACT if method.order is None else LONGEST
     limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
@@ -168,23 +168,9 @@ def step_limit(scene: Scene, exact: bool) -> float:
 
 
 def find_polhode(scene: Scene) -> tuple[PrincipalStart, Any]:
-    """Return the initial state of a scene along `polhode_axes`, and its polhode."""
-    R_BP, moments = scene.body.R_BP, scene.body.moments
-    R_PS = polhode_axes(moments, (scene.w_WB_B0 @ R_BP) * moments)
+    """Return the initial state of a scene along its polhode's axes, and its polhode."""
+    kernel, R_BP, moments = kernels("polhode"), scene.body.R_BP, scene.body.moments
+    principal = zip(moments.tolist(), ((scene.w_WB_B0 @ R_BP) * moments).tolist(), UNIT_VECTORS, strict=True)
+    R_PS = np.column_stack([axis[2:] for axis in kernel.polhode_axes(*((J, L, *e) for J, L, e in principal))])
     start = start_along(scene, R_BP @ R_PS, moments @ np.abs(R_PS))
-    return start, kernels("moser_veselov").polhode(*start.J, *start.L)
-
-
-def polhode_axes(J: Array, L: Array) -> Array:
-    """Return R_PS (3, 3): the axes e1, e2, e3 in principal components. e2 is the intermediate axis; L circles e3.
-
-    J are the moments (3,), kg m^2, and L is the momentum (3,), kg m^2/s, both in principal axes. e3 is the axis of the largest
-    moment if L^2 > 2 E J2, and of the smallest if L^2 < 2 E J2. On the separatrix both are possible.
-    """
-    low, middle, high = np.argsort(J, kind="stable")
-    above = L[high] ** 2 * (J[high] - J[middle]) / J[high] - L[low] ** 2 * (J[middle] - J[low]) / J[low]
-    to_high = above > 0 or (above == 0 and J[high] - J[middle] >= J[middle] - J[low])
-    e2, e3 = np.eye(3)[middle], np.eye(3)[high if to_high else low]
-    if L @ e3 < 0:
-        e3 = -e3
-    return np.column_stack([np.cross(e2, e3), e2, e3])
+    return start, kernel.polhode(*start.J, *start.L)
