@@ -12,13 +12,22 @@ import numpy as np
 from ..deferred_imports import kernels
 from ..errors import Diverged, IntegrationFailed, NotConverged, WrongBranch
 from ..grid import Grid
-from ..method import Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .pieces import list_pieces, march_pieces
 from .principal_axes import PrincipalStart
 
 _NO_COUNTERS = Counters(0)
+
+
+class KernelRun(partial[Trajectory]):
+    """A run, and its function `own_loop` that integrates and does not convert the samples (`Method.prepare`).
+
+    A `partial`, because its calls take 0.04 us more than those of a function; those of a method `__call__` take 0.06 us more.
+    """
+
+    __slots__ = ("own_loop",)
+    own_loop: Callable[[], Any]
 
 
 def prepare_run(
@@ -30,7 +39,7 @@ def prepare_run(
     model: Any,
     coefficients: Any,
     find_coefficients: Callable[[float], Any] | None = None,
-) -> Run:
+) -> KernelRun:
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
 
     Where a load is not smooth, steps are divided: `find_coefficients` returns the coefficients of a part of a step, s.
@@ -51,7 +60,8 @@ def prepare_run(
 
     def run() -> Trajectory:
         nonlocal counts, counters
-        done, stages, corrections, evaluations, size, elsewhere = enter(kernel.PAUSE if in_main_thread() else 0, q, L)
+        pause = kernel.PAUSE if get_ident() == main_thread().ident else 0  # not `in_main_thread()`, which takes 0.04 us more
+        done, stages, corrections, evaluations, size, elsewhere = enter(pause, q, L)
         # Runs share their counters, which are frozen and rarely change: 0.3 us.
         if (done, stages, corrections, evaluations) != counts:
             counts = done, stages, corrections, evaluations
@@ -75,8 +85,9 @@ def prepare_run(
         supplied = L[:finite, 3:].copy() if loaded else None
         return Trajectory(scene, t[:finite].copy(), R_WB[:finite], w_WB_B[:finite], label, counters, failure, None, supplied)
 
-    run.__dict__["own_loop"] = partial(enter, 0, q, L)
-    return run
+    whole = KernelRun(run)
+    whole.own_loop = partial(enter, 0, q, L)
+    return whole
 
 
 def in_main_thread() -> bool:
