@@ -54,7 +54,7 @@ class Result:
 def results(measured: Measured) -> list[Result]:
     """Return the results on the main scene: engines, the largest error first, then the paper's map and our fastest method."""
     scene = measured.main_scene.name
-    rows, here = of_study(measured.rows, "motion", scene), measured.rows[measured.rows["scene"] == scene]
+    rows, here = of_study(measured.rows, motion.STUDY.name, scene), measured.rows[measured.rows["scene"] == scene]
     points = of_scene(measured.points, scene)
     best = cheapest(of_classes(costs(points, [MIDDLE]), MethodClass.GENERAL))
     families = {PAPER_MAP, *points[points["name"] == (best.name if best else "")]["family"]}
