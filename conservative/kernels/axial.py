@@ -91,8 +91,10 @@ class Polhode(NamedTuple):
         series, (w1, w2, w3) = Series(x[0]), self.w
         slope = times((h * (w3 - w2), h * (w1 - w3), h * (w2 - w1)), (x[1] * x[2], x[2] * x[0], x[0] * x[1]))
         vectors = x, slope, scale(h * h, self.linear), scale(h * h, self.product)
+        # The third component is in front, because `sum_oscillation` evaluates the first one at the nodes.
         g, slope, linear, product = (series.vector(v[2], v[0], v[1]) for v in vectors)
         square = g * g * product
+        # The second derivative at the start, and the linear term of the equation there: the derivative of g'' by g.
         sums = sum_oscillation(g, slope, (square * 0.5 + linear) * g, square * 1.5 + linear, product, True)
         change, _, at_nodes = sum_to_order(order, sums)
         third, first, second = series.split(change)

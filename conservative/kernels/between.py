@@ -31,6 +31,7 @@ def cross_gap(n, gap, t, J_inverse, rotor, field, table, q, L, room):
     (weights, columns, starts, nodes), (scaled, slopes) = table, room
     h, supplied = gap / n, no_supply(field)
     for i in range(len(weights)):
+        # Those of the step itself are multiplied afterwards, as in `projected.take_step`.
         scaled[i] = h * weights[i] if i < starts[-2] else weights[i]
     for step in range(n):
         q, L = take_step(h, t + step * h, J_inverse, rotor, field, scaled, columns, starts, nodes, q, L, slopes)
@@ -64,9 +65,11 @@ def move(J_inverse, rotor, field, weights, columns, starts, nodes, size, longest
             call_handlers()
         if gaps[i] == 0.0:
             continue
+        # The smaller float first: an integer of a float beyond its range is undefined in machine code.
         n = max(1, int(min(math.ceil(gaps[i] / longest), 1.0 * MOST)))
         q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
         coarse, off = cross_gap(n, gaps[i], t[i], J_inverse, rotor, field, table, q0, L0, room), math.inf
+        # also if the difference is nan
         while not off <= AGREED:
             n *= 2
             if n > MOST:

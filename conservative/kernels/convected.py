@@ -42,6 +42,7 @@ def C(q):
     out = np.zeros((6, 9))
     for i in range(3):
         q1, q2, q3 = q[i], q[3 + i], q[6 + i]
+        # (q1.q1 - 1)/2 and its kin, then q2.q3, q3.q1 and q1.q2: the shear strains count twice.
         out[0, i], out[1, 3 + i], out[2, 6 + i] = q1, q2, q3
         out[3, 3 + i], out[3, 6 + i] = q3, q2
         out[4, i], out[4, 6 + i] = q3, q1

@@ -106,6 +106,7 @@ def march(model, frame, order, h, tolerance, n_steps, sampled, pause, lanes, R_W
             computed += 1
             last, before = sizes[0] + TINY, sizes[1] + TINY
             factor = min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
+            # The factor of a step that overflows is 0 or nan: a tenth of its length is tried.
             if not factor >= 1.0 and length > SHORTEST:
                 length *= SAFETY * factor if factor > 0.1 else 0.1
                 continue
@@ -130,6 +131,7 @@ def march(model, frame, order, h, tolerance, n_steps, sampled, pause, lanes, R_W
                         first = (following - whole) - rest
             g, a, w = g1, a1, w1
             steps += 1
+            # Whole distances are counted as integers, so that late times have as many digits as early ones.
             rest, carry = accumulate(rest, carry, length)
             passed = math.floor(rest)
             whole, rest = whole + int(passed), rest - passed

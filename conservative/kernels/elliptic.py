@@ -52,10 +52,12 @@ def polynomial(z, terms):
 def sine_and_cosine(x):
     """Return sin x and cos x for |x| below about 1e5, with errors of about one unit in the last place."""
     n = (x * (2.0 / math.pi) + ROUND) - ROUND
+    # Cody and Waite (1980): the parts of pi/2 are subtracted one by one, so that r keeps its digits near multiples of it.
     r = fuse(-n, PI_3, fuse(-n, PI_2, fuse(-n, PI_1, x)))
     z = r * r
     s = fuse(z * r, polynomial(z, SINE), r)
     c = fuse(z * z, polynomial(z, COSINE), fuse(z, -0.5, 1.0))
+    # the quadrant, as a float: lanes have no integers
     k = n - 4.0 * ((0.25 * n + ROUND) - ROUND)  # -2, -1, 0, 1 or 2
     odd = k * k == 1.0
     sine, cosine = choose(odd, c, s), choose(odd, s, c)
@@ -75,11 +77,13 @@ def find_means(mc):
     going = one > 0.0
     for i in range(LEVELS):
         levels = i
+        # b is the square of the geometric mean between the end of a pass and here.
         b = math.sqrt(b)
         save(means, 3 * i * WIDTH, a)
         save(means, (3 * i + 1) * WIDTH, 1.0 / a)
         save(means, (3 * i + 2) * WIDTH, b)
         last, limit = choose(going, float(i) * one, last), choose(going, 0.5 * (a + b), limit)
+        # The means agree to twice as many digits after each pass, so 1e-9 leaves nothing in the next.
         going = going & (abs(a - b) > 1e-9 * a)
         if not some(going):
             break
@@ -103,6 +107,7 @@ def jacobi(u, found):
             load(means, (3 * i + 1) * WIDTH, u),
             load(means, (3 * i + 2) * WIDTH, u),
         )
+        # A lane does not change at levels beyond its own last one.
         passed = last >= float(i)
         a_new = a * c
         c, dn = choose(passed, c * dn, c), choose(passed, (smaller + a_new) / (larger + a_new), dn)

@@ -87,6 +87,7 @@ class Coefficients(NamedTuple):
 def rates(J_inverse, rotor, c, L, g):
     """(L', gamma') of four states."""
     w = (J_inverse[0] * L[0], J_inverse[1] * L[1], J_inverse[2] * L[2])
+    # -w, so that differences of products are fused sums too
     v = (-J_inverse[0] * L[0], -J_inverse[1] * L[1], -J_inverse[2] * L[2])
     if rotor is not None:
         L = (L[0] + splat(rotor[0]), L[1] + splat(rotor[1]), L[2] + splat(rotor[2]))
@@ -153,6 +154,7 @@ def sweep(M, s, h, J_inverse, rotor, c, L0, g0, F, old, new, Z):
         dL, dg = combine(M, s, width, i, F, old)
         L, g = shift(L0, step, dL), shift(g0, step, dg)
         n, v = rates(J_inverse, rotor, c, L, g)
+        # F has two halves, so that all stages see the rates of the last sweep, in any order of the loop.
         put_six(F, width, new + i, n, v)
         before = load_six(Z, width, i)
         square = add_squares(g, before[1], add_squares(L, before[0], square))
@@ -171,6 +173,7 @@ def solve_stages(A, s, h, J_inverse, rotor, c, L, g, F, old, Z):
     for sweeps in range(1, MOST_SWEEPS + 1):
         square = sweep(A, s, h, J_inverse, rotor, c, L, g, F, old, new, Z)
         old, new = new, old
+        # The change at least halves. If it goes on so, the square of the next one is square^2 / before.
         fast = 4.0 * square < before
         if (fast and square * square <= ENOUGH * before) or (not fast and square < STAGNATION):
             return old, sweeps, square, True
@@ -260,6 +263,7 @@ def weigh(b, b_low, F, at):
     zero = splat(0.0)
     n, v = (zero, zero, zero), (zero, zero, zero)
     for i in range(0, width, FOUR):
+        # The low parts first: added to the sum of the high parts they would be rounded away.
         x, y = load_six(F, width, at + i)
         n, v = add_weighted(load(b_low, i, FOUR), x, n), add_weighted(load(b_low, i, FOUR), y, v)
     for i in range(0, width, FOUR):
@@ -301,6 +305,7 @@ def remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, g, g_ca
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
         return L, L_carry, g, g_carry
     w, T = times(J_inverse, L), cross(g, c)
+    # Energy and momentum are linear in gamma, so its new length changes them by longer c.gamma and longer L.gamma.
     dL, turn, _ = move(loose, (size, 1.0), w, whole(rotor, L), T, e - longer * dot(c, g), m - longer * now[1], g)
     L, L_carry = add_carried(L, L_carry, dL)
     g, g_carry = add_carried(g, g_carry, add(scale(longer, g), cross(g, turn)))
@@ -320,6 +325,7 @@ def march(model, coefficients, workspace):
     kept = values(J_inverse, rotor, c, L, gamma)
     size = 0.5 * dot(L, times(J_inverse, L)) + math.sqrt(dot(c, c))
     store(0, left, phi, q, gamma, unit, L, q_out, L_out)
+    # The first step has no polynomial to continue. Its guess has the rates of the start in all stages.
     hold_rates(J_inverse, rotor, c, L, gamma, F, width)
     guess, row, work, square, until_pause = A, 0, 0, 0.0, pause
     for step in range(1, n_steps + 1):
@@ -340,6 +346,7 @@ def march(model, coefficients, workspace):
         q, q_carry = carry_attitude(q, q_carry, a, length, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1
+            # `accumulate` carries what the sum has too much.
             store(row, left, phi - phi_carry, q, gamma, unit, L, q_out, L_out)
         until_pause -= sweeps
         if until_pause <= 0 < pause:

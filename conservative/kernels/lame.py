@@ -66,6 +66,7 @@ def curve(J, kappa, gamma, L):
     ww = plus(plus(times(w[0], w[0]), times(w[1], w[1])), times(w[2], w[2]))
     E = plus(scale(0.5, ww), times(k, g[2]))
     z = plus(plus(times(w[0], g[0]), times(w[1], g[1])), times(w[2], g[2]))
+    # nu = k/2, x0 = -E/6 and upper = nu + x0: in these, g2 and g3 are those of `conservative.methods.lame`.
     nu, x0 = scale(0.5, k), times(E, over(two(-1.0), two(6.0)))
     upper = plus(x0, nu)
     g2 = minus(scale(12.0, times(x0, x0)), scale(2.0, times(nu, minus(times(z, w[2]), scale(2.0, nu)))))
@@ -78,6 +79,7 @@ def curve(J, kappa, gamma, L):
 @kernel
 def scale_of(g2, g3, B):
     """A rate, 1/s, above which the series of this curve have nothing left to resolve."""
+    # g2, g3 and B have the dimensions of a fourth, a sixth and a second power of a rate.
     size = max(math.sqrt(abs(g2[0])), abs(g3[0]) ** (1.0 / 3.0))
     for n in range(3):
         size = max(size, abs(B[n, 0]))
@@ -89,6 +91,7 @@ def series(g2, g3, B, t):
     """Return p, p' and, for each of three B, the regular solution f of f'' = (2 p + B) f and f' at a short time t (twofold)."""
     c = np.zeros((TERMS, 2))
     T = times(t, t)
+    # p = 1/t^2 + sum of c_k t^(2k-2): Abramowitz and Stegun, 18.5.1 to 18.5.3
     c[2, 0], c[2, 1] = over(g2, two(20.0))
     c[3, 0], c[3, 1] = over(g3, two(28.0))
     for k in range(4, TERMS):
@@ -107,6 +110,7 @@ def series(g2, g3, B, t):
     a = np.empty((TERMS, 2))
     for n in range(3):
         b = (B[n, 0], B[n, 1])
+        # f = t^2 times the sum of a_j t^(2j). The -2 below is of the pole of 2 p.
         a[0, 0], a[0, 1] = 1.0, 0.0
         for j in range(1, TERMS):
             total = times(b, (a[j - 1, 0], a[j - 1, 1]))
@@ -130,6 +134,7 @@ def constants(g2, g3, B, h):
         halvings += 1
     p, dp, f = series(g2, g3, B, two(h * 0.5**halvings))
     for _ in range(halvings):
+        # p''/(2 p'), the limit of the slope of the addition theorem for equal arguments
         S = over(minus(scale(6.0, times(p, p)), scale(0.5, g2)), scale(2.0, dp))
         p2 = minus(times(S, S), scale(2.0, p))
         dp2 = minus(scale(2.0, times(S, minus(p, p2))), dp)
@@ -141,6 +146,7 @@ def constants(g2, g3, B, h):
             A = times(third, minus(times(y, plus(scale(2.0, p), b)), slope))
             D = times(third, minus(times(y, plus(plus(p, p2), b)), slope))
             b_ = times(third, minus(dy, times(y, S)))
+            # The propagator ((A, b), (C, D)) of an equation without a term in y' has determinant 1.
             C = over(minus(times(A, D), two(1.0)), b_)
             f[n, 0, 0], f[n, 0, 1] = plus(times(A, y), times(b_, dy))
             f[n, 1, 0], f[n, 1, 1] = plus(times(C, y), times(D, dy))
@@ -162,6 +168,7 @@ def split_step(g2, g3, B, h):
         p, dp, f = constants(g2, g3, B, part)
         if p * part * part <= LARGEST_POLE:
             return parts, p, dp, f
+        # One more, not twice as many: a step takes as long as it has parts.
         parts += 1
         if parts % PARTS_AT_ONCE == 0:
             call_handlers()
@@ -274,6 +281,7 @@ def advance(c, q, gamma, w0, w1):
     b = ((c.da - c.ya * S) * third, (c.db - c.yb * S) * third)
     d = turn(a, b, gamma, (w0, w1, c.w2))
     am, bm = (c.ym * (c.cm + x) - c.dm * S) * third, (c.dm - c.ym * S) * third
+    # M = exp(i w3 t/2) (w1 + i w2) starts at w1 + i w2 in each part. The next line turns it back.
     m0, m1 = am * w0 + bm * (c.k * g1 - half * w1), am * w1 + bm * (half * w0 - c.k * g0)
     w0, w1 = c.cos * m0 + c.sin * m1, c.cos * m1 - c.sin * m0
     q = product(q, d)
@@ -347,6 +355,7 @@ def take_step(c, parts, least, most, q, gamma, w0, w1):
     """Take a step of so many parts, which differ from lane to lane: `least` of them at least, `most` at most."""
     for part in range(most):
         q1, gamma1, v0, v1 = advance(c, q, gamma, w0, w1)
+        # All lanes take these parts, without a choice.
         if part < least:
             q, gamma, w0, w1 = q1, gamma1, v0, v1
         else:

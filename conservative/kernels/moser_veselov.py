@@ -135,6 +135,7 @@ def advance(k, at):
 def take_steps(k, at, done, last):
     """Return the state after `last` steps from the state after `done` steps."""
     while done < last:
+        # At multiples of RESCALE: results do not depend on where samples and pauses are.
         end = min(last, done - done % RESCALE + RESCALE)
         for _ in range(end - done):
             at = advance(k, at)

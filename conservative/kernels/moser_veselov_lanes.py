@@ -46,6 +46,7 @@ def gather(first, moments, R_BP, R_WB0, w_WB_B0, time, room):
 @kernel
 def quaternion(x, y, z):
     """Return the unit quaternion of the matrix with these columns, computed from its largest component."""
+    # The rule of `attitude.to_quaternion`. That one is for NumPy, needs no numba, and divides: the last bits differ.
     wx, wy, wz = y[2] - z[1], z[0] - x[2], x[1] - y[0]
     xy, xz, yz = x[1] + y[0], x[2] + z[0], y[2] + z[1]
     largest, q1, q2, q3 = 1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]
@@ -69,7 +70,7 @@ def turn(R, a):
 
 @kernel
 def step_of_order(p, h, order, room):
-    """`preprocessed_step` of each body, one after the other."""
+    """`preprocessed_step` of each body, one after the other: it branches on their numbers."""
     save_rows(room, 0, WIDTH, p)
     for i in range(WIDTH):
         a = room[i::WIDTH]
@@ -107,6 +108,7 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
         # There is a step below the limits whose squares stay in the range of floats.
         angle = math.sqrt(dot(w, w)) * h
         known = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
+        # The last condition: r0 is finite. The difference of infinity or nan with itself is nan.
         known = known & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
         finished = choose(known, 1.0, 0.0 * h)
         save_rows(flat, first + SHIFT * columns, columns, k)
@@ -144,6 +146,7 @@ def march_lanes(table, states, done, last, n_steps, every, R_WB, w_WB_B):
     for first in range(0, columns, WIDTH):
         k = Shift(*load_rows(flat, first + SHIFT * columns, columns, 15, WIDTH))
         at = State(*load_rows(states.reshape(-1), first, columns, STATE_ROWS, WIDTH))
+        # Row 0 is the start, which the first call stores.
         row, here = (done // every + 1 if done > 0 else 0), done
         while here < last or row == 0:
             sample = min(row * every, n_steps)

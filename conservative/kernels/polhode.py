@@ -94,6 +94,7 @@ def polhode(J1, J2, J3, L1, L2, L3):
     l = math.sqrt(L1 * L1 + L2 * L2 + L3 * L3)  # noqa: E741
     E = 0.5 * (L1 * L1 / J1 + L2 * L2 / J2 + L3 * L3 / J3)
     one, zero = fill_like(1.0, l), fill_like(0.0, l)
+    # Lanes compute both sides of a choice: divisors and arguments of roots on the side that is not taken are replaced.
     stays = (J3 == J2) | (l == 0.0)
     sign = choose(J3 > J1, one, -one)
     no1 = sign * (L3 * L3 * (J3 - J1) / J3 + L2 * L2 * (J2 - J1) / J2)
@@ -106,10 +107,12 @@ def polhode(J1, J2, J3, L1, L2, L3):
     A3 = choose(stays, L3, math.sqrt(no1 * J3 / gap31))
     flat = stays | (no1 <= 0.0)
     below = choose(flat, one, gap32 * no1)
+    # Near the separatrix, where mc is 0, round-off can give no2 the wrong sign.
     m, mc = choose(flat, zero, gap21 * no3 / below), choose(flat, one, max(gap31 * no2 / below, 0.0))
     nu = choose(stays, zero, sign * math.sqrt(gap32 * no1 / (J1 * J2 * J3)))
     still = (A1 == 0.0) | (A2 == 0.0)
     s, c = choose(still, zero, L2 / choose(still, one, A2)), choose(still, one, L1 / choose(still, one, A1))
+    # d from c and mc: 1 - m s^2 would cancel near the separatrix, where d can be small.
     return Polhode(J1, J2, J3, A1, A2, A3, l, E, m, mc, nu, s, c, math.sqrt(mc + m * c * c))
 
 
@@ -260,6 +263,7 @@ def preprocessed_step(p, h, order):
         last_S, last_defect = S, defect
         S -= defect * slope
     r1, r3 = k1 * C * g, k3 * D * g
+    # S, sn of half the shift, is below 1 for a shift below half a period. g is nan if there is no Cayley vector.
     r0 = 1.0 if math.isfinite(g) and abs(S) < 1.0 else math.nan
     return Step(S, C, D, r0, r1, intermediate(p, C, D, r1, r3), r3)
 

@@ -213,6 +213,7 @@ def project(J_inverse, rotor, field, axis, turn, kept, scales, q, L):
         now = values(J_inverse, rotor, field, axis, turn, q, L)
         e, m = kept[0] - now[0] if scales[0] < math.inf else 0.0, kept[1] - now[1]
         defect = max(abs(e) / scales[0], abs(m) / scales[1])
+        # Also if the defect is nan, which no comparison accepts; `march` then ends.
         if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
             return q, L, corrections, defect
         corrections += 1
@@ -227,6 +228,7 @@ def march(model, coefficients, workspace):
     J_inverse, field, axis, turn, scales, q, L, rotor = model
     weights, columns, starts, nodes, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
+    # The caller uses the same array for all runs.
     weights = weights.copy()
     for i in range(starts[-2]):  # not one product of a slice: numba compiles the text of its error for that
         weights[i] *= h

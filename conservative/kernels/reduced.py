@@ -120,6 +120,7 @@ def guess_ahead(past):
 def extrapolate(k, past):
     """Component k of `guess_ahead`."""
     a, b, c, d, e, f = past
+    # Binomial coefficients: the sixth difference of seven successive values is 0.
     # The newest comes last: a processor sums the rest while it still computes the newest.
     return ((20.0 * c[k] - 15.0 * (b[k] + d[k])) + (6.0 * e[k] - f[k])) + 6.0 * a[k]
 
@@ -223,6 +224,7 @@ def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
         close = dot(away, away) <= near * aa + NEAR_ZERO
         iterations += 1
     a, gain = final_correction(h, J, field, rotor, q, L, carry, rows, a)
+    # The determinant of the tangent is positive at a = 0. On the continuous branch it cannot change its sign.
     return a, gain, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
 
 
@@ -248,8 +250,10 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
             continue
         if aim == 1.0:
             return found, gain, corrections, size, True
+        # Parts that were halved before a bend of the branch grow again behind it.
         a, reached, part = found, aim, 2.0 * part
         rows = inverse_tangent(hs, J, field, rotor, q, a)
+        # a'(h): forcing(h)/2 is the derivative of the right side by h, and (h/2) forcing(h/2) the right side itself.
         slope = scale(0.5, apply(rows, forcing(hs, field, rotor, q, L, a)))
     r = residual(h, J, field, rotor, q, L, a)
     f = forcing(0.5 * h, field, rotor, q, L, a)
@@ -290,11 +294,14 @@ def march(model, coefficients, workspace):
     J, J_inverse, field, rotor = model.J, model.J_inverse, model.field, model.rotor
     n_steps, every, pause, q_out, L_out = workspace
     lengths = coefficients.lengths
-    tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
+    # After a Newton correction of size d, one more with the same tangent (`final_correction`) leaves an error of about d^3.
+    # Squares of d are compared.
+    tolerance = coefficients.tolerance ** (2.0 / 3.0)
     record(0, model.q, model.L, q_out, L_out)
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0), no_supply(field))
     record_supply(0, state[4], L_out)
     at, row, corrections, history = (1, 0), 0, 0, no_history()
+    # `pause` counts stages, and a block steps: rounded up, so that a block has at least one.
     block = -(-pause // len(lengths))
     left = block
     while True:
@@ -322,6 +329,7 @@ def march(model, coefficients, workspace):
             L, L_carry = react(L, L_carry, half)
             supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
+            # The history lacks this stage, so its solutions are no longer the last ones at equal distances.
             at, state, history = (step, stage + 1), (q, q_carry, L, L_carry, supplied), no_history()
             left -= DEAR
         left -= step - first
@@ -356,6 +364,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
             h, t = lengths[stage], find_start(lengths, step, stage)
             now = at_step(field, t, h)
             mean, half = step_rotor(field, rotor, t, h)
+            # L stays as it is before the stage: if the solution is not trusted, `march` solves the stage from there.
             M, M_carry = react(L, L_carry, half)
             a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
             a, gain, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
@@ -385,6 +394,7 @@ def find_start(lengths, step, stage):
     """Return the time, s, at which a stage of a step starts. Without loads its callers do not use it, and it is left out."""
     t = 0.0
     for i in range(len(lengths)):
+        # Products, whose rounding does not add up as that of a sum over all steps would.
         t += (step - 1) * lengths[i] if i >= stage else step * lengths[i]
     return t
 
@@ -417,6 +427,7 @@ def turn_attitude(a, q, carry):
     """
     square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # explicit, for the same bits in lanes
     root = math.sqrt(1.0 + square)
+    # 1/root - 1 without cancellation
     c = -square / (root * (1.0 + root))
     p = turn(q, a)
     w, cw = accumulate(q[0], carry[0], p[0] + c * (q[0] + p[0]))
@@ -453,6 +464,7 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted
 
     A body without a solution is brought to rest, where it needs no further work, and noted in `finished`.
     """
+    # Floats, because `lane_of` cannot read a truth value.
     alone = choose(trusted, fill_like(0.0, a[0]), fill_like(1.0, a[0]))
     rest = (0.0, 0.0, 0.0)
     for i in range(WIDTH):

@@ -29,6 +29,7 @@ def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
             if spin is not None:
                 cos, sin = math.cos(0.5 * spin[0] * t[i]), math.sin(0.5 * spin[0] * t[i])
                 w, x, y, z = product((w, x, y, z), (cos, 0.0, 0.0, sin))
+                # Rates turn by the whole angle, whose half is in the quaternion.
                 c, s = 1.0 - 2.0 * sin * sin, 2.0 * sin * cos
                 rates = (c * rates[0] + s * rates[1], c * rates[1] - s * rates[0], L[i, 2] * spin[1])
             s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -47,6 +48,7 @@ def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
                         R_WB[i, j, k] = rows[j][0] * R_BP[k, 0] + rows[j][1] * R_BP[k, 1] + rows[j][2] * R_BP[k, 2]
                     w_WB_B[i, j] = R_BP[j, 0] * rates[0] + R_BP[j, 1] * rates[1] + R_BP[j, 2] * rates[2]
                 size += abs(R_WB[i, j, 0]) + abs(R_WB[i, j, 1]) + abs(R_WB[i, j, 2]) + abs(w_WB_B[i, j])
+            # One test for twelve numbers. Later samples do not count once one is not finite.
             if finite == i and math.isfinite(size):
                 finite = i + 1
         done = last

@@ -106,6 +106,7 @@ def half_step(half, alpha, beta, l, A3):  # noqa: E741
     t = half * half
     y = half * (0.5 + t * (y1 + t * (0.05 * y3 + t * y5)))
     time, phi, square = 0.0, 0.0, y * y
+    # The integrands are even, so the positive nodes on [-y, y], with their weights, give the integral from 0 to y.
     for i in range(4):
         node, weight = NODES[i]
         up = 1.0 + alpha * square * (node * node)
@@ -115,6 +116,7 @@ def half_step(half, alpha, beta, l, A3):  # noqa: E741
         time, phi = time + r * below, phi + r * up
     up = 1.0 + alpha * square
     W = math.sqrt(up * up - 4.0 * beta * square)
+    # dt = 2 dy / W and dphi = u dt / (l u + A3 W), at the end of the half step
     late = half - time
     phi += late * up / (l * up + A3 * W)
     y += 0.5 * late * W
@@ -246,6 +248,7 @@ def rotate(kind, h, t, J, k, rotor, field, q, q_carry, L, L_carry):
         w, (g1, g2, g3) = times(k, L), (k[2] - k[1], k[0] - k[2], k[1] - k[0])
         x, y, z = L[0] * L[0], L[1] * L[1], L[2] * L[2]
         nu_squared = max(g1 * (g3 * y - g2 * z), g3 * (g1 * y - g2 * x))
+        # So that nu h < 1/2 and |w| h < 2 in each part, as `rotate_exactly` requires. The number can be nan.
         parts = 1.0 + abs(h) * math.sqrt(4.0 * nu_squared + 0.25 * dot(w, w))
         if not parts < MOST_PARTS:
             return q, q_carry, L, L_carry, 0, parts, False

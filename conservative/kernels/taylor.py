@@ -185,6 +185,7 @@ def shortest_move(loose, scales, w, L, T, e, m, g):
     mm = square * dot(g, g) + dot(turn, turn) + FLAT * square
     em = square * dot(w, g) - dot(T, turn)
     over = 1.0 / ((1.0 + DEPENDENT) * (ee * mm) - em * em)
+    # Cramer's rule for ee x + em y = e, em x + mm y = m: no branch, and one division
     x, y = over * (mm * e - em * m), over * (ee * m - em * e)
     rest = over * (DEPENDENT * (ee * mm) + FLAT * (scales[0] * scales[0] * mm + square * ee))
     return scale(square, add(scale(x, w), scale(y, g))), add(scale(-x, T), scale(y, turn)), rest
@@ -305,6 +306,7 @@ def project(field, body, enough, g, a, w, left, needed):
 @small
 def quaternion(g, a):
     """Return the quaternion, of any length, of the matrix with third row g and first row a."""
+    # One body can branch, and computes one of four formulas. The length has no meaning (`samples.to_body_axes`).
     b = cross(g, a)
     trace = a[0] + b[1] + g[2]
     if trace > 0.0:
@@ -348,6 +350,7 @@ def march(model, coefficients, workspace):
                 record(row, product(left, quaternion(g1, a1)), times(model.J, w1), q_out, L_out)
         if done < n_steps:
             call_handlers()
+    # The step that failed was computed, too.
     taken = done + (not defect < LEFT)
     return Result(done, done * order, corrections, taken * order, defect, False)
 

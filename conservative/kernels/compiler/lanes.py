@@ -81,6 +81,7 @@ if COMPILED:
             return builder.load(_place(context, builder, array, index))
         floats = floats_in_register(kind.width)
         vector, places = ir.VectorType(DOUBLE, floats), [_move(builder, index, i) for i in range(0, kind.width, floats)]
+        # The array is aligned to its floats only, not to a register.
         registers = [builder.load(_place(context, builder, array, each, vector), align=8) for each in places]
         return pack(context, builder, kind, Symbol(builder, registers))
 

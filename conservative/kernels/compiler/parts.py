@@ -36,6 +36,7 @@ if LINKED:
 
         def finalize(self) -> None:
             """Link the parts that this one calls; the rest is left to the caller's library."""
+            # Each once: every call of a part has added its library.
             for library in dict.fromkeys(self._linking_libraries):
                 self._reload_init.update(library._reload_init)
                 self._final_module.link_in(library._get_module_for_linking(), preserve=True)

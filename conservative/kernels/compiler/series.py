@@ -285,6 +285,7 @@ class Series:
                 phi.add_incoming(y.registers[0], body)
         branch = builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
         if LINKED:
+            # Unrolled, loops of all orders would not fit into the instruction cache.
             rolled = builder.module.add_metadata([ir.MetaDataString(builder.module, "llvm.loop.unroll.disable")])
             branch.set_metadata("llvm.loop", LoopMetadata(builder.module, [rolled]))
         builder.position_at_end(after)

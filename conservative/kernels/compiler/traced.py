@@ -287,6 +287,7 @@ def add_lanes(x):
     function_type = ir.FunctionType(DOUBLE, [DOUBLE, whole.type])
     name = f"llvm.vector.reduce.fadd.v{whole.type.count}f64"
     function = cgutils.get_or_insert_function(x.builder.module, function_type, name)
+    # -0.0 is the neutral element of sums. With "reassoc" LLVM adds halves, instead of one float after the other.
     return Symbol(x.builder, [x.builder.call(function, [ir.Constant(DOUBLE, -0.0), whole], fastmath=("reassoc",))])
 
 
