@@ -62,14 +62,6 @@ class BlockResult:
     failures: dict[int, IntegrationFailed]
     supplied: Array | None = None
 
-    def put(self, first: int, part: BlockResult) -> None:
-        """Insert the result of a part that begins with body number `first`."""
-        rows = slice(first, first + len(part))
-        self.R_WB[rows], self.w_WB_B[rows], self.drifts[rows] = part.R_WB, part.w_WB_B, part.drifts
-        if self.supplied is not None:
-            self.supplied[rows] = part.supplied
-        self.failures.update((first + i, failure) for i, failure in part.failures.items())
-
     def __len__(self) -> int:
         return len(self.R_WB)
 

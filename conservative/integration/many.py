@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..batch import Batch
 from ..check import describe, positive_integer
-from ..drifts import list_drifts
 from ..errors import BadInput
 from ..flight import rotation_only
-from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
+from ..grid import grid_for
 from ..method import Method
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
-from .blocks import LOAD_BYTES, BlockResult, list_blocks, run_blocks, start_workers
-from .blocks import SAMPLE_BYTES as STORED_BYTES
+from .blocks import list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
+from .memory import Memory, write_memory
 from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
-from .shared_choice import choose_for_all, pick_hardest
+from .shared_choice import choose_for_all, require_steps
 from .store import write_store
 
 if TYPE_CHECKING:
@@ -120,7 +117,7 @@ def integrate_many(
             require_support(chosen, bodies.first)
             warn_of_loads(bodies.first, chosen, grid.dt)
             if len(bodies) > 1:  # the run of a single body raises the error itself
-                _require_steps(chosen, bodies, grid)
+                require_steps(chosen, bodies, grid)
         else:
             choice = choose_for_all(bodies, error, *read_target(bodies.first, error, method, dt, t_end, sample_every))
             chosen, grid = choice.method, choice.grid
@@ -130,24 +127,14 @@ def integrate_many(
                 progress(ProgressOfMany(0.0, 1, 1))
             return ensemble
         blocks = list_blocks(len(bodies), grid)
-        if path is None:
-            size = STORED_BYTES + LOAD_BYTES * bodies.scene.loaded
-            n, m, most = len(bodies), grid.n_samples, most_samples() * SAMPLE_BYTES // size
-            if n * m > most:
-                allowed = f"more steps between samples, or a path: {most:.3g} samples of {size} bytes fit in memory"
-                raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
-            names = list_drifts(bodies)
-            supplied = np.empty((n, m, 4)) if bodies.scene.loaded else None
-            whole = BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names))), {}, supplied)
-            with start_workers(client, threads, len(blocks)) as workers:
-                run_blocks(chosen, bodies, grid, workers, blocks, lambda i, _, part: whole.put(i, part), progress)
-            drifts = dict(zip(names, whole.drifts.T, strict=True))
-            return Ensemble(flying, grid, whole.R_WB, whole.w_WB_B, drifts, chosen.label, whole.failures, choice, supplied)
-        stored = write_store(path, chosen.label, flying, grid, resume)
-        with start_workers(client, threads, len(blocks)) as workers, stored as store:
+        label = chosen.label
+        target = write_memory(label, flying, grid) if path is None else write_store(path, label, flying, grid, resume)
+        with start_workers(client, threads, len(blocks)) as workers, target as store:
             left = [first for first in blocks if not store.is_whole(first)]
             run_blocks(chosen, bodies, grid, workers, left, store.write, progress)
-        return replace(open_ensemble(path, flying.scene), choice=choice)
+        return replace(
+            store.ensemble() if isinstance(store, Memory) else open_ensemble(store.place, flying.scene), choice=choice
+        )
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # if it is the failure itself, it keeps its own cause
 
@@ -164,20 +151,3 @@ def _check_options(threads: object, progress: object, path: object, resume: obje
         raise BadInput("resume", "True", "False without a path, because there is no run to resume")
     if threads is not None:
         positive_integer("threads", threads, "a number of threads, 1 or more, or None for one per processor")
-
-
-def _require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
-    """Raise `BadInput` if the step is too long for one of the bodies that may rotate fastest.
-
-    Other bodies for which it is too long become `NotRun` when they are integrated. Methods with a kernel refuse a step only if
-    they have a longest one. For others of them nothing is prepared, which would take as long as runs of hundreds of bodies.
-    """
-    if method.card.kernel and method.longest_step(bodies.first) == math.inf:
-        return
-    for i in pick_hardest(bodies):
-        scene = bodies.take(i)
-        try:
-            if method.unsupported(scene) is None:
-                method.prepare(scene, grid)
-        except BadInput as refusal:
-            raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None

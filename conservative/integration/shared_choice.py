@@ -12,6 +12,7 @@ are not tried.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from ..batch import Batch
 from ..drifts import energy_scales
-from ..errors import AccuracyNotReached
+from ..errors import AccuracyNotReached, BadInput
 from ..grid import Grid
 from ..method import Method
 from ..methods.automatic import cut_step, grid_of
@@ -87,3 +88,20 @@ def find_worst(bodies: Batch, numbers: Sequence[int], method: Method, grid: Grid
     """Return the estimate with the largest total error among the bodies of these numbers, and its number; 0 and -1 if none."""
     estimates = ((trials_of(bodies.take(i)).estimate(method, grid, sensitivity=True)[0], i) for i in numbers)
     return max(estimates, key=lambda pair: pair[0].total, default=(Estimate(0.0, 0.0), -1))
+
+
+def require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
+    """Raise `BadInput` if the step is too long for one of the bodies that may rotate fastest.
+
+    Other bodies for which it is too long become `NotRun` when they are integrated. Methods with a kernel refuse a step only if
+    they have a longest one. For others of them nothing is prepared, which would take as long as runs of hundreds of bodies.
+    """
+    if method.card.kernel and method.longest_step(bodies.first) == math.inf:
+        return
+    for i in pick_hardest(bodies):
+        scene = bodies.take(i)
+        try:
+            if method.unsupported(scene) is None:
+                method.prepare(scene, grid)
+        except BadInput as refusal:
+            raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None

@@ -178,7 +178,7 @@ def test_mistakes_end_in_one_clear_line_before_any_work(arguments, parts, tmp_pa
 
 
 def test_samples_that_do_not_fit_in_memory(monkeypatch):
-    monkeypatch.setattr("conservative.integration.many.most_samples", lambda: 1)
+    monkeypatch.setattr("conservative.integration.memory.most_samples", lambda: 1)
     done = conservative("brick_flip", *SPREAD, "--starts", "3")
     assert done.exit_code == 2
     assert (
