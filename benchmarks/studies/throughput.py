@@ -283,5 +283,5 @@ STUDY = Declaration(
     settings=methodcaller("settings_for", "many"),
     in_report=family_settings,
     options=("methods", "bodies", "seed", "sizes"),
-    more=(("quick", True),),  # coarse: preparing engines takes minutes
+    more=(("quick", True), ("bodies", QUICK_BODIES)),  # coarse: preparing engines takes minutes
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, selection
-from conservative.benchmarks.studies.declaration import Extent, Named
+from conservative.benchmarks.studies.declaration import Declaration, Extent, Named
 from conservative.benchmarks.studies.studies import STUDIES
 from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.method import Method
@@ -31,13 +31,14 @@ class Kind:
     processes: int = 1
 
 
-DEFAULT, QUICK, FULL, QUICK_FULL = "default", "quick", "full", "quick and full"
+DEFAULT, QUICK, FULL, QUICK_FULL = (False, False), (False, True), (True, False), (True, True)
 KINDS = {
     DEFAULT: Kind(Extent.EVERY, bodies=1, time_limit=0.15),  # it takes a minute
     QUICK: Kind(Extent.EVERY, time_limit=0.15),
     FULL: Kind(Extent.LONG, every_method=True, bodies=3, processes=PROCESSES),
     QUICK_FULL: Kind(Extent.FULL, every_method=True, bodies=1),
 }
+"""The kinds of report by the options `--full` and `--quick`."""
 FEW_METHODS, FEW_BODIES = ("taylor:order=12", "heyoka:frame=lean", "mujoco"), 3
 """Methods on the random bodies of a default report, and their number, each in a field of its own. A further field takes four
 seconds after the installation, mostly to compile kernels, and a further method of ours two to four seconds a field."""
@@ -113,7 +114,7 @@ def plan_report(
         An engine is not installed, and `skip_missing` is False.
     """
     names, methods, engines = tuple(scenes), tuple(methods), tuple(engines)
-    kind = KINDS[(QUICK_FULL if quick else FULL) if full else QUICK if quick else DEFAULT]
+    kind = KINDS[full, quick]
     whole = bool(methods) or kind.every_method
     few = bodies is None and not names and not whole
     if bodies is None:
@@ -126,22 +127,28 @@ def plan_report(
         for method in (*compared, *named):
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     shared = {"truth": remember_truths(), "skip_missing": skip_missing}
+
+    def methods_of(each: Declaration) -> tuple[Method, ...]:
+        """Return the methods of a study; none if the report does not have it."""
+        if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
+            return ()
+        if each.named is Named.ONLY:
+            return named
+        if each.draw and few:
+            return tuple(method for method in compared if method.name in FEW_METHODS)
+        mine = every if each.draw else compared
+        return each.in_report((*mine, *named) if each.named is Named.TOO else mine)
+
     made: list[Study] = []
     for each in STUDIES.values():
-        if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
-            continue
-        if each.draw and few:
-            taken = tuple(method for method in compared if method.name in FEW_METHODS)
-        else:
-            mine = () if each.named is Named.ONLY else every if each.draw else compared
-            taken = each.in_report((*mine, *(() if each.named is Named.APART else named)))
-        if not taken:
+        if not (taken := methods_of(each)):
             continue
         limit = kind.time_limit if time_limit is None and each.named is not Named.ONLY else time_limit
         extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if each.draw else shared
         settings = {"quick": quick or (few and each.draw is not None), "time_limit": limit, **extent, **dict(each.more)}
-        made.append(each.plan(taken, () if each.scenes else chosen, kind.processes, **settings))
+        study = each.plan(taken, () if each.scenes else chosen, kind.processes, **settings)
         if each.draw and few:
-            made[-1] = replace(made[-1], scenes=made[-1].scenes[:FEW_BODIES], drawn=made[-1].drawn[:FEW_BODIES])
+            study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
+        made.append(study)
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
     return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed, arguments)

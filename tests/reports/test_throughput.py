@@ -7,7 +7,7 @@ import pytest
 
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.throughput import EXACT
+from conservative.benchmarks.studies.throughput import EXACT, QUICK_BODIES
 from conservative.reports.report import render
 from conservative.reports.rows.names import MethodClass, with_names
 from conservative.reports.run.measure import Measurements
@@ -108,6 +108,7 @@ def test_a_method_that_did_not_run_has_its_reason():
 def test_the_report_has_a_section_with_a_picture(tmp_path):
     plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], full=True, bodies=1), measurements()
     assert plan.names[-1] == "throughput"
+    assert (plan.studies[-1].quick, plan.studies[-1].bodies) == (True, QUICK_BODIES)  # not those of `random`
     built = build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
     render(built, tmp_path, png=False)
     for name in ("report.md", "index.html"):
