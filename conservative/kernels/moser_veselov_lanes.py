@@ -120,7 +120,7 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
 
 
 @small
-def store_state(flat, columns, k, at, first, row, R_WB, w_WB_B):
+def store_state(flat, columns, k, at, first, row, samples, R_flat, w_flat):
     """Write sample number `row` of the bodies of a number, in body axes."""
     w, x, y, z = product(load_rows(flat, first + LEFT * columns, columns, 4, WIDTH), own_quaternion(k, at))
     s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -132,8 +132,8 @@ def store_state(flat, columns, k, at, first, row, R_WB, w_WB_B):
     a, b, c = axes[0:3], axes[3:6], axes[6:9]
     rates = (amplitudes[0] * at.c, amplitudes[1] * at.s, amplitudes[2] * at.d)
     rows = (dot(r0, a), dot(r0, b), dot(r0, c), dot(r1, a), dot(r1, b), dot(r1, c), dot(r2, a), dot(r2, b), dot(r2, c))
-    record_lanes(first, row, R_WB.shape[1], rows, R_WB.reshape(-1))
-    record_lanes(first, row, R_WB.shape[1], (dot(rates, a), dot(rates, b), dot(rates, c)), w_WB_B.reshape(-1))
+    record_lanes(first, row, samples, rows, R_flat)
+    record_lanes(first, row, samples, (dot(rates, a), dot(rates, b), dot(rates, c)), w_flat)
 
 
 @entry
@@ -143,6 +143,7 @@ def march_lanes(table, states, done, last, n_steps, every, R_WB, w_WB_B):
     R_WB (columns, s, 3, 3) and w_WB_B (columns, s, 3), rad/s, in body axes, get the start, every `every`-th step, and the last.
     """
     columns, flat = table.shape[1], table.reshape(-1)
+    R_flat, w_flat, samples = R_WB.reshape(-1), w_WB_B.reshape(-1), R_WB.shape[1]
     for first in range(0, columns, WIDTH):
         k = Shift(*load_rows(flat, first + SHIFT * columns, columns, 15, WIDTH))
         at = State(*load_rows(states.reshape(-1), first, columns, STATE_ROWS, WIDTH))
@@ -154,6 +155,6 @@ def march_lanes(table, states, done, last, n_steps, every, R_WB, w_WB_B):
             at = take_steps(k, at, here, end)
             here = end
             if here == sample:
-                store_state(flat, columns, k, at, first, row, R_WB, w_WB_B)
+                store_state(flat, columns, k, at, first, row, samples, R_flat, w_flat)
                 row += 1
         save_rows(states.reshape(-1), first, columns, at)
