@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from threading import get_ident, main_thread
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..grid import Grid
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart
-from .run_kernel import KernelRun, in_main_thread
+from .run_kernel import KernelRun
 from .taylor_model import axes_of
 
 
@@ -31,7 +32,7 @@ def prepare_dense(scene: Scene, grid: Grid, label: str, start: PrincipalStart, m
     def run() -> Trajectory:
         R_WB, w_WB_B = np.empty((n + kernel.REGISTER, 3, 3)), np.empty((n + kernel.REGISTER, 3))
         R_WB[0], w_WB_B[0] = R_WB0, scene.w_WB_B0
-        pause = kernel.PAUSE if in_main_thread() else 0
+        pause = kernel.PAUSE if get_ident() == main_thread().ident else 0
         done, *counts, size, _ = kernel.enter(*numbers, pause, lanes, R_WB.reshape(-1), w_WB_B.reshape(-1))
         failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, size, kernel.FAILURE)
         good, counters = grid.count_samples(done), Counters(done, *counts)

@@ -2,6 +2,7 @@
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -254,6 +255,13 @@ def test_steps_span_samples_that_are_as_accurate_as_steps(name: str, every: int)
     assert angle_between(end.R_WB[-1], found.R_WB[-1]) < 1e-11  # measured 1.5e-12
     assert found.counters.steps == grid.n_steps
     assert found.counters.stages / method.terms < 150  # steps; measured 15 to 142 for 200 samples
+
+
+@pytest.mark.parametrize("method", [cv.Taylor(), cv.Taylor(tolerance=1e-11)])
+def test_the_loop_of_a_run_can_be_timed_alone(method: cv.Taylor) -> None:
+    for name in ("lagrange_top", "librating_satellite"):  # the samples of the latter are turned afterwards
+        run: Any = method.prepare(registry.scene(name), cv.Grid(0.01, 5))
+        assert run.own_loop()[0] == run().counters.steps == 5
 
 
 def test_samples_before_a_step_that_cannot_be_projected_are_kept() -> None:
