@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numba
@@ -13,7 +14,7 @@ COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the
 TRIED = (0, 63), (0, 68)
 """Oldest and newest version of numba that the tests have passed with. A version of numba comes with one version of llvmlite."""
 
-LINKED = COMPILED and TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
+LINKED = COMPILED and TRIED[0] <= tuple(map(int, re.findall(r"\d+", numba.__version__)[:2])) <= TRIED[1]
 """True if kernels rely on parts of numba that it does not document, False if they are compiled by `njit` alone."""
 
 if COMPILED and not LINKED:
