@@ -113,7 +113,7 @@ class Card:
         Returns the `Structure` of a setting; None if it is unknown.
     takes
         The parts of scenes that the method takes (`conservative.needs`); default: fields that depend on the attitude only. If a
-        scene needs more, `Method.unsupported` says so. Methods that integrate the rotation only take free flight.
+        scene needs more, `Method.unsupported` says so. Methods of the rotation alone also take free flight.
     """
 
     variants: tuple[str, ...] = ("",)

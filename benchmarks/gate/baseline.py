@@ -77,7 +77,7 @@ def limit(measure: str, value: float, spread: float) -> float:
 def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) -> Baseline:
     """Return the baseline that accepts runs of one commit, with the reason in its history.
 
-    Rows that were not run, or skipped, are dropped; the history lists them.
+    Rows that were not run, or skipped, are dropped; the history lists them. Those that `-k` or `-m` may have left out stay.
 
     Raises
     ------
@@ -91,6 +91,8 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
     if failed:
         raise BadInput("results", f"rows that failed: {', '.join(failed)}", "runs without failures: a failure is not accepted")
     rows = {row.id: _row(row, runs) for row in runs[0].rows.values() if row.status is Status.PASSED}
+    if any(run.chosen for run in runs):
+        rows = {id: row for id, row in before.items() if id not in runs[0].rows} | rows
     entry = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "reason": reason.strip(),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,11 @@ class Gate:
         self.rows: dict[str, Row] = {}
         self.verdict: compare.Verdict | None = None
         self.without_baseline = False
+        self.chosen = False
+
+    def pytest_deselected(self, items: Sequence[pytest.Item]) -> None:
+        """Note that `-k` or `-m` left benchmarks out."""
+        self.chosen = self.chosen or any("benchmark" in getattr(item, "fixturenames", ()) for item in items)
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> None:
@@ -86,7 +91,7 @@ class Gate:
         NoBaseline
             There is nothing to compare with.
         """
-        run = Results(machine_title(), self.rows, commit(self.root))
+        run = Results(machine_title(), self.rows, commit(self.root), self.chosen)
         results.write(run, self.folder / results.FILE)
         try:
             self.verdict = compare.judge(baseline.read(self.baseline), run)

@@ -68,11 +68,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Results:
-    """The rows of one run, by id, the machine they were measured on, and the commit."""
+    """The rows of one run, by id, its machine and commit, and whether `-k` or `-m` left benchmarks out."""
 
     machine: str
     rows: Mapping[str, Row]
     commit: str = ""
+    chosen: bool = False
 
 
 def find_runaway(values: Mapping[str, float]) -> str:
@@ -113,7 +114,7 @@ def read(path: Path) -> Results:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
-        return Results(content["machine"], {row.id: row for row in rows}, content["commit"])
+        return Results(content["machine"], {row.id: row for row in rows}, content["commit"], content.get("chosen", False))
     except OSError as error:
         raise BadInput("results", f"{path} ({error.strerror})", allowed) from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:

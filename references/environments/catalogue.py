@@ -36,8 +36,8 @@ class Pinocchio(LocalEngine):
 
 def __getattr__(name: str) -> type[EngineMethod]:
     """Return the class of an engine that runs in an environment, such as `exudyn`."""
-    if name.startswith("_"):
-        raise AttributeError(name)
-    scripts = (Path(engines.__file__).with_name(name + suffix) for suffix in SCRIPTS)
-    script = next((each for each in scripts if each.is_file()), None)
-    return engine_class(read_script(script) if script else import_module(f"{engines.__name__}.{name}"))
+    files = (Path(engines.__file__).with_name(name + suffix) for suffix in (*SCRIPTS, ".py"))
+    file = next((each for each in files if each.is_file()), None)
+    if file is None or name.startswith("_"):
+        raise AttributeError(f"{__name__} has no class {name!r}, and there is no adapter of this name in references/engines")
+    return engine_class(read_script(file) if file.suffix in SCRIPTS else import_module(f"{engines.__name__}.{name}"))

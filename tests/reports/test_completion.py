@@ -53,7 +53,7 @@ def test_the_shell_completes_a_single_folder_and_unknown_paths(typed, folder):
 def test_the_last_of_several_is_completed(folder):
     assert completed("report --scenes lagrange_top,my") == [("plain", "lagrange_top,my_body.toml")]
     assert completed("report --scenes my_body.toml,to") == [("plain", "my_body.toml,tops/")]
-    assert completed("report --methods reduced,he") == [("plain", "reduced,heyoka")]
+    assert completed("report --methods reduced,heyo") == [("plain", "reduced,heyoka")]
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,16 @@ def test_the_history_has_every_change():
     assert (third.history[2]["removed"], third.history[2]["changed"]) == ([ROW.id], [])
 
 
+def test_rows_that_a_run_left_out_stay():
+    """Of 77 rows, 75 were removed by an update after a run with `-k`."""
+    chosen = Results("here", {OTHER.id: OTHER}, chosen=True)
+    accepted = baseline.update_baseline(KEPT, [chosen], "one more")
+    assert set(accepted.rows) == {ROW.id, OTHER.id}
+    assert accepted.history[-1]["removed"] == []
+    skipped = Results("here", {ROW.id: replace(ROW, status=Status.SKIPPED)}, chosen=True)
+    assert set(baseline.update_baseline(accepted, [skipped], "not that one").rows) == {OTHER.id}
+
+
 def test_runs_that_disagree_are_refused():
     for other in (changed(definition="new"), changed(engine="new"), Results("here", {OTHER.id: OTHER})):
         with pytest.raises(BadInput, match="disagree"):

@@ -171,6 +171,9 @@ def test_from_end_to_end(tmp_path, monkeypatch):
     assert code == 0, text
     assert "gate: passed, 5 rows" in text
     assert "## Gate: passed" in (tmp_path / "summary.md").read_text()
+    assert not results.read(Path(written)).chosen
+    run(tmp_path, "--benchmark", "--gate", "test_other.py", "-k", "kept")
+    assert results.read(Path(written)).chosen
     for old, new in PLANTED:
         assert old in suite.read_text()
         suite.write_text(suite.read_text().replace(old, new))
