@@ -111,9 +111,14 @@ def engines(group: str, page: Path) -> str:
 def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
     data = getattr(kind, "data", None)  # none: the engine is a class of its own
     file, words = (kind.adapter.__file__, kind.adapter.__doc__) if data else (inspect.getfile(kind), kind.__doc__)
-    package = f"{data.package} ≥ {data.oldest}" if data and data.oldest else data.package if data else name
+    apart = data and data.oldest and hasattr(kind, "at_version")  # of those in this process pyproject.toml has the bounds
+    package = f"{data.package} ≥ {data.oldest}" if apart else data.package if data else name
     origin = {"npm": "npm", "apt": "Debian"}.get(data.kind) if data else None
-    texts = [_settings(each.name, each.default, data) for each in dataclasses.fields(kind) if each.name != "precision"]
+    texts = [
+        _settings(each.name, each.default, data, _quoted(kind, each.name))
+        for each in dataclasses.fields(kind)
+        if each.name != "precision"
+    ]
     precision = dict(data.settings).get("precision") if data else None
     bits = "64 or 32" if precision else "32" if data and data.precision == "f32" else "64"
     link = os.path.relpath(os.path.realpath(file), page.parent)
@@ -121,14 +126,21 @@ def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
     return [f"[`{name}`]({link})", package, "; ".join(texts), bits, summary(words)]
 
 
-def _settings(name: str, default: object, data: Any) -> str:
-    """Return a setting with its default first, then its other values."""
+def _settings(name: str, default: object, data: Any, quoted: list[str]) -> str:
+    """Return a setting with its default first, then its other values: those of an engine's data, or that its class quotes."""
     first = data and next(iter(data.settings), "") == name
-    values = [*(data.choices.get(name) or (data.orders if first else ()))] if data else []
+    values = [*(data.choices.get(name) or (data.orders if first else ()))] if data else quoted
     values = [f"`{each}`" for each in dict.fromkeys([default, *values]) if each != ""]
     if first and data.orders:
         return ", ".join(values)
     return f"`{name}`" if isinstance(default, bool) else f"`{name}` = {', '.join(values)}" if values else f"`{name}`"
+
+
+def _quoted(kind: Any, name: str) -> list[str]:
+    """Return the values of a setting that are in quotation marks under `Parameters` of a class."""
+    text = inspect.cleandoc(kind.__doc__ or "")
+    entry = re.search(rf"^(?:\w+, )*{name}(?:, \w+)*\n((?:    .*\n?)+)", text, re.MULTILINE)
+    return re.findall(r'"(\w+)"', entry[1]) if entry and isinstance(getattr(kind, name), str) else []
 
 
 def studies() -> str:
@@ -139,7 +151,7 @@ def studies() -> str:
     extents = {Extent.EVERY: "every", Extent.FULL: "full", Extent.LONG: "full, not quick"}
     rows = []
     for name, each in STUDIES.items():
-        report = extents[each.extent] + ", with random bodies" * bool(each.draw)
+        report = extents[each.extent] + ", if it draws bodies" * bool(each.draw) + ", if no scene is named" * bool(each.scenes)
         report = "with `--engines`" if each.named is Named.ONLY else report
         rows.append([f"`{name}`", each.about[0].upper() + each.about[1:], report, "yes" if each.timed else ""])
     return table(["study", "what it measures", "in reports", "measures times"], rows)

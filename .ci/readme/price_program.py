@@ -1,4 +1,4 @@
-"""One side of the study of prices, in a new process: `python -P price_program.py SIDE SCENE OTHER`.
+"""One side of the table of prices, in a new process: `python -P price_program.py SIDE SCENE OTHER`.
 
 It prints as JSON: the wall time, s, since before the import of the package until the first run has ended, the same for `RUNS`
 starts of the body one after the other, the time of the first run of another scene, and the method and the final attitude (9) of

@@ -59,8 +59,8 @@ class Declaration:
         Its own scenes, which a report has only if none is named; None: the scenes of the report.
     draw
         Function that draws its bodies and returns the study, from methods and keywords; None: it has scenes.
-    settings
-        The settings of a family that a bare name stands for if the study runs alone.
+    settings, of_engines
+        The settings of a family that a bare name stands for if the study runs alone, and those of the named engines.
     in_report
         The methods of a report that are in the study.
     options
@@ -78,6 +78,7 @@ class Declaration:
     scenes: Callable[[], tuple[Scene, ...]] | None = None
     draw: Callable[..., Study] | None = None
     settings: selection.Settings = selection.all_variants
+    of_engines: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     in_report: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     options: tuple[str, ...] = ("scenes", "methods")
     more: tuple[tuple[str, Any], ...] = ()
@@ -89,9 +90,9 @@ class Declaration:
 
     @property
     def about(self) -> str:
-        """What it measures: the first line of its file, without `The study of`."""
+        """What it measures: the first line of its file, without `The study of` and its name."""
         first = (sys.modules[self.findings.__module__].__doc__ or "").partition("\n")[0]
-        return first.rstrip(".").removeprefix("The study of ").removeprefix("The ")
+        return first.rstrip(".").removeprefix("The study of ").removeprefix(f"{self.name}: ")
 
     def plan(self, methods: Sequence[Method], scenes: Sequence[Scene] = (), processes: int = 1, **settings: Any) -> Study:
         """Return the study of methods, with the scenes or else its own; `settings` are fields of `Study`, or of the draw."""

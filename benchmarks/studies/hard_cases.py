@@ -67,5 +67,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 STUDY = Declaration(
-    findings, Extent.LONG, apart=True, scenes=scenes, settings=lambda method: settings(all_variants(method)), in_report=settings
+    findings,
+    Extent.LONG,
+    apart=True,
+    scenes=scenes,
+    settings=lambda method: settings(all_variants(method)),
+    of_engines=settings,
+    in_report=settings,
 )

@@ -38,7 +38,7 @@ MORE_STEPS = (0, 1, 2)
 SAMPLES = 1000
 """Approximate number of samples of a run."""
 REPEATS = 3
-"""Repeats of all rounds: a difference between repeats is noise."""
+"""Repeats of all rounds; the interval of a ratio comes from them."""
 ROUNDS = 3
 """Rounds of a repeat; the fastest call counts."""
 TIME_FACTOR = 1.25

@@ -51,7 +51,7 @@ class Projected(Method):
         colour="teal",
         kernel="projected",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
-        takes=frozenset(Need),
+        takes=frozenset(Need) - {Need.FLIGHT},  # free flight is a free body
     )
 
     bounds = within_round_off

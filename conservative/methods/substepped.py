@@ -11,9 +11,10 @@ from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import Need
+from ..needs import Needs
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
+from .reduced import Reduced
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Substepped(Method):
     card: ClassVar[Card] = Card(
         report=(),
         structure=lambda method: method.inner.card.structure(method.inner),
-        takes=frozenset(Need),  # `unsupported` asks the other method
+        takes=Reduced.card.takes,  # by default
     )
 
     def __post_init__(self) -> None:
@@ -60,6 +61,10 @@ class Substepped(Method):
     def inner(self) -> Method:
         """Return the method of the parts."""
         return registry.method(self.method.replace("/", ","))
+
+    @property
+    def takes(self) -> Needs:
+        return self.inner.takes
 
     @property
     def order(self) -> int | None:

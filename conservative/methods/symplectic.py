@@ -15,7 +15,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import IN_TIME, ROTATION, Need
+from ..needs import FIELDS, IN_TIME, ROTATION, Need
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.splittings import SEQUENCES, Lengths, lengths_of
@@ -61,7 +61,7 @@ class Splitting(Method):
         suite=(),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
-        takes=ROTATION | IN_TIME | {Need.ROTOR},
+        takes=FIELDS | IN_TIME | {Need.ROTOR},
     )
     kind: ClassVar[str] = "EXACT"
 
@@ -106,6 +106,7 @@ class NoSquish(Splitting):
     order: int = 2
 
     family: ClassVar[str] = "no_squish"
+    card: ClassVar[Card] = replace(Splitting.card, takes=Splitting.card.takes | {Need.FLIGHT})
     kind: ClassVar[str] = "AXES"
 
 
@@ -126,7 +127,7 @@ class Rattle(Splitting):
 
     order: int = 2
 
-    card: ClassVar[Card] = replace(Splitting.card, takes=Splitting.card.takes - {Need.ROTOR})
+    card: ClassVar[Card] = replace(Splitting.card, takes=ROTATION | IN_TIME)
     family: ClassVar[str] = "rattle"
     kind: ClassVar[str] = "ENDS"
 

@@ -74,7 +74,7 @@ def run_methods(
         The engine of a method is not installed.
     """
     scene = registry.scene(scene_name)
-    methods = [read_method(name or None, scene) for name in method_names or ("",)]
+    methods = [read_method(name, scene) for name in method_names or (None,)]
     runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in methods]
     for method in methods:
         _ = method.label  # raises `MissingEngine`

@@ -42,14 +42,15 @@ def plan_study(
     """
     choice("name", name, tuple(studies.STUDIES))
     declared = studies.STUDIES[name]
+    given = {"scenes": scenes, "methods": methods, "sizes": sizes, "bodies": bodies, "seed": seed}
+    _require_options(declared, {option: value for option, value in given.items() if value not in (None, (), [])})
     counts = tuple(read_count("sizes", size) for size in sizes)
     extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
-    _require_options(declared, {"scenes": scenes, "methods": methods, **extent})
     if declared.named is Named.ONLY:
         compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
     else:
         ours = selection.methods(methods or None, skip_missing, declared.settings)
-        others = engine_selection.select_engines(engines, skip_missing) if engines else ()
+        others = declared.of_engines(engine_selection.select_engines(engines, skip_missing)) if engines else ()
         compared = tuple(dict.fromkeys((*ours, *others)))
     settings = {"quick": quick, "skip_missing": skip_missing, "time_limit": time_limit, **extent}
     processes = QUICK_PROCESSES if quick else PROCESSES
@@ -59,10 +60,11 @@ def plan_study(
 def _require_options(declared: Declaration, given: Mapping[str, Any]) -> None:
     """Raise `BadInput` if an option is given that the study does not have."""
     for option, value in given.items():
-        if value not in ((), []) and option not in declared.options:
-            others = ", ".join(name for name, each in studies.STUDIES.items() if option in each.options)
+        if option not in declared.options:
+            own = [*declared.options, *(["engines"] if declared.named is Named.ONLY else [])]
             text = ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
-            raise BadInput(option, text, f"nothing: the study {declared.name!r} has no {option}; these have: {others}")
+            allowed = f"nothing: the study {declared.name!r} has no {option}; it has {', '.join(own)}"
+            raise BadInput(option, text, allowed)
 
 
 def read_count(argument: str, text: str) -> int:

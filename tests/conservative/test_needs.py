@@ -16,6 +16,8 @@ from conservative.identity import digest, fields_of_motion
 from conservative.needs import LOADS, Need
 from conservative.references.truth import reference
 
+from ..crossing import ROWS
+
 R0 = rotation_about((1.0, -2.0, 0.5), 0.9)
 TURN = rotation_about((0.3, 1.0, -0.7), 0.6)
 TENSOR = TURN @ np.diag((2.3, 1.1, 3.1)) @ TURN.T
@@ -267,3 +269,18 @@ def test_the_last_step_may_end_after_a_table():
     found = cv.integrate(built, 0.013)
     assert found.t[-1] > 2.0
     assert found.ok
+
+
+NUMBERS = ("symmetric", "for bodies in a field", "right angles")
+"""Words of the reasons of `unsupported` that depend on numbers, or on another part, and not on a part alone."""
+
+
+@pytest.mark.parametrize("name", [n for n, family in registry.list_families().items() if family.role != cv.Role.ENGINE])
+def test_a_method_takes_every_part_that_it_declares(name):
+    """Pages show what is declared. `projected` and `splitting` declared free flight, and refused it."""
+    method = registry.method(name)
+    for need in method.takes:
+        reason = method.unsupported(ROWS[need].scene())
+        assert reason is None or any(words in reason for words in NUMBERS), (need, reason)
+        assert (need, reason) != (cv.Need.FLIGHT, "it is for bodies in a field")
+    assert method.takes == method.card.takes

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
 from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.benchmarks.studies import selection, studies
+from conservative.benchmarks.studies.throughput import QUICK_BODIES
 from conservative.methods.gauss import Gauss
 from conservative.reports import report
 from conservative.reports.charts import style
@@ -85,6 +86,29 @@ def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_every
     assert plan_report(quick=True).names == plan_report(bodies=0).names == MAIN
     assert plan_report(engines=["scipy"]).names == ("random", *MAIN, *ENGINES)
     assert set(plan_report(["lagrange_top"], full=True).names) == set(FULL)
+
+
+def test_settings_of_the_studies_of_each_kind_of_report():
+    """quick, processes, longest run (s), scenes and bodies: as they were when each stood in `plan_report`."""
+    main, full = (False, 1, 0.15, 2, None), (False, 1, 0.6, 2, None)
+    several = (False, 5, 0.6, 2, None)
+    expected = {
+        (): {"random": (True, 1, 0.15, 3, None)} | dict.fromkeys(MAIN, main),
+        ("quick",): dict.fromkeys(MAIN, (True, 1, 0.15, 2, None)),
+        ("full",): {"random": (False, 5, 0.6, 15, None)}
+        | dict.fromkeys(FULL, full)
+        | dict.fromkeys(("work_precision", "each_step"), several)
+        | {"stability": (False, 1, 0.6, 11, None), "hard_cases": (False, 1, 0.6, len(registry.list_scenes()), None)}
+        | {"throughput": (True, 5, 0.15, 3, QUICK_BODIES)},
+        ("full", "quick"): {"random": (True, 1, 0.15, 5, None)} | dict.fromkeys(FULL, (True, 1, 0.15, 2, None)),
+    }
+    for options, studies_of in expected.items():
+        planned = plan_report(**dict.fromkeys(options, True)).studies
+        found = {
+            each.name: (each.quick, each.processes, each.longest_run, len(each.scenes), getattr(each, "bodies", None))
+            for each in planned
+        }
+        assert found == studies_of, options
 
 
 def test_methods_of_other_packages_are_part_of_the_default_report(monkeypatch):

@@ -21,7 +21,7 @@ if COMPILED and not LINKED:
     _oldest, _newest = (".".join(map(str, version)) for version in TRIED)
     warnings.warn(
         f"numba {numba.__version__} is not one of the tried versions {_oldest} to {_newest}. Results agree to "
-        f"round-off, but compiling takes up to twice as long. To avoid this, run: pip install 'numba=={_newest}.*'",
+        f"round-off, but compiling takes up to 2.2 times as long. To avoid this, run: pip install 'numba=={_newest}.*'",
         RuntimeWarning,
         stacklevel=2,
     )
