@@ -18,6 +18,7 @@ that runs in an environment of its own is named the same way, with a version if 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -44,6 +45,10 @@ def list_methods() -> tuple[str, ...]:
 def list_engines() -> tuple[str, ...]:
     """Return the names of all engines that run in environments of their own, sorted; none is imported."""
     return tuple(list_entries(ENGINES))
+
+
+VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
+"""What the version of an engine looks like."""
 
 
 def partition_version(name: str) -> tuple[str, str, str]:
@@ -90,14 +95,14 @@ def method(text: str) -> Method:
     MissingEngine
         The engine is not installed.
     """
-    name, _, settings = printable_text("method", text, _NAME).partition(":")
-    base, at, version = partition_version(name)
+    given, _, settings = printable_text("method", text, _NAME).partition(":")
+    base, at, version = partition_version(given)
     name = base + at + version
     methods, engines = list_entries(METHODS), list_entries(ENGINES)
     known = set(engines) if at else {*engines, *methods}
-    if base not in known or bool(at) != bool(version):
+    if base not in known or (at and not VERSION.fullmatch(version)):
         allowed = nearest(base, known, "conservative list, and conservative engines list")
-        raise BadInput("method", repr(name), allowed + (", with @ and a version" if at else ""))
+        raise BadInput("method", repr(given), allowed + (", with @ and a version such as 3.6.0" if at else ""))
     # The class that runs in this process, or in an environment if a version is named or there is no other.
     family: type[Method] = (
         engine(base).at_version(version) if at else load_entry(METHODS if name in methods else ENGINES, "method", name)

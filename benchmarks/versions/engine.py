@@ -63,7 +63,7 @@ class Range:
 
     @classmethod
     def of(cls, values: Iterable[float]) -> Range:
-        """Return the spread of values; the first is the measured value, and NaN are ignored."""
+        """Return the range of values; the first is the measured value, and NaN are ignored."""
         first, *rest = values
         known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
         return cls(first, min(known), max(known))
@@ -76,7 +76,7 @@ class Range:
 
 
 NOTHING = Range(math.nan, math.nan, math.nan)
-"""The spread of a value that could not be measured."""
+"""The range of a value that could not be measured."""
 
 
 @dataclass(frozen=True, kw_only=True)

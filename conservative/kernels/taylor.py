@@ -140,12 +140,12 @@ def expand(field, constants, order, h, K, g, a, w):
     """Return the state after one step, not projected, the last two terms of the series, and its coefficients (`Vectors`)."""
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
-    turn = series.spread(field.rate) if isinstance(field, Turned) else None
+    turn = series.broadcast(field.rate) if isinstance(field, Turned) else None
     ratio = series.vector(*constants) if isinstance(field, Free) and len(K) == 3 else None
     accelerate, terms = field.series(constants, g, series), Vectors(series, len(start))
     if len(K) > 3:
         accelerate = add_rotor(accelerate, series.vector(*K[3:6]), series.vector(*K[6:]))
-    sums = sum_orders(series, terms, series.spread(h), start, series.vector(*K[:3]), accelerate, turn, ratio)
+    sums = sum_orders(series, terms, series.broadcast(h), start, series.vector(*K[:3]), accelerate, turn, ratio)
     change, last, before = sum_to_order(order, sums)
     end = tuple(v + d for v, d in zip(start, change, strict=True))
     return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
@@ -396,7 +396,7 @@ class Bodies(NamedTuple):
     units: Any
 
 
-class Motion(NamedTuple):
+class LaneState(NamedTuple):
     """Rows of the attitude's matrix and rates of bodies in lanes, the step that failed (0: none), and its defect."""
 
     g: Any
@@ -421,10 +421,10 @@ def find_sample(bodies, turn, g, a, w):
 def enter_many(order, like, columns, motions, turns, done, until, n_steps, every, R_WB, w_WB_B):
     """Take the steps after `done` up to number `until`, each body in a lane of its own.
 
-    `like` is a `Bodies` and a `Motion` of floats, whose numbers are in `columns` (., n) and `motions` (., n). Samples of every
-    `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,), rad/s. `turns` (samples or
-    1, 2, n) are cosines and sines of the angles of spins that are left out. A body whose step cannot be projected counts as
-    failed from then on; its samples after that step have no meaning.
+    `like` is a `Bodies` and a `LaneState` of floats, whose numbers are in `columns` (., n) and `motions` (., n). Samples of
+    every `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,), rad/s. `turns`
+    (samples or 1, 2, n) are cosines and sines of the angles of spins that are left out. A body whose step cannot be projected
+    counts as failed from then on; its samples after that step have no meaning.
     """
     n, samples = columns.shape[1], 1 + (n_steps + every - 1) // every
     for at in range(0, n, REGISTER):

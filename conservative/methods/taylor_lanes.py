@@ -65,7 +65,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         R_BP=R_BP,
         units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
     )
-    motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
+    motion = kernel.LaneState(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
     width, like = kernels("compiler.lanes").REGISTER, (zeros_like(start), zeros_like(motion))
     columns, motions = (stack_columns(list(flatten(each, n)), width) for each in (start, motion))
     m = columns.shape[1]

@@ -109,7 +109,7 @@ class PointField:
         S = series.vector(S[1], S[2], S[0])
         M1, M2 = (series.vector(*moment) for moment in moments)
         s, weighted_s, y, torque = (series.history() for _ in range(4))
-        y0 = series.spread(y0)
+        y0 = series.broadcast(y0)
 
         def accelerate(c: Any, n: Any) -> Any:
             torque.push(fuse(-M1, c[n, 1], M2 * c[n, 0]))

@@ -198,7 +198,7 @@ class Series:
         """Return a vector."""
         return join(x, y, z, x) if self.one_body else Axes(x, y, z)
 
-    def spread(self, x):
+    def broadcast(self, x):
         """Return a number by which vectors are multiplied."""
         return join(x, x, x, x) if self.one_body else x
 

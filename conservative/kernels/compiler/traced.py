@@ -84,7 +84,7 @@ else:
             kind = self.registers[0].type
             return kind.count * len(self.registers) if isinstance(kind, ir.VectorType) else 0
 
-        def spread(self, x):
+        def broadcast(self, x):
             """Return the registers of a number x with as many lanes as this one."""
             floats = self.width // len(self.registers)
             if not isinstance(x, Symbol):
@@ -103,7 +103,7 @@ else:
         def emit(self, operation, *numbers):
             """Return the result of an operation on registers, for numbers that may be lanes, single numbers or constants."""
             widest = max((x for x in numbers if isinstance(x, Symbol)), key=lambda x: x.width)
-            registers = zip(*(widest.spread(x) for x in numbers), strict=True)
+            registers = zip(*(widest.broadcast(x) for x in numbers), strict=True)
             return Symbol(self.builder, [operation(*each) for each in registers], self.flags)
 
         def call(self, name, *numbers):
@@ -298,5 +298,5 @@ def join(a, b, c, d):
         return np.array((a, b, c, d))
     value = ir.Constant(ir.VectorType(DOUBLE, FOUR), ir.Undefined)
     for place, x in enumerate((a, b, c, d)):
-        value = symbol.builder.insert_element(value, *symbol.spread(x), ir.Constant(INDEX, place))
+        value = symbol.builder.insert_element(value, *symbol.broadcast(x), ir.Constant(INDEX, place))
     return Symbol(symbol.builder, [value], symbol.flags)
