@@ -38,7 +38,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     """
     every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
     methods: list[Method] = []
-    for name in dict.fromkeys(every):
+    for name in dict.fromkeys("@".join(filter(None, split_requirement(each))) for each in every):
         try:
             family = _family(*split_requirement(name))
             methods += dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants")))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -174,16 +174,17 @@ def compare_projects(
     Raises
     ------
     BadInput
-        This process does not have a scene, or neither version has a method.
+        This process does not have a scene, or neither version has one of the methods, or any.
     """
     for name in scenes:
         define_scene(name)  # before any work
     truths = remember_truths()
     with closing(ProjectSide(base, methods, truths)) as was, closing(ProjectSide(head, methods, truths)) as now:
         made: ProjectComparison = compare((was, now), scenes, tell)
+        if unknown := find_unknown(methods, {line.setting for line in made.lines}):
+            raise BadInput("methods", ", ".join(unknown), "methods that a version has, without engines in environments")
         if not made.lines:
-            raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
-
+            raise BadInput("methods", "none", "a project that registers methods, or names of methods")
         good = [
             (line.scene, line.setting)
             for line in made.lines
@@ -192,6 +193,12 @@ def compare_projects(
         times = compare_times(was, now, good, processes, tell)
         lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
         return replace(made, lines=tuple(lines))
+
+
+def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]:
+    """Return the methods of which no version has a setting."""
+    families = {setting.partition(":")[0] for setting in settings}
+    return [name for name in methods if name.partition(":")[0] not in families]
 
 
 def judge(comparison: ProjectComparison) -> Verdict:

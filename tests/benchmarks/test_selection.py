@@ -138,7 +138,7 @@ def test_an_engine_without_an_environment_is_an_error_with_the_line_that_install
 def test_a_missing_engine_is_a_row_if_requested():
     (selected,) = select_engines(["exudyn==1.2.3"], skip_missing=True)
     assert isinstance(selected, Missing)
-    assert selected.label == "exudyn==1.2.3"
+    assert selected.label == "exudyn@1.2.3"
     case = Case("engines_at_one_step", SCENE, selected, grid_for(SCENE, 0.02))
     outcome = attempt(case, skip_missing=True)
     assert outcome.kind is OutcomeKind.MISSING
@@ -225,3 +225,8 @@ def test_a_method_with_a_missing_engine_has_the_name_that_was_given():
     selected = names_of(Missing("mujoco:RK4", error=MissingEngine("MuJoCo", "mujoco")))
     assert (selected["family"], selected["version"], selected["setting"]) == ("mujoco", "", "RK4")
     assert selected["label"] == "mujoco:RK4"
+
+
+def test_both_ways_to_write_a_version_are_one_engine():
+    found = select_engines(["mujoco@0.0.1", "mujoco==0.0.1"], skip_missing=True)
+    assert [each.name for each in found] == ["mujoco@0.0.1"]

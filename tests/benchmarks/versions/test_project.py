@@ -166,6 +166,13 @@ def test_fields_that_turn_have_different_definitions():
     assert define_scene("stable_satellite") != define_scene("unstable_satellite")
 
 
+def test_methods_that_no_version_has_are_named():
+    """They were left out without a word if another method was there."""
+    settings = {"reduced", "reduced:order=4", "mujoco:RK4"}
+    assert project.find_unknown(["reduced", "mujoco:RK4"], settings) == []
+    assert project.find_unknown(["reduced", "nothing", "mujoco@4.0.0:RK4"], settings) == ["nothing", "mujoco@4.0.0:RK4"]
+
+
 def test_an_unknown_scene_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr(project, "ProjectSide", None)
     with pytest.raises(BadInput, match="scene: got 'nowhere'"):
