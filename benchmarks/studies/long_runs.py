@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from conservative.grid import grid_for
 from conservative.outcome import Outcome
+from conservative.scene import Scene
 
 from ..measures.errors import measure_drifts
 from ..measures.measure import Measure, Value
@@ -16,7 +17,12 @@ from .declaration import Declaration
 from .study import Progress, Study
 
 DURATIONS = 10.0
-"""Length of a run in durations of its scene."""
+"""Length of a run in durations of its scene, if the tables of its loads are as long."""
+
+
+def end_of(scene: Scene) -> float:
+    """Return the length of a long run of a scene, s: `DURATIONS`, or up to the end of the first table that ends before."""
+    return min(scene.t_end * DURATIONS, *(max(scene.t_end, load.end) for load in scene.loads), math.inf)
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -25,7 +31,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     for scene in study.scenes:
         for method in study.competitors:
             tell(f"{scene.name}: {method.name}")
-            case = Case(study.name, scene, method, grid_for(scene, scene.dt, scene.t_end * DURATIONS))
+            case = Case(study.name, scene, method, grid_for(scene, scene.dt, end_of(scene)))
             done = study.attempt(case)
             if isinstance(done, Outcome):
                 yield from case.rows((Value(Measure.DRIFT_MAX, math.nan, each.name) for each in scene.invariants), done)

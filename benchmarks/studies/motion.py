@@ -1,9 +1,9 @@
 """The study of motions that a report shows: those of the methods in the charts, at the steps of their users, and the exact one.
 
-A run has ten durations of its scene, or one if it fails after that. It yields the errors and drifts of the first duration, and
-lines: attitudes and rates of the first duration, the drift of each invariant with its sign, and a curve on a sphere. The curve
-of a free body is its polhode: the angular momentum in principal axes, relative to its initial length. The curve of a body in a
-field is the trace of an axis, a unit vector in world axes.
+A run has ten durations of its scene (`long_runs.end_of`), or one if it fails after that. It yields the errors and drifts of the
+first duration, and lines: attitudes and rates of the first duration, the drift of each invariant with its sign, and a curve on
+a sphere. The curve of a free body is its polhode: the angular momentum in principal axes, relative to its initial length. The
+curve of a body in a field is the trace of an axis, a unit vector in world axes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..measures import errors
 from ..measures.measurement import Samples
 from .case import Case, Success
 from .declaration import Declaration, Named
-from .long_runs import DURATIONS
+from .long_runs import end_of
 from .study import Finding, Progress, Study
 
 SAMPLES = 700
@@ -56,8 +56,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
             tell(f"{scene.name}: {method.name}")
             step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
             first = grid_for(scene, step)
-            for durations in (DURATIONS, 1.0):
-                case = Case(study.name, scene, method, grid_for(scene, step, scene.t_end * durations))
+            for end in (end_of(scene), scene.t_end):
+                case = Case(study.name, scene, method, grid_for(scene, step, end))
                 done = study.attempt(case)
                 if isinstance(done, Success):
                     begin = head(done.trajectory, first.n_samples)

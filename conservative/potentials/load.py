@@ -231,6 +231,11 @@ class OfTime(PickledByFields):
             raise BadInput(self.name, got, "a function that returns the same value each time")
         return max(float(np.linalg.norm(each)) for each in values)
 
+    @property
+    def end(self) -> float:
+        """Last time, s, at which it has a value: that of a table, otherwise infinite."""
+        return float(self.value[0][-1]) if isinstance(self.value, tuple) else math.inf
+
     def require_times(self, t_end: float) -> None:
         """Raise `BadInput` if a table does not cover the times from 0 to t_end, s."""
         if isinstance(self.value, tuple):

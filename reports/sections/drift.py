@@ -38,7 +38,7 @@ def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None
     picture = figures.signed_drift(drifts)
     return Figure(
         f"drift_{scene.name}" if methods is None else "drift_over_time",
-        f"{scene.name}: change of energy and momentum in {long_runs.DURATIONS * scene.t_end:.3g} s",
+        f"{scene.name}: change of energy and momentum in {long_runs.end_of(scene):.3g} s",
         f"Steps of {scene.dt:g} s, unless adaptive. Middle line: exact. Above it a method gains, below it loses. The axis is "
         "logarithmic on both sides of it.",
         picture if methods is None else None,

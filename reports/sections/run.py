@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -37,7 +38,7 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if "truth" in error:
         yield "error against", f"{error['truth']}, largest of {error['samples']} samples"
     for name, value in summary["drift"].items():
-        yield f"drift of {name}", f"{value:.2e} (relative)"
+        yield f"drift of {name}", f"{value:.2e} (relative)" if not math.isnan(value) else DASH
     yield "orthonormality", f"{summary['orthonormality']:.2e}"
     if last := summary["last"]:
         yield f"at t = {last['t']:g} s", ""
@@ -71,7 +72,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
         [
             summary["method"],
             status_of(summary).partition(":")[0] if summary["outcome"].ok else str(summary["outcome"]),
-            *(f"{summary['drift'][name]:.1e}" for name in drifts),
+            *(DASH if math.isnan(summary["drift"][name]) else f"{summary['drift'][name]:.1e}" for name in drifts),
             *(f"{summary['error'][name]:.1e}" if name in summary["error"] else DASH for name in ("attitude", "rate")),
             f"{summary['counters']['steps']:,}",
             f"{summary['wall_time']:.2g}",

@@ -34,8 +34,8 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     sample += "; in the last rows, each of the scene's own steps." if measured.every_step[name] else "."
     decades = replace(contests, caption=f"{name}: fastest method of each class at each decade of the error")
     drift_words = (
-        f"Largest drift over {long_runs.DURATIONS:g} durations, relative (✓ up to {tolerance(CONSERVED)}, ≈ up to "
-        f"{tolerance(SMALL)}, ✗ more)."
+        f"Largest drift over {long_runs.end_of(scene) / scene.t_end:g} durations, relative (✓ up to {tolerance(CONSERVED)}, "
+        f"≈ up to {tolerance(SMALL)}, ✗ more)."
     )
     order_words = (
         "Fit of log(error) over log(step), with standard error, between the steps that are too large to converge and the "

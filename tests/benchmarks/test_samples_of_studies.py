@@ -13,7 +13,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
-from conservative.benchmarks.studies import motion, speed, studies
+from conservative.benchmarks.studies import long_runs, motion, speed, studies
 from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
@@ -113,3 +113,15 @@ def test_the_cost_of_a_setting_is_the_least_time_of_a_simulated_second(monkeypat
     conditions = SimpleNamespace(target=1e-3, scene=BRICK, time_limit=60.0)
     result = recommend.time_settings(conditions, {"a": SimpleNamespace(best=lambda target: probe)})
     assert result == {"a": pytest.approx(2.0 / 0.5)}
+
+
+@pytest.mark.parametrize("name", ["motion", "long_runs"])
+def test_long_runs_end_with_the_table_of_a_load(name):
+    """A table that covers the duration of its scene ended a report with an error."""
+    body, table = cv.RigidBody((2.0, 3.0, 4.0)), ([0.0, 0.2, 0.5], [[0.1, 0.0, 0.2], [0.3, 0.0, 0.1], [0.0, 0.0, 0.0]])
+    scene = cv.Scene("driven", body, np.eye(3), (1.0, 0.5, -0.7), 0.4, dt=0.02, torque=cv.Torque(table))
+    rows, _ = findings(name, cv.Reduced(), scenes=(scene,))
+    assert rows
+    assert all(row.outcome.ok for row in rows)
+    assert long_runs.end_of(scene) == 0.5
+    assert long_runs.end_of(registry.scene("brick_flip")) == 60.0

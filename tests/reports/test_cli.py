@@ -345,3 +345,14 @@ def test_choices_are_those_that_a_scene_file_accepts(table, tmp_path):
         path.write_text(f"t_end = 1.0\n{body}\n{potential}[start]\nw_WB_B = [0, 0, 1]\n")
         allowed = conservative("run", path).stderr.partition("one of ")[2].strip().split(", ")
         assert set(keys) == set(allowed) - {"shape", "kind", "com_B" if table == "shape" else "", "R_BS"}
+
+
+def test_a_balance_that_a_method_does_not_sum_has_no_drift(tmp_path):
+    body = "[body]\ninertia = [2.0, 3.0, 4.0]\n[damping]\nmatrix = [[0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]\n"
+    (tmp_path / "damped.toml").write_text(f"t_end = 0.5\n{body}[start]\nw_WB_B = [1.0, 0.5, -0.7]\n")
+    arguments = ["run", str(tmp_path / "damped.toml"), "--dt", "0.01", "-m", "scipy", "--no-truth"]
+    alone, both = (CliRunner().invoke(main, arguments + more) for more in ([], ["-m", "reduced"]))
+    for done in (alone, both):
+        assert done.exit_code == 0, done.output
+        assert "nan" not in done.output
+        assert "–" in done.output
