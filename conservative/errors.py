@@ -49,7 +49,7 @@ class Unsupported(BadInput):
 
 
 REINSTALL = "the entry points of these files: run pip install -e . again in their folder, or reinstall conservative-rotation"
-"""What to do if the installation is older than the files: entry points are copied when a package is installed."""
+"""Advice if the installation is older than the files: entry points are copied when a package is installed."""
 
 
 class NotLoadable(BadInput):

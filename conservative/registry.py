@@ -48,7 +48,7 @@ def list_engines() -> tuple[str, ...]:
 
 
 VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
-"""What the version of an engine looks like."""
+"""Pattern of the version of an engine."""
 
 
 def partition_version(name: str) -> tuple[str, str, str]:

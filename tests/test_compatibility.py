@@ -1,4 +1,4 @@
-"""What others depend on and must not change by accident: .github/ARCHITECTURE.md, "What must never change"."""
+"""Formats and numbers that others depend on: .github/ARCHITECTURE.md, "What must never change"."""
 
 import re
 

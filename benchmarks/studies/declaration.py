@@ -29,10 +29,10 @@ class Extent(IntEnum):
 
 
 class Named(Enum):
-    """What a study makes of the engines that are named for a report."""
+    """How a study uses the engines that are named for a report."""
 
     APART = auto()
-    """Nothing: they have studies of their own."""
+    """Not at all: they have studies of their own."""
     TOO = auto()
     """They are compared like all methods."""
     ONLY = auto()
@@ -90,7 +90,7 @@ class Declaration:
 
     @property
     def about(self) -> str:
-        """What it measures: the first line of its file, without `The study of` and its name."""
+        """Description: the first line of its file, without `The study of` and its name."""
         first = (sys.modules[self.findings.__module__].__doc__ or "").partition("\n")[0]
         return first.rstrip(".").removeprefix("The study of ").removeprefix(f"{self.name}: ")
 
