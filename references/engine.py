@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import import_module, metadata
 from typing import Any
 
@@ -143,19 +143,29 @@ class EngineAxes:
         return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure, frame=frame)
 
 
-@dataclass(frozen=True, eq=False)
 class EngineRun:
-    """A run of an engine: its own loop, and the conversion of the result. A benchmark can time the loop alone."""
+    """A run of an engine: its loop, with limits, and the conversion of the result.
 
-    own_loop: Callable[[], Any]
-    convert: Callable[[Any], Trajectory]
+    `bind` returns the loop as a user of the engine would write it, with everything bound before and without limits. It is the
+    attribute `own_loop`, which benchmarks time after the first call of the run; by default it is the loop itself.
+    """
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        loop: Callable[[], Any],
+        convert: Callable[[Any], Trajectory],
+        bind: Callable[[], Callable[[], Any]] | None = None,
+    ) -> None:
         # So that the first call does not compile the conversion.
         to_body_axes(np.empty(0), States(MATRIX, np.empty((0, 0, 12))), np.empty((0, 3, 3)))
+        self._loop, self._convert, self._bind = loop, convert, bind
+
+    @cached_property
+    def own_loop(self) -> Callable[[], Any]:
+        return self._bind() if self._bind else self._loop
 
     def __call__(self) -> Trajectory:
-        return self.convert(self.own_loop())
+        return self._convert(self._loop())
 
 
 def principal_axes(scene: Scene) -> EngineAxes:

@@ -27,6 +27,7 @@ from ..potentials.potential import depends_on_time
 from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
+from .run_kernel import KernelRun
 
 AnyMethod = TypeVar("AnyMethod", bound=Method)
 Prepare = Callable[[AnyMethod, Scene, Grid], Run]
@@ -138,6 +139,8 @@ def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
             return prepare(method, scene, grid)
         steps = Grid(grid.dt / units.time, grid.n_steps, grid.every)
         run = prepare(method, scene.derive(convert_scene, units), steps)
-        return lambda: units.restore(run(), scene, grid)
+        restored = KernelRun(lambda: units.restore(run(), scene, grid))
+        restored.own_loop = getattr(run, "own_loop", run)
+        return restored
 
     return prepare_in_units

@@ -64,13 +64,17 @@ class Integrators:
     def __init__(self, compiled: Any) -> None:
         self._first, self._idle = compiled, [copy(compiled)]
 
+    def copy(self) -> Any:
+        """Return an integrator for the caller alone."""
+        return copy(self._first)
+
     @contextmanager
     def borrow(self) -> Iterator[Any]:
         """Yield an idle integrator. The caller sets state, time and parameters."""
         try:
             integrator = self._idle.pop()
         except IndexError:
-            integrator = copy(self._first)
+            integrator = self.copy()
         try:
             yield integrator
         finally:

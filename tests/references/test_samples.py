@@ -1,5 +1,7 @@
 """The compiled conversion of engines' states against products of NumPy, and the run of an engine without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,10 @@ import conservative as cv
 from conservative.attitude import from_quaternion
 from conservative.grid import Grid
 from conservative.potentials.turning import Orbit
+from conservative.references.heyoka_equations import formulations
 from conservative.references.samples import MATRIX, QUATERNION, ROWS, States, to_body_axes
 from conservative.references.solvers.heyoka import FRAMES, Heyoka
+from conservative.trajectory import Trajectory
 
 BODIES, SAMPLES = 3, 5
 DRAW = np.random.default_rng(4)
@@ -56,10 +60,27 @@ def test_samples_count_up_to_the_first_that_is_not_finite(column):
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-def test_the_own_loop_of_heyoka_is_its_run_without_the_conversion(frame):
+@pytest.mark.parametrize("n", [1, 4, 50])
+def test_the_own_loop_of_heyoka_is_its_run_without_the_conversion(frame, n):
+    """The loop of a user, which is timed, has the states of the run with limits, each time from the initial state."""
     scene = cv.scenes.lagrange_top(t_end=0.5)
-    run = Heyoka(1e-12, frame).prepare(scene, Grid(0.01, 50))
-    states, steps, _ = run.own_loop()
+    method = Heyoka(1e-12, frame)
+    run = method.prepare(scene, Grid(0.5 / n, n))
     trajectory = run()
-    assert states.shape[0] == len(trajectory) == 51
-    assert steps == trajectory.counters.steps
+    problem = getattr(formulations, frame)(scene)
+    for _ in range(2):
+        states = np.array(run.own_loop(), ndmin=2)
+        found = formulations.gather([problem])(states[None])
+        R_WB, w_WB_B, _ = to_body_axes(trajectory.t[-len(states) :], found, problem.axes.R_BF[None])
+        assert len(states) == (1 if n == 1 else n + 1)
+        assert np.array_equal(R_WB[0], trajectory.R_WB[-len(states) :])
+        assert np.array_equal(w_WB_B[0], trajectory.w_WB_B[-len(states) :])
+    assert np.array_equal(run().R_WB, trajectory.R_WB)
+
+
+def test_a_loop_in_other_units_is_timed_without_the_conversion_to_si():
+    scene = cv.scenes.lagrange_top(t_end=0.5)
+    tiny = replace(scene, body=cv.RigidBody(scene.body.inertia * 1e-12), potential=None)
+    for method in (cv.Gauss(), Heyoka(1e-9)):
+        run = method.prepare(tiny, Grid(0.01, 50, 50))
+        assert not isinstance(run.own_loop(), Trajectory)
