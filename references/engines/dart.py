@@ -9,7 +9,7 @@ World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://da
 
 import numpy as np
 
-from .shared import sample
+from .shared import stepped
 
 ENGINE = {
     "package": "dartpy",
@@ -45,13 +45,12 @@ def prepare(given):
     start = joint.getPositions().copy(), joint.getVelocities().copy()
     inertial = dart.dynamics.Frame.World()
 
-    def run():
+    def begin():
         world.reset()
         joint.setPositions(start[0])
         joint.setVelocities(start[1])
-        return sample(given, world.step, read)
 
     def read():
         return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}
 
-    return run
+    return stepped(given, begin, world.step, read)

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .shared import sample, write_mjcf
+from .shared import stepped, write_mjcf
 
 AS_INSTALLED = "approximate_implicitfast,precision=f32,as_installed=true"
 ENGINE = {
@@ -66,13 +66,12 @@ def prepare(given):
     step = partial(scene.step, update_visualizer=False)
     step()
 
-    def run():
+    def begin():
         scene.reset()
         body.set_qpos(place)
         body.set_dofs_velocity(rates)
-        return sample(given, step, read)
 
     def read():
         return {"q": body.get_quat().numpy().ravel(), "w_W": body.get_ang().numpy().ravel()}
 
-    return run
+    return stepped(given, begin, step, read)

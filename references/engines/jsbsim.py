@@ -20,7 +20,7 @@ FGPropagate, the integrators; FGInertial, FGMassBalance: https://jsbsim-team.git
 import tempfile
 from pathlib import Path
 
-from .shared import sample
+from .shared import stepped
 
 INTEGRATORS = {  # FGPropagate::eIntegrateType
     **{"RectEuler": 1, "Trapezoidal": 2, "AB2": 3, "AB3": 4, "AB4": 5, "Buss1": 6, "Buss2": 7, "LocalLinearization": 8},
@@ -75,9 +75,7 @@ def prepare(given):
         flight[f"ic/{axis}-rad_sec"] = rate
     attitude = flight.get_propagate()
 
-    def run():
-        flight.run_ic()
-        samples = sample(given, flight.run, read)
+    def convert(samples):
         T = samples["T"]
         # The planet-fixed frame is inertial here. Its attitude in the world follows from the initial attitude.
         return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": samples["w"]}
@@ -85,4 +83,4 @@ def prepare(given):
     def read():
         return {"T": attitude.get_Tec2b(), "w": [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]}
 
-    return run
+    return stepped(given, flight.run_ic, flight.run, read, convert)

@@ -21,7 +21,7 @@ from functools import partial
 
 import numpy as np
 
-from .shared import compile_models, record_warp, sample
+from .shared import compile_models, record_warp, stepped
 
 ENGINE = {
     "package": "mujoco-warp",
@@ -46,6 +46,7 @@ def prepare(given):
     def run():
         return {name: samples[0] for name, samples in run_many().items()}
 
+    run.loop = getattr(run_many, "loop", run_many)
     return run
 
 
@@ -67,10 +68,12 @@ def prepare_many(bodies):
     qpos, qvel = data.qpos.numpy(), data.qvel.numpy()  # views of the engine's own arrays
     q0, w0 = np.array([body.q0 for body in bodies]), np.array([body.w0 for body in bodies])
 
-    def run():
+    def begin():
         qpos[:, :-4], qpos[:, -4:], qvel[:, :-3], qvel[:, -3:] = 0, q0, 0, w0
-        samples = sample(given, step, lambda: {"q": qpos[:, -4:], "w": qvel[:, -3:]})
+
+    def convert(samples):
         return {name: values.swapaxes(0, 1) for name, values in samples.items()}
 
+    run = stepped(given, begin, step, lambda: {"q": qpos[:, -4:], "w": qvel[:, -3:]}, convert)
     run.owners = data, model  # of the views and the rows
     return run

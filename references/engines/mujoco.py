@@ -25,6 +25,7 @@ import ctypes
 from contextlib import contextmanager, nullcontext
 from functools import lru_cache
 from threading import Lock
+from time import perf_counter
 
 import numpy as np
 
@@ -84,7 +85,42 @@ def prepare(given):
         samples = {"q": qpos[:, -4:], "w": qvel[:, -3:], "reason": reason, "evaluations": evaluations}
         return samples | {"p": qpos[:, :3], "v": qvel[:, :3]} if hasattr(given, "p_WB0") else samples
 
+    loop = _bind_loop(mj, model, data, start, given)
+    run.loop = _with_callback(mj, field, loop) if field else loop
     return run
+
+
+def _with_callback(mj, field, loop):
+    """Return the loop with its callback. `wall_time` installs it once, as users do."""
+
+    def call():
+        with _passive(mj, field):
+            return loop()
+
+    def wall_time(calls):
+        with _passive(mj, field):
+            began = perf_counter()
+            for _ in range(calls):
+                loop()
+            return perf_counter() - began
+
+    call.wall_time = wall_time
+    return call
+
+
+def _bind_loop(mj, model, data, start, given):
+    """Return the loop as users write it, for a run that does not fail: it returns qpos and qvel."""
+    if len(given.steps) > 2:
+        march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
+        return lambda: march(mj, model, data, start, given)
+    step, set_state, full, end = mj.mj_step, mj.mj_setState, mj.mjtState.mjSTATE_FULLPHYSICS, (data.qpos, data.qvel)
+
+    def loop():
+        set_state(model, data, start, full)
+        step(model, data, given.n_steps)
+        return end
+
+    return loop
 
 
 def prepare_many(bodies):

@@ -9,7 +9,7 @@ World, joints: https://nimblephysics.org/docs/
 
 import numpy as np
 
-from .shared import sample
+from .shared import stepped
 
 ENGINE = {
     "package": "nimblephysics",
@@ -41,15 +41,14 @@ def prepare(given):
     still = np.zeros(3 * given.free)
     place, rates = np.concatenate([_rotation_vector(given.q0), still]), np.concatenate([given.w0, still])
 
-    def run():
+    def begin():
         skeleton.setPositions(place)
         skeleton.setVelocities(rates)  # in body axes
-        return sample(given, world.step, read)
 
     def read():
         return {"R": body.getWorldTransform().rotation(), "w_W": body.getAngularVelocity()}
 
-    return run
+    return stepped(given, begin, world.step, read)
 
 
 def _rotation_vector(q):

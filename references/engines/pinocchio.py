@@ -53,6 +53,16 @@ def prepare(given):
             samples |= {"p": q[:, :3], "v": np.array([pin.Quaternion(a) * b for a, b in zip(q[:, 3:], v[:, :3], strict=True)])}
         return samples
 
+    if len(given.steps) == 2:
+        q0, v0 = _start(given)
+
+        def loop():
+            q, v = q0, v0
+            for count in range(given.n_steps):
+                q, v = step(q, v, count * given.dt)
+            return q, v
+
+        run.loop = loop
     return run
 
 
@@ -71,9 +81,7 @@ def prepare_many(bodies):
 
 def _march(step, given):
     """Return samples of Pinocchio's coordinates (n, 4 or 7) and velocities (n, 3 or 6), nan after a run has diverged."""
-    q, v, count = np.roll(given.q0, -1), given.w0, 0  # Pinocchio has the scalar last; velocities are in body axes
-    if hasattr(given, "p_WB0"):
-        q, v = np.concatenate([given.p_WB0, q]), np.concatenate([given.R0.T @ given.v_WB0, v])
+    (q, v), count = _start(given), 0
     qs, vs = np.full((len(given.steps), len(q)), np.nan), np.full((len(given.steps), len(v)), np.nan)
     qs[0], vs[0] = q, v
     with np.errstate(all="ignore"):
@@ -85,6 +93,14 @@ def _march(step, given):
                 break
             qs[sample], vs[sample] = q, v
     return qs, vs
+
+
+def _start(given):
+    """Return the initial coordinates and velocities: Pinocchio has the scalar last; velocities are in body axes."""
+    q, v = np.roll(given.q0, -1), given.w0
+    if hasattr(given, "p_WB0"):
+        return np.concatenate([given.p_WB0, q]), np.concatenate([given.R0.T @ given.v_WB0, v])
+    return q, v
 
 
 def _stepper(pin, given):

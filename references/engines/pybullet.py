@@ -45,13 +45,18 @@ def prepare(given):
 
     bullet.connect(bullet.DIRECT)
     flies = hasattr(given, "p_WB0")
-    build = _build_free if given.free else _build_held
+    build, ready = _build_free if given.free else _build_held, []
 
-    def run():
+    def renew():
         bullet.resetSimulation()
         bullet.setGravity(0, 0, -given.gravity)
         bullet.setPhysicsEngineParameter(fixedTimeStep=given.dt, numSubSteps=0)
-        body = build(bullet, given)
+        ready[:] = [build(bullet, given)]
+
+    def run():
+        if not ready:
+            renew()
+        body = ready.pop()
 
         def read():
             if given.free:
@@ -71,6 +76,7 @@ def prepare(given):
         back = given.q_com * (1, -1, -1, -1)
         return {"q": _product(samples["q"], back), "w": samples["w_W"] @ _matrix(given.q_com).T}
 
+    run.renew = renew
     return run
 
 

@@ -45,7 +45,9 @@ def prepare(given):
     com, moments, axes = ([float(number) for number in numbers] for numbers in (given.com, given.moments_com, given.q_com))
     mass = rp.MassProperties(tuple(com), float(given.mass), tuple(moments), rp.Rotation3(*axes))
 
-    def run():
+    ready = []
+
+    def build():
         world = rp.PhysicsWorld(gravity=(0.0, 0.0, -float(given.gravity)))
         world.integration_parameters.dt = given.dt
         world.integration_parameters.num_solver_iterations = given.substeps
@@ -57,7 +59,12 @@ def prepare(given):
         if not given.free:
             support = world.add_body(rp.RigidBody.fixed().build())
             world.impulse_joints.insert(support, handle, rp.SphericalJoint.builder().build(), True)
-        body = world.rigid_bodies[handle]
+        ready.append((world, world.rigid_bodies[handle]))
+
+    def run():
+        if not ready:
+            build()
+        world, body = ready.pop()
 
         def read():
             turn, rate = body.rotation, body.angvel
@@ -67,4 +74,5 @@ def prepare(given):
         samples["q"][0], samples["w_W"][0] = given.q0, given.w0_W  # in double precision
         return samples
 
+    run.renew = build
     return run

@@ -17,7 +17,7 @@ SAPIEN: https://sapien-sim.github.io/docs/
 
 import numpy as np
 
-from .shared import sample
+from .shared import stepped
 
 ENGINE = {
     "package": "sapien",
@@ -66,12 +66,12 @@ def prepare(given):
     start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
     drift = given.v0.astype(np.float32)
 
-    def run():
+    def begin():
         entity.set_pose(start)
         body.set_linear_velocity(drift)
         body.set_angular_velocity(spin)
         body.wake_up()
-        return sample(given, system.step, lambda: {"q": body.get_pose().q, "w_W": body.get_angular_velocity()})
 
+    run = stepped(given, begin, system.step, lambda: {"q": body.get_pose().q, "w_W": body.get_angular_velocity()})
     run.owner = scene  # of the body
     return run

@@ -22,6 +22,27 @@ def sample(given, step, read):
     return {name: np.array([each[name] for each in samples]) for name in samples[0]}
 
 
+def stepped(given, start, step, read, convert=None):
+    """Return the run of an engine that is stepped from Python, and its loop; `start` sets the initial state.
+
+    For `read` see `sample`, whose samples `convert` maps to others.
+    """
+
+    def loop():
+        start()
+        for _ in range(given.n_steps):
+            step()
+
+    def run():
+        start()
+        samples = sample(given, step, read)
+        return convert(samples) if convert else samples
+
+    if len(given.steps) == 2:  # otherwise reading samples is a part of the loop
+        run.loop = loop
+    return run
+
+
 def pack_field(given, moment=0.0):
     """Return the numbers of a field (22,) for `field_torque`; all are 0 if there is none.
 

@@ -252,7 +252,7 @@ class LocalEngine(AdapterMethod):
             run = self._load().prepare(SimpleNamespace(**self.settings, **describe(axes, grid)))
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
-        return EngineRun(run, read_one(axes, grid, self.label))
+        return EngineRun(run, read_one(axes, grid, self.label), bind=lambda: getattr(run, "loop", run))
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Prepare the run of many bodies; return None if the engine does not support it for these bodies."""

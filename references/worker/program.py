@@ -5,6 +5,7 @@ model from the numbers and settings in `given` and returns a run, a function wit
 dictionary. An adapter may also define
 
     prepare_many(bodies)    the same for a list of bodies, in one run
+    run.loop()              measured instead of the run: the loop as users of the engine write it, without reading of samples
     run.renew()             called before each measured call, and not measured
     run.dispose()           called when the run is not needed any more
 
@@ -179,19 +180,20 @@ def _split(numbers: Message, rows: list[str]) -> list[Message]:
 
 
 def _wall_time(run: Any, calls: int) -> float:
-    if inner := getattr(getattr(run, "own_loop", None), "wall_time", None):  # of another process, without the exchange with it
-        return float(inner(calls))
     renew: Callable[[], None] | None = getattr(run, "renew", None)
+    loop = getattr(run, "loop", run)
+    if inner := getattr(getattr(run, "own_loop", loop), "wall_time", None):  # of another process, without the exchange with it
+        return float(inner(calls))
     if renew is None:
         start = perf_counter()
         for _ in range(calls):
-            run()
+            loop()
         return perf_counter() - start
     total = 0.0
     for _ in range(calls):
         renew()
         start = perf_counter()
-        run()
+        loop()
         total += perf_counter() - start
     return total
 

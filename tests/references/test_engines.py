@@ -15,6 +15,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.benchmarks.measures.timing import wall_time
 from conservative.grid import Grid
 from conservative.references import engine
 from conservative.references.engine import principal_axes
@@ -331,3 +332,18 @@ def test_a_planar_body_with_its_weight_in_its_plane_has_a_mass_model():
         "plate", cv.RigidBody(B @ np.diag((1, 2, 3)) @ B.T), B, (1, 2, 3), 1.0, cv.UniformGravity(2, B @ (0.3, 0.4, 0))
     )
     assert engine.unsupported_reason(scene) is None
+
+
+@pytest.mark.parametrize("n", [1, 9, 40])  # by rollout, and by `mj_step`
+@pytest.mark.parametrize("name", ["mujoco:RK4", "mujoco:Euler", "pinocchio:RK4", "pinocchio:Euler"])
+@pytest.mark.parametrize("scene", ["asymmetric_top", "attracted_body", "thrown_box"])
+def test_the_timed_loop_ends_in_the_state_of_the_run(scene, name, n):
+    """It starts from the initial state at each call, and installs the callback of a field by itself."""
+    scene = registry.scene(scene)
+    run = registry.method(name).prepare(scene, Grid(0.005, n, n))
+    before = run()
+    for _ in range(2):
+        _, rates = run.own_loop()
+        np.testing.assert_allclose(rates[-3:] @ scene.body.R_BP.T, before.w_WB_B[-1], rtol=1e-15, atol=1e-15)
+    assert wall_time(run.own_loop, 3) > 0
+    assert np.array_equal(run().R_WB, before.R_WB)

@@ -158,6 +158,12 @@ def test_renewing_a_run_is_not_measured():
     assert time.perf_counter() - start > 2
 
 
+def test_the_loop_is_measured_instead_of_the_run():
+    slow = Trial("loop").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
+    assert slow.own_loop.wall_time(2) >= 0.2  # of its loop; the run itself takes a millisecond
+    assert slow().ok
+
+
 def test_runs_in_threads_do_not_mix():
     scenes = [cv.scenes.brick_flip(t_end=end) for end in (0.1, 0.2, 0.3, 0.4)]
     lengths = {}

@@ -40,6 +40,8 @@ def prepare(given):
 
     if given.do == "renew":
         run.renew = lambda: time.sleep(0.5)
+    if given.do == "loop":
+        run.loop = lambda: time.sleep(0.1)
     return run
 
 
