@@ -35,15 +35,15 @@ from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, names_of
 from ..studies.selection import tolerance_setting
+from ..studies.speed import CALL, own_loop
 from ..studies.study import HANG_LIMIT, Progress
 from ..studies.time_limit import attempt_here
 from .probe import RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
 
 COST_LIMIT = 1.0
 """Wall time per simulated second, s/s, that a setting may cost: real time."""
-RUN_TIME = 0.005
-"""Target duration of a timed run, s."""
 ROUNDS, TIMING_BUDGET = 7, 0.25
+"""Rounds of timing, and the time budget, s, for all of one setting."""
 COARSER_START = 4
 """First step of our methods, in units of the automatically chosen step, so that an order can be observed."""
 LOOSEST = 1e-3
@@ -316,20 +316,18 @@ def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: fl
 
 
 def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Outcome]) -> dict[str, float]:
-    """Return the wall time per simulated second of the resulting settings, s/s, by line: interleaved minimums."""
+    """Return the wall time per simulated second of the resulting settings over the motion of their probes, s/s, by line."""
     runs, lengths = {}, {}
     for line, refinement in refinements.items():
         probe = None if isinstance(refinement, Outcome) else refinement.best(conditions.target)
         if probe is None or not probe.outcome.ok:
             continue
-        length = min(RUN_TIME / probe.cost, conditions.duration if conditions.scene.loads else math.inf)
-        n = max(1, round(length / probe.dt))
-        adaptive = tolerance_setting(probe.method) is not None
-        grid = Grid(length, 1) if adaptive else Grid(probe.dt, n, n)
-        run = attempt_here(conditions.time_limit, Case("recommendation", conditions.scene, probe.method, grid))
-        if isinstance(run, Success):
-            runs[line], lengths[line] = run.run, grid.dt * grid.n_steps
-    timings = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
+        n = round(probe.length / probe.dt)
+        grid = Grid(probe.length, 1) if tolerance_setting(probe.method) else Grid(probe.dt, n, n)
+        done = attempt_here(conditions.time_limit, Case("recommendation", conditions.scene, probe.method, grid))
+        if isinstance(done, Success):
+            runs[line], lengths[line] = own_loop(done.run), probe.length
+    timings = time_interleaved(runs, ROUNDS, CALL, TIMING_BUDGET)
     return {line: timing.minimum / lengths[line] if timing.outcome.ok else math.inf for line, timing in timings.items()}
 
 

@@ -25,7 +25,6 @@ from .case import Case, Success
 from .declaration import Declaration, Named
 from .selection import Missing
 from .speed import MEASURES, time_steps
-from .step_ladder import SAMPLES
 from .study import Progress, Study
 from .time_limit import attempt_here
 
@@ -39,7 +38,7 @@ FAR_SIDE = 0.5
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield the properties of each engine, its errors and drifts with every step stored, and its times with a few samples."""
+    """Yield the properties of each engine, its errors and drifts with every step stored, and its times, final state only."""
     tell = study.count(progress, len(study.competitors) + 1)
     for scene in study.scenes:
         grid = grid_for(scene, scene.dt)
@@ -65,9 +64,9 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
         yield from case.rows(properties, outcome, AS_INSTALLED if method in method.settings_for("as_installed") else "")
     yield from measure_accuracy(case, done, truth)
     if isinstance(done, Success):
-        # The same steps with few samples, and fewer steps if the run is slow.
+        # The same steps, and the first ones if the run is slow.
         n_steps = math.ceil(case.grid.n_steps * min(1.0, study.longest_run / done.cost.first_call))
-        case = replace(case, grid=Grid(case.grid.dt, n_steps, math.ceil(n_steps / SAMPLES)))
+        case = replace(case, grid=Grid(case.grid.dt, n_steps, n_steps))
         done = study.attempt_here(case)
     if isinstance(done, Outcome):
         yield from case.rows(blanks(*MEASURES), done)

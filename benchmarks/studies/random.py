@@ -7,11 +7,7 @@ same step sizes for every method with a step and the same tolerances for every a
   initial rate (10 to 20 rad of actual rotation for nine in ten of 120 bodies). Asymmetric bodies in a field amplify errors: an
   initial relative error of the rates by a factor of 10 at the median, of 19 or more on one body in ten, and of 1,400 at most.
   Over 48 rad the factor is 33 at the median and 1,400 or more on one body in twenty.
-* The time of a setting is that of the same motion, final state only, repeated within each sample. Only the loop is timed (the
-  attribute `own_loop` of a run): on our side one compiled call per motion, for heyoka the reset of its state and
-  `propagate_until`. The conversion of the final state, which is our adapter's, would add 2 µs on our side and 6 µs on
-  heyoka's. What remains of a call in Python is 1 to 2 µs on our side and 2 to 4 µs on heyoka's: of motions that take 2 to 14 µs
-  and 8 to 40 µs (five bodies, errors of 1e-2 to 1e-12 rad), so at large errors a third to a half of either.
+* The time of a setting is that of the same motion, final state only, as in all studies (`time_runs`).
 * Settings that cannot be the fastest are not timed, to save time: see `worth_timing`.
 
 The reference solution of each body is confirmed by an independent one (`references.truth.confirm`). A body on which they differ
@@ -65,14 +61,10 @@ ORDER = 4
 """Smallest order of a method. Methods of lower order take thousands of steps instead of a dozen."""
 FLOOR = DECADES[-1] / 10
 """A method that is below this error twice gets no shorter steps, because no decade is left."""
-CALL = 1e-4
-"""Smallest duration of a timed sample, s: short samples are rarely interrupted."""
 MARGIN = 3.0
 """A setting is timed if its estimated time is at most this multiple of the fastest setting's on its side."""
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run above which only every third setting of a line is measured."""
-ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
-"""Rounds of timing, rounds of a quick study, and the time budget, s, for all rounds of one setting."""
 TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
 
@@ -209,9 +201,8 @@ def time_rows(study: Study, points: list[TimedSetting], processes: Processes) ->
             if isinstance(run, Outcome):
                 yield case.row(TIME, run)
             else:
-                ready[case, Measure.TIME] = case, getattr(run, "own_loop", run)
-        rounds = QUICK_ROUNDS if study.quick else ROUNDS
-        yield from time_runs(study, ready, processes, rounds, CALL, BUDGET, own_loop=(Measure.TIME,))
+                ready[case, Measure.TIME] = case, run
+        yield from time_runs(study, ready, processes)
 
 
 def prepare_unchecked(case: Case) -> Run | Outcome:

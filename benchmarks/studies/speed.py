@@ -19,7 +19,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
-from ..measures.timing import Timing, time_interleaved, wall_time
+from ..measures.timing import Timing, time_interleaved
 from .case import Case, Success
 from .declaration import Declaration
 from .study import Progress, Study
@@ -33,48 +33,23 @@ MEASURES = (
     Measure.PREPARE,
     Measure.FIRST_CALL,
 )
-CALL = 0.004
-"""Target duration of a timed call, s, for which the overhead of a call is a few percent."""
+CALL = 1e-4
+"""Shortest timed sample, s. A faster run is repeated within a sample, each time from the initial state over the same motion."""
 TRIAL = 8
 """Number of steps of the run that determines the speed of a foreign method."""
-LONGEST = 2**16
-"""Largest factor by which the number of steps of a timed run increases."""
-ROUNDS = 5
-"""Largest number of rounds for each of hundreds of points."""
 Runs = dict[tuple[Case, Measure], tuple[Case, Callable[[], Any]]]
-"""Timed cases and runs, by the case and the measure of their rows."""
+"""Timed cases and their runs, by the case and the measure of their rows."""
 UNCOUNTED = Outcome(OutcomeKind.UNSUPPORTED, "its engine does not count steps")
 
 
-def keep_end(grid: Grid, times: int = 1) -> Grid:
-    """Return a grid with `times` as many steps, initial and final state only."""
-    return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
+def keep_end(grid: Grid) -> Grid:
+    """Return a grid over the same motion, initial and final state only."""
+    return Grid(grid.dt, grid.n_steps, grid.n_steps)
 
 
-def make_timed(study: Study, case: Case) -> tuple[Case, Success] | Outcome:
-    """Return a case to be timed and its result, with the cost of the first run, or the outcome of its failure.
-
-    It has so many steps that a call takes about `CALL` s, or the most steps that do not fail. Their number is determined in
-    several rounds, because a short call is mostly overhead.
-    """
-    done = study.attempt_here(case)
-    if isinstance(done, Outcome):
-        return done
-    longest, cost, times = case, done.cost, 1
-    while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
-        times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
-        longer = replace(case, grid=keep_end(case.grid, times))
-        again = study.attempt_here(longer)
-        if isinstance(again, Outcome):
-            break
-        longest, done = longer, again
-    return longest, replace(done, cost=cost)
-
-
-def _shortest(run: Run) -> float:
-    """Return the wall time of a call, s: the smallest of three, or the first if it is far too long."""
-    spent = wall_time(run)
-    return spent if spent > 10 * CALL else min(spent, wall_time(run), wall_time(run))
+def own_loop(run: Run) -> Callable[[], Any]:
+    """Return the part of a run that is timed: without the conversion of its samples, if it can be run without one."""
+    return getattr(run, "own_loop", run)
 
 
 def shorten(study: Study, case: Case) -> Case:
@@ -100,18 +75,19 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             tell(f"{scene.name}: preparing {method.name}")
             scene.forget()  # so that the scene is converted again; compiled code stays warm
             case = shorten(study, Case(study.name, scene, method, keep_end(grid_for(scene, scene.dt))))
-            timed = make_timed(study, case)
-            if isinstance(timed, Outcome):
-                yield from case.rows(blanks(*MEASURES), timed)
+            done = study.attempt_here(case)
+            if isinstance(done, Outcome):
+                yield from case.rows(blanks(*MEASURES), done)
             else:
-                ready.update([timed])
+                ready[case] = done
         tell(f"{scene.name}: timing {len(ready)} methods")
         yield from time_steps(study, ready)
 
 
 def time_steps(study: Study, ready: Mapping[Case, Success]) -> Iterator[Measurement]:
     """Yield the `MEASURES` of runs, all in interleaved rounds."""
-    timings = time_interleaved({case: done.run for case, done in ready.items()}, study.rounds, budget=study.timing_budget)
+    loops = {case: own_loop(done.run) for case, done in ready.items()}
+    timings = time_interleaved(loops, study.rounds, CALL, study.timing_budget)
     for case, timing in timings.items():
         yield from times(case, ready[case], timing)
 
@@ -137,36 +113,27 @@ def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Ite
     """Yield the times of cases, final state only; see `time_runs`."""
     ready: Runs = {}
     for case in cases:
-        timed = make_timed(study, replace(case, grid=keep_end(case.grid)))
-        if isinstance(timed, Outcome):
-            yield case.row(Value(Measure.TIME, math.nan), timed)
+        timed = replace(case, grid=keep_end(case.grid))
+        done = study.attempt_here(timed)
+        if isinstance(done, Outcome):
+            yield case.row(Value(Measure.TIME, math.nan), done)
         else:
-            longest, done = timed
-            ready[case, Measure.TIME] = longest, done.run
+            ready[case, Measure.TIME] = timed, done.run
     yield from time_runs(study, ready, processes)
 
 
-def time_runs(
-    study: Study,
-    ready: Runs,
-    processes: Processes,
-    rounds: int = 0,
-    min_time: float = CALL / 2,
-    budget: float = 0.0,
-    own_loop: tuple[Measure, ...] = (Measure.TIME_OWN_LOOP,),
-) -> Iterator[Measurement]:
+def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measurement]:
     """Yield the times of runs, s per simulated second, all in interleaved rounds, a row for each process.
 
-    For rounds, min_time and budget see `time_interleaved`; 0 stands for those of the study. `own_loop` are the measures of runs
-    without the conversion of samples.
+    The conversion of samples is included in `Measure.TIME_SAMPLED` only.
     """
     timings = processes.time(
-        {key: run for key, (_, run) in ready.items()},
-        {key: partial(prepare_loop, case, key[1] in own_loop) for key, (case, _) in ready.items()},
+        {key: run if key[1] == Measure.TIME_SAMPLED else own_loop(run) for key, (_, run) in ready.items()},
+        {key: partial(prepare_timed, case, key[1] == Measure.TIME_SAMPLED) for key, (case, _) in ready.items()},
         limit=study.hang_limit * (1 + len(ready)),
-        rounds=rounds or min(study.rounds, ROUNDS),
-        min_time=min_time,
-        budget=budget or study.timing_budget / 2,
+        rounds=study.rounds,
+        min_time=CALL,
+        budget=study.timing_budget / 4,
         shared=list({case.scene: None for case, _ in ready}),
     )
     for key, each in timings.items():
@@ -174,11 +141,11 @@ def time_runs(
         yield from key[0].time_rows(key[1], each, case.grid.dt * case.grid.n_steps)
 
 
-def prepare_loop(case: Case, own: bool) -> Callable[[], Any]:
-    """Return the run of a case; if `own`, without the conversion of its samples, if it can be run without one."""
+def prepare_timed(case: Case, converted: bool) -> Callable[[], Any]:
+    """Return what is timed of a case, prepared: its run if samples are converted, otherwise its own loop."""
     run = case.method.prepare(case.scene, case.grid)
     run()  # so that engines find their limits outside of the loop
-    return getattr(run, "own_loop", run) if own else run
+    return run if converted else own_loop(run)
 
 
 STUDY = Declaration(findings, timed=True)

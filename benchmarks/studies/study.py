@@ -81,7 +81,7 @@ class Study:
     @property
     def rounds(self) -> int:
         """Rounds of interleaved timing."""
-        return 3 if self.quick else 9
+        return 7 if self.quick else 15
 
     @property
     def timing_budget(self) -> float:

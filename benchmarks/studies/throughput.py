@@ -68,7 +68,6 @@ BODIES, QUICK_BODIES = 64, 8
 """Number of bodies whose errors are measured."""
 PREPARATION = 8.0
 """Largest time of a preparation, in units of the time limit of a call."""
-ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
 """Statistics of the errors of the bodies."""
 EXACT = "closed form"
@@ -206,7 +205,8 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
             off = angle_between(kind.truth, block.R_WB).max(axis=1)
         off = np.where(block.finished & np.isfinite(off), off, math.pi)
         errors = {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
-        line.append(BatchSetting(chosen, case, errors, cost.first_call / n, cost.prepare / n))
+        if block.finished.all():  # otherwise a run ends early, and its time is not that of the motion
+            line.append(BatchSetting(chosen, case, errors, cost.first_call / n, cost.prepare / n))
         values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
         yield from case.rows(values, detail=EXACT if exact else "")
     return line
@@ -240,7 +240,7 @@ def time_rows(
         {point: run for point, (run, *_) in ready.items()},
         {point: partial(prepare_drawn, point.way, point.case.drawn, size, keep_end(point.case.grid)) for point in ready},
         limit=study.hang_limit * (1 + len(ready)),
-        rounds=QUICK_ROUNDS if study.quick else ROUNDS,
+        rounds=study.rounds,
         min_time=CALL,
         budget=study.timing_budget,
     )

@@ -27,7 +27,7 @@ from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success
 from ..studies.line import LinePoint, measure_line
-from ..studies.speed import keep_end, make_timed, shorten
+from ..studies.speed import CALL, keep_end, own_loop, shorten
 from ..studies.study import Progress, Study
 from .comparison import TIMING, Comparison, Line, compare
 from .times import Ratio, ratio_of
@@ -256,10 +256,9 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     real difference appears again.
     """
     grid = keep_end(grid_for(scene, scene.dt))
-    timed = {
-        version: make_timed(study, shorten(study, Case(study.name, scene, method, grid))) for version, method in methods.items()
-    }
-    ready = {version: run[1] for version, run in timed.items() if not isinstance(run, Outcome)}
+    cases = {version: shorten(study, Case(study.name, scene, method, grid)) for version, method in methods.items()}
+    tried = {version: study.attempt_here(case) for version, case in cases.items()}
+    ready = {version: done for version, done in tried.items() if not isinstance(done, Outcome)}
     times = _repeat(study, ready, range(REPEATS))
     if any(ratio(was, now).beyond(TIME_FACTOR) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))
@@ -268,7 +267,7 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
 
 
 def _repeat(study: Study, ready: Mapping[str, Success], seeds: range) -> dict[str, StepTimes]:
-    runs = {version: done.run for version, done in ready.items()}
-    repeats = [time_interleaved(runs, ROUNDS, budget=study.timing_budget, seed=seed) for seed in seeds]
+    runs = {version: own_loop(done.run) for version, done in ready.items()}
+    repeats = [time_interleaved(runs, ROUNDS, CALL, study.timing_budget, seed) for seed in seeds]
     steps = {version: done.trajectory.counters.steps or math.nan for version, done in ready.items()}
     return {version: tuple(each[version].minimum / steps[version] for each in repeats) for version in ready}

@@ -20,8 +20,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from conservative import registry
 from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
+from conservative.grid import grid_for
 
 from ..studies.study import Progress
 from .comparison import TIMING
@@ -39,9 +41,11 @@ LAYOUTS = 3
 MOST_TURNS = 6
 """Largest number of measurements for a row whose interval contains the limit."""
 SAMPLE = 0.0004
-"""Duration of a sample, s: most fit between two interruptions."""
-MOST_STEPS, MOST_CALLS = 2**20, 10_000
-"""Largest number of steps of a run, and of calls in a sample."""
+"""Duration of a sample of short runs, s: most fit between two interruptions."""
+LONGEST = 0.002
+"""Duration of a call, s, above which it has the first steps of the scene only. A shorter one is the scene's motion."""
+MOST_CALLS = 10_000
+"""Largest number of calls in a sample."""
 RESAMPLES = 4999
 
 
@@ -159,14 +163,16 @@ class Clock:
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
         if row not in self._work:
-            n, spent = 16, 0.0
-            while True:  # to the number of steps that take as long as a sample, to several percent
-                run = self._sides[0].timed(*row, n)
+            scene, n, spent = registry.scene(row[0]), 16, 0.0
+            most = grid_for(scene, scene.dt).n_steps
+            while True:  # to all steps of the scene, or the first ones of a slow method
+                run = self._sides[0].timed(*row, min(n, most))
                 run.wall_time(1)
                 spent = max(min(run.wall_time(1) for _ in range(5)), 1e-9)
-                if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
+                if spent >= LONGEST or n >= most:
                     break
-                n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / spent)))
+                n = max(n + 1, math.ceil(n * min(8.0, 1.2 * LONGEST / spent)))
+            n = min(n, most)
             self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / spent / 2)))
         steps, calls = self._work[row]
         runs = [[side.timed(*row, steps) for _ in range(LAYOUTS)] for side in self._sides]

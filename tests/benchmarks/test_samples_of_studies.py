@@ -109,7 +109,7 @@ def test_speed_has_the_minimum_and_the_median():
 def test_the_cost_of_a_setting_is_the_least_time_of_a_simulated_second(monkeypatch):
     timed = lambda runs, *_, **__: dict.fromkeys(runs, Timing(2.0, 3.0, 7, 1))  # noqa: E731
     monkeypatch.setattr(recommend, "time_interleaved", timed)
-    probe = SimpleNamespace(outcome=OK, cost=recommend.RUN_TIME / 0.5, dt=0.01, method=cv.Reduced())
+    probe = SimpleNamespace(outcome=OK, length=0.5, dt=0.01, method=cv.Reduced())
     conditions = SimpleNamespace(target=1e-3, scene=BRICK, time_limit=60.0)
     result = recommend.time_settings(conditions, {"a": SimpleNamespace(best=lambda target: probe)})
     assert result == {"a": pytest.approx(2.0 / 0.5)}
