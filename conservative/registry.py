@@ -67,6 +67,8 @@ def engine(name: str) -> Any:
 def scene(text: str) -> Scene:
     """Return a scene from its name with parameters, such as `brick_flip:disturbance=1e-6`, or from a file, `my_body.toml`.
 
+    A scene with parameters has them in its name, so that rows of the same scene with other parameters are apart.
+
     Raises
     ------
     BadInput
@@ -80,7 +82,8 @@ def scene(text: str) -> Scene:
         return load(text)
     name, _, settings = text.partition(":")
     builder: Callable[..., Scene] = load_entry(SCENES, "scene", name)
-    return call_with_settings(builder, f"scene {name}", settings)
+    built = call_with_settings(builder, f"scene {name}", settings)
+    return built.rename(f"{name}:{settings}") if settings and built.name == name else built
 
 
 def method(text: str) -> Method:

@@ -65,7 +65,7 @@ class Study:
     Raises
     ------
     BadInput
-        There are no scenes or no methods, or the limit is not a finite duration above 0.
+        There are no scenes or no methods, two scenes have one name, or the limit is not a finite duration above 0.
     """
 
     name: str
@@ -134,6 +134,9 @@ class Study:
         for argument in ("scenes", "methods"):
             if not getattr(self, argument):
                 raise BadInput(argument, "none", "one or more")
+        names = [scene.name for scene in self.scenes]
+        if repeated := next((name for name in names if names.count(name) > 1), ""):  # rows would be taken for one scene's
+            raise BadInput("scenes", f"two with the name {repeated!r}", "scenes with different names (`name` in a scene file)")
         positive_integer("processes", self.processes)
         if self.time_limit is not None:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")

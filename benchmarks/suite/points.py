@@ -146,7 +146,7 @@ def measure(point: Point) -> tuple[dict[str, float], dict[str, float]]:
         measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
     nudged = {name: [each[name] for each in measured] for name in measured[0]}
     spreads = {name: max(values) - min(values) for name, values in nudged.items()}
-    order = fit_order(point) if point.scene.name in PAPER else {}
+    order = fit_order(point) if point.scene.name.partition(":")[0] in PAPER else {}
     return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
 
 

@@ -161,7 +161,13 @@ def test_progress_counts_up_to_the_whole(name):
 
 
 @pytest.mark.parametrize(
-    ("change", "argument"), [({"name": "sped"}, "name"), ({"scenes": ()}, "scenes"), ({"methods": ()}, "methods")]
+    ("change", "argument"),
+    [
+        ({"name": "sped"}, "name"),
+        ({"scenes": ()}, "scenes"),
+        ({"methods": ()}, "methods"),
+        ({"scenes": (SCENE, SCENE)}, "scenes"),
+    ],
 )
 def test_bad_studies(change, argument):
     good = {"name": "speed", "scenes": (SCENE,), "methods": (cv.Reduced(),)}

@@ -35,6 +35,13 @@ def test_the_nearest_names_of_an_unknown_scene_are_listed(text, hint):
     assert hint in str(caught.value)
 
 
+def test_a_scene_with_parameters_has_them_in_its_name():
+    assert registry.scene("brick_flip").name == "brick_flip"
+    assert registry.scene("brick_flip:t_end=24").name == "brick_flip:t_end=24"
+    drawn = "random_body:field=spring,seed=7,index=12"
+    assert registry.scene(drawn).name == drawn
+
+
 @pytest.mark.parametrize("text", ["heyoka:tol=small", "gauss:stages=two", "gauss:many"])
 def test_words_instead_of_numbers_are_refused(text):
     with pytest.raises(BadInput, match="a number, such as"):
