@@ -10,7 +10,7 @@ import numpy as np
 from conservative.attitude import Array, from_quaternion, hat
 from conservative.references.engine import principal_axes
 from conservative.references.exact.method import Exact, free_body, lagrange_top
-from conservative.references.solvers.scipy import Derivative, list_derivatives, solve_pieces, wheel_rates
+from conservative.references.solvers.scipy import Derivative, SolveIvp, list_derivatives, solve_pieces, wheel_rates
 from conservative.scene import Scene
 
 States = tuple[Array | None, Array | None]
@@ -103,7 +103,7 @@ class Compared:
         pieces = [(a, b, changed(exact)) for a, b, exact in list_derivatives(self.scene, float(t[-1]), self.start)]
         with np.errstate(all="ignore"):  # a motion that diverges ends in nan
             atol = self.tolerance * np.repeat([1.0, self.scale], [4, 3])
-            found = solve_pieces(self.scene, pieces, t, rtol=self.tolerance, atol=atol)[0]
+            found = solve_pieces(self.scene, pieces, t, SolveIvp("DOP853", self.tolerance, atol))[0]
             states[: len(found)] = found
             return self.motion(states)
 

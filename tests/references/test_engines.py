@@ -226,7 +226,15 @@ BRICK = cv.scenes.brick_flip(t_end=1.0)
 @pytest.mark.parametrize("n_steps", [2, 20])
 @pytest.mark.parametrize(
     ("name", "rate"),
-    [("scipy", 1e30), ("scipy:LSODA", 1e30), ("scipy:Radau", 1e30), ("precise:64", 1e30), ("heyoka:1e-9", 1e20)],
+    [
+        ("scipy", 1e30),
+        ("scipy:LSODA", 1e30),
+        ("scipy:Radau", 1e30),
+        ("scipy:loop=compiled", 1e30),
+        ("scipy:LSODA,loop=compiled", 1e30),
+        ("precise:64", 1e30),
+        ("heyoka:1e-9", 1e20),
+    ],
 )
 def test_a_run_that_needs_too_many_steps_ends_at_once(name, rate, n_steps):
     scene = BRICK.rename("fast", w_WB_B0=(0.0, rate, rate / 10))
@@ -246,7 +254,8 @@ def test_an_adaptive_engine_stops_at_the_limit_of_steps(monkeypatch, method, n_s
     assert run.counters.steps == 5
 
 
-def test_an_exception_of_a_potential_is_reported():
+@pytest.mark.parametrize("name", ["scipy", *(f"scipy:{name},loop=compiled" for name in ("DOP853", "RK45", "LSODA", "Adams"))])
+def test_an_exception_of_a_potential_is_reported(name):
     hook, calls = np.array([0.0, 0.1, 0.4]), []
 
     def gradient(R):
@@ -258,7 +267,7 @@ def test_an_exception_of_a_potential_is_reported():
     field = cv.FunctionPotential(lambda R: (R[2] @ hook) ** 4, gradient)
     scene = cv.Scene("s", BRICK.body, np.eye(3), (0.1, 0.2, 3.0), 1.0, field)
     with pytest.raises(cv.PotentialFailed) as caught:
-        cv.integrate(scene, 0.1, SciPy())
+        cv.integrate(scene, 0.1, registry.method(name))
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
 
 
