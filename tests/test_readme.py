@@ -235,3 +235,17 @@ def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
     assert "Of these 22 cases, heyoka is faster beyond the interval" in text
     assert "in none; 11 are open" in text
     assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")
+
+
+def test_the_scripts_of_the_table_of_calls_end_in_the_states_of_the_timed_runs(monkeypatch):
+    calls = load("calls")
+    found = calls.measure_calls(rounds=1)
+    rows = {(each["name"], each["quantity"]): each["value"] for each in calls.call_rows(found)}
+    assert len(rows) == 3 * len(calls.CALLS)
+    for name in calls.CALLS:
+        timed, script = rows[name, "timed call"], rows[name, "shortest script"]
+        assert rows[name, "ratio"] == pytest.approx(timed / script)
+        assert min(timed, script) > 0.2  # us
+    monkeypatch.setattr(calls, "STEP", 0.02)  # of the scripts only
+    with pytest.raises(AssertionError, match="Mismatched"):
+        calls.measure_calls(rounds=1)

@@ -2,7 +2,7 @@
 
     python .ci/readme                    # write them
     python .ci/readme --check            # exit with 1 if one of them is not current
-    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price
+    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price --calls
 
 The last form first replaces rows of measured.csv, from the folders of a report and of studies, and the picture. Options can be
 left out; the rows of others stay. CONTRIBUTING.md has the commands that make the folders.
@@ -32,6 +32,7 @@ def read_pages(root: Path) -> dict[Path, str]:
 
 def measure_again(options: argparse.Namespace) -> None:
     """Replace rows of measured.csv, and the picture."""
+    import calls
     import measure
     import price
 
@@ -42,6 +43,7 @@ def measure_again(options: argparse.Namespace) -> None:
         measured.SCENES: measure.three_scenes(*options.scenes) if options.scenes else None,
         measured.MANY: measure.many_rows(options.many) if options.many else None,
         measured.PRICE: price.price_rows(price.measure_pairs()) if options.price else None,
+        measured.CALLS: calls.call_rows(calls.measure_calls()) if options.calls else None,
     }
     old = measured.read_rows()
     rows = [row for part, new in made.items() for row in new or [each for each in old if measured.part_of(each) == part]]
@@ -65,8 +67,9 @@ def main(root: Path = ROOT) -> None:
     parser.add_argument("--scenes", nargs=2, type=Path, metavar="FOLDER", help="TIMES EACH_STEP: the table of three scenes")
     parser.add_argument("--many", type=Path, metavar="FOLDER", help="the table of many bodies")
     parser.add_argument("--price", action="store_true", help="measure the table of prices, in new processes")
+    parser.add_argument("--calls", action="store_true", help="measure the table of calls")
     options = parser.parse_args()
-    if options.measured or options.scenes or options.many or options.price:
+    if options.measured or options.scenes or options.many or options.price or options.calls:
         measure_again(options)
     pages = read_pages(root)
     new = {page: marks.fill(text, PARTS) for page, text in pages.items()} | {root / "README.md": measured.render_readme()}

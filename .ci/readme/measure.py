@@ -23,7 +23,9 @@ COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "c
 CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
 GENERAL = "taylor:order=12"
 """Our integrator for any body in README's table."""
-ENGINES = {"heyoka": "heyoka", "SciPy": "scipy", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
+ENGINES = {"heyoka": "heyoka", "SciPy": "scipy:loop=compiled", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
+"""The methods of the drifts and errors; times are those of the fastest setting of a family."""
+FAMILIES = {name: method.partition(":")[0] for name, method in ENGINES.items()}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
 TIMES = (
@@ -38,10 +40,10 @@ SCENES = (
 )
 MANY = "conservative study throughput --methods taylor,heyoka,mujoco --sizes 1024"
 OURS = {"our general integrators": MethodClass.GENERAL, "our closed forms": MethodClass.SOLUTION}
-OTHERS = {**ENGINES, "CyRK": "cyrk"}
+OTHERS = {**FAMILIES, "CyRK": "cyrk"}
 EACH = ("the scene's steps, all stored", "without the conversion of an engine's states", "the scene's steps, final state only")
 """The rows of `each_step` in the table of three scenes, in the order of `EachStep.runs`."""
-PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
+PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy:loop=compiled")
 
 
 def scene_rows(report: Path, times: Path) -> Iterator[dict[str, Any]]:
@@ -114,7 +116,7 @@ def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
 def _time_rows(timed: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
     """Yield the time of the fastest setting of each family that reaches `ERROR`, and heyoka's time over ours."""
     reached, common = costs(timed, [ERROR]), {"scene": scene, "version": ""}
-    families = {"ours": GENERAL.partition(":")[0], "closed form": CLOSED_FORMS[scene], **ENGINES}
+    families = {"ours": GENERAL.partition(":")[0], "closed form": CLOSED_FORMS[scene], **FAMILIES}
     fastest = {name: cheapest(reached[reached["family"] == family]) for name, family in families.items()}
     for name, each in fastest.items():
         time, method = (1e6 * each.time, each.name) if each else (math.inf, "")

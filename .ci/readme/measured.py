@@ -11,10 +11,11 @@ from marks import table
 
 HERE = Path(__file__).resolve().parent
 ROWS = HERE / "measured.csv"
-REPORT, BODIES, SCENES, MANY, PRICE = "report", "random bodies", "three scenes", "many bodies", "price"
+REPORT, BODIES, SCENES, MANY = "report", "random bodies", "three scenes", "many bodies"
+PRICE, CALLS = "price", "call"
 """Parts of measured.csv, in its order."""
 RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
-VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4", "SciPy": "DOP853"}
+VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4"}
 
 
 def read_rows() -> list[dict[str, str]]:
@@ -25,7 +26,7 @@ def read_rows() -> list[dict[str, str]]:
 
 def part_of(row: dict[str, str]) -> str:
     """Return the part to which a row belongs."""
-    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, MANY, PRICE)]
+    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, MANY, PRICE, CALLS)]
     return known[0] if known else SCENES if "," in row["scene"] else REPORT
 
 
@@ -129,6 +130,17 @@ def render_price() -> str:
     return table(header, lines) + f"\n{origin(PRICE)}\n"
 
 
+def render_calls() -> str:
+    """Return the times of a timed call and of the shortest script, and their ratio, a row for each engine."""
+    rows = [row for row in read_rows() if part_of(row) == CALLS]
+    quantities = list(dict.fromkeys(row["quantity"] for row in rows))
+    lines: dict[str, list[str]] = {}
+    for row in rows:
+        lines.setdefault(row["name"], [row["name"]]).append(f"{float(row['value']):#.3g}".removesuffix("."))
+    header = ["engine", *(name if name == "ratio" else f"{name}, µs" for name in quantities)]
+    return table(header, list(lines.values())) + f"\n{origin(CALLS)}\n"
+
+
 def origin(part: str) -> str:
     """Return the date and the commands of a part as a sentence."""
     rows = [row for row in read_rows() if part_of(row) == part]
@@ -152,5 +164,5 @@ def small(value: float) -> str:
     return "< 1e-15" if value < 1e-15 else f"{value:.0e}".replace("e-0", "e-") if value < 0.01 else f"{value:.1g}"
 
 
-TABLES = {BODIES: render_bodies, SCENES: render_scenes, MANY: render_many, PRICE: render_price}
+TABLES = {BODIES: render_bodies, SCENES: render_scenes, MANY: render_many, PRICE: render_price, "calls": render_calls}
 """Tables of times by the name of their mark."""

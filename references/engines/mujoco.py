@@ -113,11 +113,15 @@ def _bind_loop(mj, model, data, start, given):
     if len(given.steps) > 2:
         march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
         return lambda: march(mj, model, data, start, given)
-    step, set_state, full, end = mj.mj_step, mj.mj_setState, mj.mjtState.mjSTATE_FULLPHYSICS, (data.qpos, data.qvel)
+    step, n_steps, qpos, qvel = mj.mj_step, given.n_steps, data.qpos, data.qvel
+    mj.mj_setState(model, data, start, mj.mjtState.mjSTATE_FULLPHYSICS)
+    q0, v0, end, turning = qpos.copy(), qvel.copy(), (qpos, qvel), given.turn.any()
 
     def loop():
-        set_state(model, data, start, full)
-        step(model, data, given.n_steps)
+        qpos[:], qvel[:] = q0, v0
+        if turning:
+            data.time = 0.0
+        step(model, data, n_steps)
         return end
 
     return loop

@@ -54,12 +54,12 @@ def prepare(given):
         return samples
 
     if len(given.steps) == 2:
-        q0, v0 = _start(given)
+        (q0, v0), times = _start(given), [count * given.dt for count in range(given.n_steps)]
 
         def loop():
             q, v = q0, v0
-            for count in range(given.n_steps):
-                q, v = step(q, v, count * given.dt)
+            for t in times:
+                q, v = step(q, v, t)
             return q, v
 
         run.loop = loop
@@ -117,12 +117,12 @@ def _stepper(pin, given):
     model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
     aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
     field, torque, bracket = pack_field(given), compile_torque(), _cross_motions if model.nv == 6 else _cross
-    no_field = not field.any()
 
     def acceleration(q, v, t):
-        if no_field:
-            return aba(model, data, q, v, tau)
         return aba(model, data, q, v, np.array(torque(field, pin.Quaternion(q).toRotationMatrix().ravel(), t)))
+
+    if not field.any():
+        acceleration = lambda q, v, t: aba(model, data, q, v, tau)  # noqa: E731
 
     def euler(q, v, t):
         v = v + dt * acceleration(q, v, t)

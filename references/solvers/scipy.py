@@ -61,7 +61,7 @@ class SciPy(Method):
     loop
         "python": `solve_ivp`, whose loop is in Python. Samples come from the integrator's interpolant; DOP853's is of order 7
         and adds to the error of the steps: on 2 s of the brick, the error between steps is 1.6 to 2.4 times that at their ends.
-        "compiled": `ode`, five to eight times as fast (brick, 1e-6 rad). "DOP853" (`dop853`) and "RK45" (`dopri5`) start again
+        "compiled": `ode`, five times as fast (brick, 1e-6 rad). "DOP853" (`dop853`) and "RK45" (`dopri5`) start again
         at each sample, "BDF" and "Adams" (`vode`) and "LSODA" interpolate.
 
     Raises
