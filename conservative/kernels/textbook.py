@@ -20,7 +20,7 @@ from .symplectic import torque
 
 FAILURE = "no solution within 100 corrections"  # of generalised-alpha
 PAUSE = 2**13  # steps between two calls of handlers of signals
-MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC = range(5)
+MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC, SPIERS, SPIERS_RATES = range(7)
 ROUND_OFF, NEARLY, REST = 1e-30, 1e-20, 1e-4
 """The solver stops at the first squared correction, relative to squared accelerations and REST, or where corrections below the
 second no longer shrink. Round-off is larger for long and thin bodies: it grows with the ratio of their moments."""
@@ -127,6 +127,26 @@ def buss_step(h, t, J_inverse, field, q, L):
 
 
 @kernel
+def spiers_step(rates_first, h, t, J_inverse, field, q, L):
+    """Return the state after Spiers's step: a kick by the torque, then a rotation about L after one about w - s L.
+
+    Every s gives the L' of Euler's equations. With k = w x L and s = k.(J^-1 k)/|k|^2, the energy's second derivative is 0, and
+    the step is the exact motion of a body with two equal moments. L in the world is constant. With `rates_first`, L in the body
+    is the same, but the body turns by h w with the rates w at the end.
+    """
+    L = add(L, scale(h, torque(field, t, q)))
+    w = times(J_inverse, L)
+    k = cross(w, L)
+    square = dot(k, k)
+    s = dot(k, times(J_inverse, k)) / square if square > 0.0 else 0.0  # along a principal axis any s gives the same step
+    turned = exponential(scale(h, subtract(w, scale(s, L))))
+    L1 = in_body(turned, L)
+    if rates_first:
+        return product(q, exponential(scale(h, times(J_inverse, L1)))), L1
+    return product(product(q, exponential(scale(h * s, L))), turned), L1
+
+
+@kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`)."""
     J, J_inverse, field, q, L, _ = model
@@ -149,9 +169,11 @@ def march(model, coefficients, workspace):
                     return Result(step - 1, step - 1, corrections, None, math.sqrt(size), False)
             elif scheme == BUSS:
                 q, L = buss_step(h, t, J_inverse, field, q, L)
-            else:  # as game engines do: first the rates, then the attitude with the new rates
+            elif scheme == GYROSCOPIC:  # as game engines do: first the rates, then the attitude with the new rates
                 L = add(L, scale(h, add(cross(L, times(J_inverse, L)), torque(field, t, q))))
                 q = product(q, exponential(scale(h, times(J_inverse, L))))
+            else:
+                q, L = spiers_step(scheme == SPIERS_RATES, h, t, J_inverse, field, q, L)
             until_sample -= 1
             if until_sample == 0 or step == n_steps:
                 until_sample = every

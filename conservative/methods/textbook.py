@@ -21,7 +21,7 @@ from .principal_axes import principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
-Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic"]
+Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic", "spiers", "spiers_rates"]
 _RADIUS = "a spectral radius from 0 to 1"
 SCHEMES = {
     "rkmk": ("RKMK 4", 4),
@@ -29,6 +29,8 @@ SCHEMES = {
     "generalized_alpha": ("generalised-alpha", 2),
     "buss": ("Buss 3", 3),
     "gyroscopic": ("explicit gyroscopic step", 1),
+    "spiers": ("Spiers 1", 1),
+    "spiers_rates": ("Spiers 1, rates first", 1),
 }
 """Titles in tables, and orders. In the order of the numbers in `conservative.kernels.textbook`."""
 
@@ -37,9 +39,9 @@ SCHEMES = {
 class Textbook(Method):
     """A textbook method, compiled like ours, as a baseline: shown in tables, in no contest, never chosen automatically.
 
-    All of them support every field, also time-dependent ones. None conserves energy. "buss" integrates the momentum in world
-    axes and conserves it, or its component along the field's axis. The others integrate it in body axes and conserve only the
-    axial momentum of a symmetric body.
+    All of them support every field, also time-dependent ones. None conserves energy, except "spiers" for a free symmetric body,
+    whose motion it solves. "buss" and "spiers" conserve the momentum in the world, or its component along the field's axis. All
+    but "buss" conserve the axial momentum of a symmetric body.
 
     Parameters
     ----------
@@ -48,7 +50,10 @@ class Textbook(Method):
         IV.8.2). "crouch_grossman": order 4 with five stages (IV.8.1; Jackiewicz, Marthinsen & Owren 2000).
         "generalized_alpha": order 2, implicit (Brüls & Cardona 2010). "buss": order 3, one rotation a step (Buss 2000, for a
         free body; the torque is integrated by Radau's rule of order 3). "gyroscopic": order 1, the explicit gyroscopic torque
-        (an option of Bullet, and ODE before it became implicit) in a semi-implicit Euler step.
+        (an option of Bullet, and ODE before it became implicit) in a semi-implicit Euler step. "spiers": order 1, a rotation
+        about the momentum after one about a part of the rate (B. Spiers, *A better way to spin*, 2026, "Momentum-first method";
+        Avian's pull request 993 proposes the method of this text). "spiers_rates": the same rates at the end, with which the
+        body turns ("Modified Jolt Method" there).
     rho
         Spectral radius of generalised-alpha at infinite frequency, 0 to 1: 1 has no numerical damping.
 
@@ -83,9 +88,9 @@ class Textbook(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        if self.scheme == "buss":
-            return frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
-        return frozenset({"axial momentum"})
+        in_world = {"momentum", "vertical momentum", "momentum along the field's axis"}
+        kept = {"buss": in_world, "spiers": {*in_world, "axial momentum"}}
+        return frozenset(kept.get(self.scheme, {"axial momentum"}))
 
     @property
     def setting_parts(self) -> dict[str, str]:
