@@ -15,6 +15,7 @@ import csv
 import sys
 from pathlib import Path
 
+import bibliography
 import declared
 import marks
 import measured
@@ -22,7 +23,7 @@ import published
 from code_map import ROOMS, ROOT
 
 PICTURE = Path("reports", "pictures", "time_against_error.svg")
-PARTS = {**measured.TABLES, **declared.TABLES, **published.TABLES}
+PARTS = {**measured.TABLES, **declared.TABLES, **published.TABLES, **bibliography.TABLES}
 
 
 def read_pages(root: Path) -> dict[Path, str]:
