@@ -219,17 +219,57 @@ def test_the_tables_of_benchmarks_are_made_of_their_studies(copied, tmp_path, mo
     assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
 
 
-def test_the_page_follows_the_counts_and_intervals(tmp_path, monkeypatch):
-    program, measure = load("measured"), load("measure")
-    texts = dict.fromkeys(measure.COLUMNS, "")
+def test_a_closed_form_is_not_in_bold_however_fast(tmp_path, monkeypatch):
+    program = load("measured")
     with program.ROWS.open(encoding="utf-8", newline="") as file:
-        rows = [each for each in csv.DictReader(file) if each["name"] != "random bodies"]
-    rows += [texts | each for each in measure._random(study([(1e-6, 2e-6), (1e-6, 1.04e-6)]))]
+        rows = [each | {"value": "1e-9"} if each["name"] == program.CLOSED else each for each in csv.DictReader(file)]
     with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, measure.COLUMNS)
+        writer = csv.DictWriter(file, rows[0])
         writer.writeheader()
         writer.writerows(rows)
     monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
+    header, _, *lines = program.render_scenes().partition("\n\n")[0].splitlines()
+    column = header.split(" | ").index(program.CLOSED)
+    lines = [line.split(" | ") for line in lines if "without the conversion" not in line]
+    assert {line[column] for line in lines if line[column] != "–"} == {"1e-09"}
+    assert all(sum(cell.startswith("**") for cell in line) == 1 for line in lines)
+
+
+@pytest.fixture
+def of_bodies(tmp_path, monkeypatch):
+    """Return a function that replaces the rows of random bodies by those of a study, and returns the program."""
+    program, measure = load("measured"), load("measure")
+
+    def replace_rows(bodies):
+        texts = dict.fromkeys(measure.COLUMNS, "")
+        with program.ROWS.open(encoding="utf-8", newline="") as file:
+            rows = [each for each in csv.DictReader(file) if each["name"] != "random bodies"]
+        rows += [texts | each for each in measure._random(study(bodies))]
+        with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, measure.COLUMNS)
+            writer.writeheader()
+            writer.writerows(rows)
+        monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
+        return program
+
+    return replace_rows
+
+
+@pytest.mark.parametrize(
+    "bodies", [[(1e-6, 2e-6), (None, None)], [(1e-6, 2e-6), (1e-6, 1.04e-6)], [(1e-6, 2e-6), (3e-6, 1e-6)]]
+)
+def test_the_counts_of_cases_add_up(bodies, of_bodies):
+    program = of_bodies(bodies)
+    for text in (program.render_readme(), program.render_bodies()):
+        (sentence,) = re.findall(r"Of these 22\s.*?\.(?=\n)", text, re.DOTALL)
+        assert ("neither side" in sentence) == (bodies[1] == (None, None))
+    cases, *counts = (int(number) for number in re.findall(r"\d+", sentence))
+    assert cases == sum(counts) == 22
+    assert counts == {None: [11, 0, 0, 11], 1e-6: [11, 0, 11], 3e-6: [11, 11, 0]}[bodies[1][0]]
+
+
+def test_the_page_follows_the_counts_and_intervals(of_bodies):
+    program = of_bodies([(1e-6, 2e-6), (1e-6, 1.04e-6)])
     text = " ".join(program.render_readme().split())
     assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
     assert "Of these 22 cases, heyoka is faster beyond the interval" in text

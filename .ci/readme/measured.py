@@ -14,7 +14,7 @@ ROWS = HERE / "measured.csv"
 REPORT, BODIES, SCENES, MANY = "report", "random bodies", "three scenes", "many bodies"
 PRICE, CALLS = "price", "call"
 """Parts of measured.csv, in its order."""
-RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
+RATIO, GENERAL, CLOSED = "heyoka's time over ours", "our general integrators", "our closed forms"
 VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4"}
 
 
@@ -53,6 +53,7 @@ def render_readme() -> str:
         interval=lambda *place: interval(values, *place),
         ratios=sorted(interval(values, *key[:2]) for key in values if key[1:] == (BODIES, RATIO)),
         count=lambda quantity: int(values["all fields", BODIES, quantity]),
+        unreached=count_unreached(values),
         version=versions,
         date=date,
     )
@@ -69,12 +70,23 @@ def render_bodies() -> str:
     cases, won, undecided, lost = (
         int(values["all fields", BODIES, f"cases{which}"]) for which in ("", " won", " open", " lost")
     )
-    counts = f"\nOf these {cases} cases, a body at an error, ours won {won} and lost {lost}; {undecided} are open.\n"
+    counts = f"\nOf these {cases} cases, a body at an error, ours won {won} and lost {lost}; {undecided} are open"
+    unreached = count_unreached(values)
+    counts += f", and in {unreached} neither side reaches the error.\n" if unreached else ".\n"
     return table(head, lines) + counts + origin(BODIES) + "\n"
 
 
+def count_unreached(values: dict[tuple[str, str, str], float]) -> int:
+    """Return in how many cases neither side reaches the error: those that are neither won nor lost nor open."""
+    cases, *others = (int(values["all fields", BODIES, f"cases{which}"]) for which in ("", " won", " open", " lost"))
+    return cases - sum(others)
+
+
 def render_scenes() -> str:
-    """Return the times of all sides on three scenes, a row for each error and kind of run, the fastest in bold."""
+    """Return the times of all sides on three scenes, a row for each error and kind of run.
+
+    The fastest is in bold. Closed forms solve few motions and are a class of their own, so they are not compared.
+    """
     values, versions, _ = read_values()
     places = list(dict.fromkeys(place for place, name, _ in values if name == GENERAL))
     timed = [key[1] for key, value in values.items() if key[0] in places and key[2] == "time" and math.isfinite(value)]
@@ -88,7 +100,7 @@ def render_scenes() -> str:
         times = [values.get((place, side, "time"), math.inf) for side in sides]
         cells = [two_digits(time) for time in times]
         if math.isfinite(times[0]):  # all sides
-            fastest = times.index(min(times))
+            fastest = times.index(min(time for time, side in zip(times, sides, strict=True) if side != CLOSED))
             cells[fastest] = f"**{cells[fastest]}**"
         lines.append([scene if scene != before else "", what, *cells, ratio_text(interval(values, place, GENERAL))])
         before = scene

@@ -73,7 +73,9 @@ def base_vectors(scene: Scene) -> Formulation:
     The second row is their cross product. The rows are not orthonormalised, so their drift shows in the samples.
     """
     formulation = _with_attitude(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), ROWS)
-    return replace(formulation, fast_math=True)  # measured: 1 % less time, 2 % more at 1e-14; for the quaternion 2 to 5 % more
+    # Measured on ten bodies in five fields at four tolerances, means of five processes: 14 % less time to 8 % more, 5 % less in
+    # the mean. For the quaternion it is 13 % less to 13 % more, 3 % less in the mean.
+    return replace(formulation, fast_math=True)
 
 
 def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], kind: int) -> Formulation:
