@@ -1,33 +1,37 @@
 """Series steps as long as a tolerance allows, with samples between their ends: the series itself, projected (`taylor`).
 
-The coefficients belong to a guessed length. Their last two terms determine the guess for the next step (A. Jorba and M. Zou, A
-software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005). A step whose terms exceed
-the tolerance is computed again, shorter: the first one, and few others. Samples and the end of the step are values of the same
-polynomials, by Horner's scheme, each projected onto the invariants, several samples at once in the lanes of a register. Samples
+The coefficients belong to a guessed length, that of the step before. Their last terms determine the length (A. Jorba and M.
+Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005), and the values of
+the polynomials there are the end of the step. No step is rejected, and the first guess hardly matters. Samples are values of
+the same polynomials, several at once in the lanes of a register. Ends and samples are projected onto the invariants. Samples
 are therefore as accurate as steps, and no step ends at one.
 """
 
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
-from ..arithmetic import cosine, root, sine
+import numpy as np
+
+from ..arithmetic import choose, cosine, sine
 from . import entry, kernel
-from .axial import TINY
-from .compiler.lanes import REGISTER, load, save_columns
-from .compiler.series import recall
+from .compiler.lanes import REGISTER, gather_numbers, load, load_rows, save_columns
+from .compiler.series import TWICE, Series, recall
 from .compiler.signals import call_handlers, end_of_block
-from .compiler.traced import trace
-from .compiler.vector import accumulate, dot, every, fill_like, fuse
-from .protocol import Result, find_ends, loosen
-from .taylor import BETWEEN, ENOUGH, LEFT, Model, begin, correct, expand, find_sample, project
+from .compiler.traced import fast_exp2, fast_log2, trace
+from .compiler.vector import accumulate, every, fill_like, fuse
+from .protocol import Result, loosen
+from .taylor import BETWEEN, ENOUGH, LEFT, begin, correct, find_sample, grow, project
 from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
 
-SAFETY, SHORTEST = 0.8, 2.0**-30
-"""Factor between a step and the longest that the tolerance allows, and the shortest step, in distances of the grid's times."""
+SHARE, SLOW = 0.5, 0.25
+"""Largest term, in tolerances, and unit of rates, in rates of the slowest axis at the same energy. With these, random bodies
+have errors of at most heyoka's size with the same tolerance, 1e-3 or less."""
+SHORTEST, LONGER = 2.0**-30, 4.0
+"""Shortest step, in distances of the grid's times, and log2 of the longest one, in guessed lengths: terms can underflow."""
 
 
 class Frame(NamedTuple):
@@ -44,35 +48,43 @@ class Frame(NamedTuple):
 
 
 @trace
-def take_step(field, constants, order, h, K, g, a, w, scales):
-    """Return the state after one step, not projected, the sizes of the last two terms, and what `recall` needs of all.
+def expand(field, constants, order, h, K, g, a, w, over, largest, over_order):
+    """Return the share of a step at which the two terms before the last are so large, and the terms of `evaluate`.
 
-    Rates are in units of the rate of the slowest axis at the same energy.
+    `largest` is log2 of the size's square; rates count `over` times. `over_order` are halves of the terms' inverse orders.
     """
-    end, *terms, coefficients = expand(field, constants, order, h, K, g, a, w)
-    over = 0.5 * scales[1] * scales[2]
-    sizes = tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in terms)
-    return end, sizes, coefficients.locate()
-
-
-recall = trace(recall)
+    series, _, (_, *sized), terms = grow(field, constants, order, h, K, g, a, w)
+    squares = (sum(series.split(fuse(w * over, w * over, fuse(a, a, g * g)))) for g, a, w in sized)
+    x, y = ((largest - fast_log2(square)) * each for square, each in zip(squares, over_order, strict=True))
+    least = choose(x < y, x, y)
+    return fast_exp2(choose(least < LONGER, least, LONGER)), terms.locate()
 
 
 @trace
-def add_product(x, s, terms):
-    """Return s x + terms, three vectors each; x can be ()."""
-    if not x:
-        return tuple(tuple(fill_like(c, s) for c in v) for v in terms)
-    return tuple(tuple(fuse(y, s, c) for y, c in zip(*each, strict=True)) for each in zip(x, terms, strict=True))
+def add_terms(x, s, terms, n, m):
+    """Return s^2 x plus s times the coefficients n, plus the coefficients m = n - 1; x can be ()."""
+    series = Series(s)
+    pairs = zip(recall(terms, n, series), recall(terms, m, series), strict=True)
+    added = [fuse(c, s, d) for c, d in pairs]
+    return tuple(fuse(y, s * s, d) for y, d in zip(x, added, strict=True)) if x else tuple(added)
+
+
+@trace
+def add_start(x, s, g, a, w):
+    """Return the state after s x is added; x is r of vectors (`Vectors`)."""
+    series = Series(s)
+    starts = (series.vector(*(fill_like(c, s) for c in v)) for v in (g, a, w))
+    return tuple(series.split(fuse(series.shuffle(y, TWICE), s, v)) for y, v in zip(x, starts, strict=True))
 
 
 @partial(kernel, forceinline=True)
-def evaluate(terms, order, s, state):
-    """Return the states at shares s of a step from `state`, not projected."""
-    x = add_product((), s, recall(terms, order))
-    for n in range(order - 1, 0, -1):
-        x = add_product(x, s, recall(terms, n))
-    return add_product(x, s, state)
+def evaluate(terms, order, s, g, a, w):
+    """Return the states at a share s of the guessed length, or at several, from the start of a step. They are not projected."""
+    # Two terms at once, of an even order: half as many sums wait for each other.
+    x = add_terms((), s, terms, order, order - 1)
+    for n in range(order - 2, 0, -2):
+        x = add_terms(x, s, terms, n, n - 1)
+    return add_start(x, s, g, a, w)
 
 
 @trace
@@ -85,66 +97,74 @@ def find_turn(spin, t, further):
 
 
 @partial(kernel, forceinline=True, ahead=True)
-def march(model, frame, order, h, tolerance, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
+def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
     """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
 
-    The series has an order and a tolerance for its last two terms; the grid's times are h, s, apart. `lanes` are the numbers 0,
-    1, ... of the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
+    The order is even. The grid's times are h, s, apart. `largest` is that of `find_share`, `lanes` are the numbers 0, 1, ... of
+    the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
     """
     field, g, a = model.field, model.g, model.a
     body, K, w = begin(model)
     constants, _, _, scales = body
-    ahead = load(lanes, 0, REGISTER) * float(sampled)
-    further = find_turn(frame.spin, ahead * h, ())
+    places = lanes * float(sampled)
+    further = find_turn(frame.spin, places * h, ())
     row, done, following, corrections, steps, computed, defect, good = 1, 0, min(sampled, n_steps), 0, 0, 0, 0.0, True
-    # Times are in units of h: the step begins at whole + rest and has a length; its next sample is at `following`.
-    whole, rest, carry, length = 0, 0.0, 0.0, 1.0
+    # Times are in units of h: the step begins at whole + rest; its next sample is at `following`. 1 rad is guessed at first.
+    whole, rest, carry, over = 0, 0.0, 0.0, 0.5 / SLOW * scales[1] * scales[2]
+    length, over_order = 1.0 / (scales[1] * max(*model.J_inverse) * h), (0.5 / (order - 1), 0.5 / (order - 2))
     while done < n_steps and good:
         pausing = end_of_block(computed, 2**62, pause)
         while done < n_steps and good and computed < pausing:
-            (g1, a1, w1), sizes, terms = take_step(field, constants, order, length * h, K, g, a, w, scales)
+            share, terms = expand(field, constants, order, length * h, K, g, a, w, over, largest, over_order)
             computed += 1
-            last, before = sizes[0] + TINY, sizes[1] + TINY
-            factor = min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
-            # The factor of a step that overflows is 0 or nan: a tenth of its length is tried.
-            if not factor >= 1.0 and length > SHORTEST:
-                length *= SAFETY * factor if factor > 0.1 else 0.1
-                continue
+            inverse, left = 1.0 / length, (n_steps - whole) - rest
+            share = min(max(share, SHORTEST * inverse), left * inverse)
+            step = share * length if share < left * inverse else left
+            g1, a1, w1 = evaluate(terms, order, share, g, a, w)
             g1, a1, w1, defect, needed = correct(field, body, BETWEEN, g1, a1, w1)
             g1, a1, w1, more, defect = project(field, body, BETWEEN, g1, a1, w1, defect, needed)
             corrections += 1 + more
             good = defect < LEFT
-            first = (following - whole) - rest
-            while good and done < n_steps and first <= length:
-                at = min(first + ahead, length)
-                g2, a2, w2 = evaluate(terms, order, at * (1.0 / length), (g, a, w))
-                g2, a2, w2, left, needs = correct(field, body, ENOUGH, g2, a2, w2)
-                g2, a2, w2, _, left = project(field, body, ENOUGH, g2, a2, w2, left, needs)
-                good = every(left < LEFT)
+            ahead = (following - whole) - rest
+            while good and done < n_steps and ahead <= step:
+                at = min(ahead + places, step)
+                g2, a2, w2 = evaluate(terms, order, at * inverse, g, a, w)
+                g2, a2, w2, defects, needs = correct(field, body, ENOUGH, g2, a2, w2)
+                g2, a2, w2, _, defects = project(field, body, ENOUGH, g2, a2, w2, defects, needs)
+                good = every(defects < LEFT)
                 sample = find_sample(frame, find_turn(frame.spin, following * h, further), g2, a2, w2)
                 save_columns(R_WB, 9 * row, 9, sample[:9])
                 save_columns(w_WB_B, 3 * row, 3, sample[9:])
                 for i in range(REGISTER):
                     # A shorter last interval does not fit the angles of the lanes.
-                    if good and done < n_steps and first <= length and (i == 0 or following - done == sampled):
+                    if good and done < n_steps and ahead <= step and (i == 0 or following - done == sampled):
                         row, done, following = row + 1, following, min(following + sampled, n_steps)
-                        first = (following - whole) - rest
+                        ahead = (following - whole) - rest
             g, a, w = g1, a1, w1
             steps += 1
             # Whole distances are counted as integers, so that late times have as many digits as early ones.
-            rest, carry = accumulate(rest, carry, length)
+            rest, carry = accumulate(rest, carry, step)
             passed = math.floor(rest)
-            whole, rest = whole + int(passed), rest - passed
-            length = min(max(SAFETY * factor * length, SHORTEST), (n_steps - whole) - rest)
+            whole, rest, length = whole + int(passed), rest - passed, step
         if done < n_steps:
             call_handlers()
     return Result(done, steps * order, corrections, computed * order, defect, False)
 
 
-MODEL_END, FRAME_END = find_ends(Model, Frame)
+@cache
+def enter_like(like):
+    """Return `march` as Python calls it (`taylor.enter_like`). The last `REGISTER` numbers are those of the lanes."""
+
+    @entry
+    def enter(numbers, order, n_steps, sampled, pause, R_WB, w_WB_B):
+        model, frame, h, largest = load_rows(numbers, 0, 1, like, 1)
+        lanes = load(numbers, len(numbers) - REGISTER, REGISTER)
+        return loosen(march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B))
+
+    return enter
 
 
-@entry
-def enter(*loose):
-    """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(*loose[:MODEL_END]), Frame(*loose[MODEL_END:FRAME_END]), *loose[FRAME_END:]))
+def bind(model, frame, order, h, tolerance):
+    """Return `march` as Python calls it (`protocol`), without the arguments that are given here."""
+    numbers, like = gather_numbers((model, frame, h, 2.0 * math.log2(SHARE * tolerance)))
+    return partial(enter_like(like), np.append(numbers, np.arange(float(REGISTER))), order)

@@ -13,8 +13,8 @@ of a named tuple that passes between Python and machine code by unpickling it, w
 nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few is an error when `enter` is
 compiled. Each file has its own: numba does not find the code of a closure over a compiled function in its cache again.
 
-A named tuple as an argument takes 1.1 us as well. `taylor`, whose runs can take 1 us, therefore has `bind(model, coefficients)`
-instead of `enter`: it returns a function of the workspace alone and passes the model as an array of its numbers.
+A named tuple as an argument takes 1.1 us as well. `taylor` and `dense`, whose runs can take 1 us, therefore have `bind` instead
+of `enter`: it returns a function without model and coefficients, and passes the model as an array of its numbers.
 """
 
 from __future__ import annotations

@@ -136,8 +136,8 @@ def begin(model):
     return (constants, (J, J_inverse, model.loose, rotor), kept, scales), K, w
 
 
-def expand(field, constants, order, h, K, g, a, w):
-    """Return the state after one step, not projected, the last two terms of the series, and its coefficients (`Vectors`)."""
+def grow(field, constants, order, h, K, g, a, w):
+    """Return the kind of a step's series, its start, the sum and terms of an order (`sum_orders`), and all coefficients."""
     series = Series(w[0])
     start = tuple(series.vector(*v) for v in (g, a, w))
     turn = series.broadcast(field.rate) if isinstance(field, Turned) else None
@@ -146,9 +146,7 @@ def expand(field, constants, order, h, K, g, a, w):
     if len(K) > 3:
         accelerate = add_rotor(accelerate, series.vector(*K[3:6]), series.vector(*K[6:]))
     sums = sum_orders(series, terms, series.broadcast(h), start, series.vector(*K[:3]), accelerate, turn, ratio)
-    change, last, before = sum_to_order(order, sums)
-    end = tuple(v + d for v, d in zip(start, change, strict=True))
-    return *(tuple(map(series.split, each)) for each in (end, last, before)), terms
+    return series, start, sum_to_order(order, sums), terms
 
 
 def add_rotor(accelerate, first, second):
@@ -164,7 +162,8 @@ def add_rotor(accelerate, first, second):
 @trace
 def take_step(field, constants, order, h, K, g, a, w):
     """Return the state after one step, not projected."""
-    return expand(field, constants, order, h, K, g, a, w)[0]
+    series, start, (change, *_), _ = grow(field, constants, order, h, K, g, a, w)
+    return tuple(series.split(v + d) for v, d in zip(start, change, strict=True))
 
 
 def straighten(g, a):
@@ -277,7 +276,7 @@ def start_of(model):
 def advance(field, constants, order, h, K, g, a, w, angles):
     """Return the state after one step, not projected, and the sums of angles."""
     if not hasattr(field, "advance"):
-        return expand(field, constants, order, h, K, g, a, w)[0], angles
+        return take_step(field, constants, order, h, K, g, a, w), angles
     x, changes = field.advance(order, h, g)
     return (x, a, w), tuple(accumulate(*each, change) for each, change in zip(angles, changes, strict=True))
 

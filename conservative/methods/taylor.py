@@ -54,12 +54,13 @@ class Taylor(Method):
 
     With a tolerance, steps have any length, and dt is only the distance of samples. Samples are values of the steps'
     polynomials, each projected onto the invariants, and as accurate as the steps. Use a tolerance for many samples: if every
-    sample of the flipping brick at 100 Hz is stored, it takes 0.3 to 0.45 of the time of equal steps. Use it also for motions
+    sample of the flipping brick at 100 Hz is stored, it takes 0.3 to 0.5 of the time of equal steps. Use it also for motions
     that are fast for a short time, such as a close passage of an attracting point. For a passage at a fortieth of the largest
-    distance, tolerance 1e-12 takes 135 steps for an error of 3e-13 rad, while 4,000 equal steps leave 1e-8 rad. Steps are
+    distance, tolerance 1e-12 takes 103 steps for an error of 2e-14 rad, while 4,000 equal steps leave 1e-8 rad. Steps are
     chosen as in Jorba & Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods
-    (2005). The order is 6 plus two thirds of the digits of the tolerance, the best choice for random bodies near an attracting
-    point.
+    (2005). The order is 6.5 plus three quarters of the digits of the tolerance, made even, the fastest for random bodies.
+    Errors grow with time: after 12 rad, 97 % of random bodies have errors below the tolerance (1e-2 to 1e-12), and half of
+    them below 0.06 times the tolerance.
 
     `integrate_many` integrates several bodies at once, one per lane of a vector register, with equal steps. The results differ
     from those of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
@@ -74,8 +75,8 @@ class Taylor(Method):
     order
         Order of the series, 4 to 18; default 14. None with a tolerance, which determines it.
     tolerance
-        None for the steps of the grid. Otherwise steps are as long as the last two terms of the series are at most this large,
-        relative to 1 for the attitude matrix and to the largest possible rate of the axis of largest inertia.
+        None for the steps of the grid. Otherwise steps are as long as the two terms before the last are at most half of this,
+        relative to 1 for the attitude matrix and to a quarter of the largest possible rate of the axis of largest inertia.
 
     Raises
     ------
@@ -126,7 +127,7 @@ class Taylor(Method):
         """Order of the series, also if a tolerance determines it."""
         if self.tolerance is None:
             return self.order or DEFAULT
-        return max(LOWEST, min(HIGHEST, round(6 - 2 / 3 * math.log10(self.tolerance))))
+        return max(LOWEST, min(HIGHEST, 2 * round(3.25 - 0.375 * math.log10(self.tolerance))))
 
     def unsupported(self, scene: Scene) -> str | None:
         return scene.derive(find_obstacle)

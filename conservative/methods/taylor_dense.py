@@ -26,14 +26,14 @@ def prepare_dense(scene: Scene, grid: Grid, label: str, start: PrincipalStart, m
     R_BP = () if start.R_BP is None else tuple(map(triple, start.R_BP))
     units = (1.0, 1.0, start.spin[1] / start.J_inverse[2] if start.spin else 1.0)
     frame = kernel.Frame(tuple(map(triple, axes_of(scene))), R_BP, units, start.spin[:1] if start.spin else ())
-    numbers = *model, *frame, order, grid.dt, tol, grid.n_steps, grid.every
-    R_WB0, lanes = from_quaternion(to_quaternion(scene.R_WB0)), np.arange(kernel.REGISTER, dtype=float)
+    enter = partial(kernel.bind(model, frame, order, grid.dt, tol), grid.n_steps, grid.every)
+    R_WB0 = from_quaternion(to_quaternion(scene.R_WB0))
 
     def run() -> Trajectory:
         R_WB, w_WB_B = np.empty((n + kernel.REGISTER, 3, 3)), np.empty((n + kernel.REGISTER, 3))
         R_WB[0], w_WB_B[0] = R_WB0, scene.w_WB_B0
         pause = kernel.PAUSE if get_ident() == main_thread().ident else 0
-        done, *counts, size, _ = kernel.enter(*numbers, pause, lanes, R_WB.reshape(-1), w_WB_B.reshape(-1))
+        done, *counts, size, _ = enter(pause, R_WB.reshape(-1), w_WB_B.reshape(-1))
         failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, size, kernel.FAILURE)
         good, counters = grid.count_samples(done), Counters(done, *counts)
         samples = {"t": t[:good].copy(), "R_WB": R_WB[:good], "w_WB_B": w_WB_B[:good]}
@@ -41,5 +41,5 @@ def prepare_dense(scene: Scene, grid: Grid, label: str, start: PrincipalStart, m
 
     room = np.empty(9 * (n + kernel.REGISTER)), np.empty(3 * (n + kernel.REGISTER))
     whole = KernelRun(run)
-    whole.own_loop = partial(kernel.enter, *numbers, 0, lanes, *room)
+    whole.own_loop = partial(enter, 0, *room)
     return whole

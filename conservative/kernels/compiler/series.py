@@ -36,7 +36,7 @@ LOWEST, HIGHEST = 4, 18
 """Lowest and highest order. Code for higher orders does not fit into the processor's instruction cache."""
 LOOPS_FROM = 6
 TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
-"""Indices that turn (x1, x2, x3) into (x2, x3, x1) and (x3, x1, x2)."""
+"""Indices that turn (x1, x2, x3) into (x2, x3, x1) and (x3, x1, x2), or back: each undoes the other."""
 
 if COMPILED:
     from llvmlite import ir
@@ -171,19 +171,16 @@ class Vectors:
         return memory.locate(*places[1]), 8 * FOUR * (places[2][0] - places[1][0])
 
 
-def recall(terms, n):
-    """Return the coefficients n = 1, 2, ... of g, a and w of one body, three times three numbers, from `Vectors.locate`."""
+def recall(terms, n, series):
+    """Return the coefficients n = 1, 2, ... of g, a and w of one body as r, from `Vectors.locate`: vectors of a `Series`."""
     if isinstance(terms, Vectors):
-        return tuple((z, x, y) for x, y, z in (terms[n, part] for part in (0, 2, 4)))
-    builder, (start, step, number) = n.builder, (x.registers[0] for x in (*terms, n))
+        return tuple(terms[n, part] for part in (0, 2, 4))
+    builder, (start, step, number), register = n.builder, (x.registers[0] for x in (*terms, n)), ir.VectorType(DOUBLE, FOUR)
     at = builder.add(start, builder.mul(builder.sub(number, ir.Constant(INTEGER, 1)), step))
-
-    def read(place):
-        pointer = builder.inttoptr(builder.add(at, ir.Constant(INTEGER, 8 * place)), DOUBLE.as_pointer())
-        return Symbol(builder, [builder.load(pointer)])
-
-    # r and s of a vector are (x2, x3, x1, x2) and (x3, x1, x2, x3), each in a register
-    return tuple(tuple(read(2 * FOUR * k + place) for place in (2, 0, 1)) for k in range(3))
+    places = (builder.add(at, ir.Constant(INTEGER, 8 * 2 * FOUR * k)) for k in range(3))
+    pointers = (builder.inttoptr(place, register.as_pointer()) for place in places)
+    found = [Symbol(builder, [builder.load(pointer, align=8 * FOUR)]) for pointer in pointers]
+    return tuple(v if series.one_body else Axes(*v.split()[:3]) for v in found)
 
 
 class Series:
@@ -331,23 +328,22 @@ def find_next(series, c, n, h, K, accelerate, ratio):
 
 
 def sum_orders(series, c, h, start, K, accelerate, turn, ratio):
-    """Yield, for each order up to the highest, three times (g, a, w): the sum of a step, its last term, and the one before.
+    """Yield, for each order up to the highest, three times (g, a, w): the sum of a step, and the two terms before its last.
 
     The coefficients are added to c. `turn` is the rate of the axes of g and a, None if they are fixed. `ratio` is g/w, by
     components, of a free body, which saves a product; otherwise None.
     """
     c.push(start)
-    total = before = None
+    total = term = before = None
     for n in range(HIGHEST):
         g, a, w = find_next(series, c, n, h, K, accelerate, ratio)
         if turn is not None:
             by = h * (1.0 / (n + 1)) * turn
             g, a = fuse(c.newest[1], by, g), fuse(-c.newest[0], by, a)
-        term = g, a, w
+        earlier, before, term = before, term, (g, a, w)
         total = term if total is None else tuple(s + x for s, x in zip(total, term, strict=True))
         c.push(term)
-        yield total, term, before
-        before = term
+        yield total, before, earlier
 
 
 def sum_to_order(order, sums):
