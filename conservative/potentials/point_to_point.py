@@ -100,7 +100,7 @@ class PointField:
         The squared distance s is linear in g. S holds S2, S3, S1 of s/s[0] = 1 + S.(g - g[0]). With s[k] in units of
         s[0], s y' = alpha s' y gives
 
-            y[n] = (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n
+            y[n] = alpha y[0] s[n] + (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n-1
         """
         A, *moments = constants
         x = subtract(scale(A, g), self.b)
@@ -108,20 +108,21 @@ class PointField:
         S = scale(-2.0 * A * over * over, self.b)
         S = series.vector(S[1], S[2], S[0])
         M1, M2 = (series.vector(*moment) for moment in moments)
-        s, weighted_s, y, torque = (series.history() for _ in range(4))
-        y0 = series.broadcast(y0)
+        y, torque, *s = (series.history() for _ in range(3 if series.one_body else 4))
+        y0, steep = series.broadcast(y0), series.broadcast(alpha * y0)
 
         def accelerate(c: Any, n: Any) -> Any:
             torque.push(fuse(-M1, c[n, 1], M2 * c[n, 0]))
             distance = series.add_up(S * c[n, 0])
-            s.push(distance)
-            weighted_s.push(distance * float(n))
-            if n:
-                plain, weighted = series.convolve(n, 1, n, ((s, y),), ((weighted_s, y),))
-                y.push(weighted * ((alpha + 1) / n) - plain)
+            for history, value in zip(s, series.pair(distance, 1.0, float(n)), strict=True):
+                history.push(value)
+            if n > 1:
+                sums = series.convolve(n, 1, n - 1, *(((history, y),) for history in s))
+                y.push(fuse(distance, steep, series.add_pair(sums, -1.0, (alpha + 1) / n)))
             else:
-                y.push(y0)
-            return series.convolve(n, 0, n, ((y, torque),), start=torque[n] if base else None)[0]
+                y.push(distance * steep if n else y0)
+            before = series.convolve(n, 0, max(n - 1, 0), ((y, torque),), start=torque[n] if base else None)[0]
+            return fuse(y[n], torque[0], before) if n else before
 
         return accelerate
 

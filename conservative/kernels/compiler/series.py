@@ -28,9 +28,11 @@ differential equations by the method of Taylor series (1971).
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...arithmetic import Axes, Traced, fuse
 from . import COMPILED, LINKED
-from .traced import join
+from .traced import join, lanes_like
 
 LOWEST, HIGHEST = 4, 18
 """Lowest and highest order. Code for higher orders does not fit into the processor's instruction cache."""
@@ -211,6 +213,14 @@ class Series:
         """Return the sum of the components, by which vectors can be multiplied."""
         return v + v.shuffle(TURNED) + v.shuffle(TWICE) if self.one_body else v[0] + v[1] + v[2]
 
+    def pair(self, x, a, b):
+        """Return a x and b x for a number that is the same for all components: for one body in one number."""
+        return (x * lanes_like(x, np.array((a, b, 0.0, 0.0))),) if self.one_body else (x * a, x * b)
+
+    def add_pair(self, pair, a, b):
+        """Return the sum of the numbers of a pair, times a and b."""
+        return self.add_up(*self.pair(*pair, a, b)) if self.one_body else pair[0] * a + pair[1] * b
+
     def history(self):
         """Return an empty history."""
         return History(self.memory)
@@ -318,12 +328,10 @@ def find_next(series, c, n, h, K, accelerate, ratio):
         r, s = f * c[0, k], f * c[0, k + 1]
         return new + fuse(-s, c[n, 4], r * c[n, 5])
 
-    torque = accelerate(c, n)
-    old = None if torque is None else f * torque
-    if ww is not None:
-        old = f * K * ww if old is None else old + f * K * ww
-    w = add(old, f1 * K, c[n, 5])
+    w = add(None if ww is None else f * K * ww, f1 * K, c[n, 5])
     w = fuse(f2 * K, c[n, 4], w) if n else w
+    torque = accelerate(c, n)
+    w = w if torque is None else fuse(torque, f, w)  # the torque is late
     return find_row(0, gw[0]) if gw else w * ratio, find_row(2, aw), w
 
 
