@@ -10,7 +10,7 @@ import hashlib
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from functools import partial
+from functools import cache, partial
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -27,6 +27,7 @@ def digest(value: object) -> str:
     return hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()
 
 
+@cache
 def fields_of_motion(kind: Any) -> tuple[str, ...]:
     """Return the names of the fields of a dataclass that its digest contains."""
     return tuple(field.name for field in fields(kind) if field.metadata.get("of motion", True))
@@ -36,7 +37,7 @@ def _list_parts(value: Any, above: list[object]) -> Any:  # noqa: PLR0912  # a b
     """Return nested lists with the same `repr` in every process. `above` are the values around this one: cycles end."""
     value = getattr(value, "py_func", value)  # a function that numba has compiled
     kind, inner = f"{type(value).__module__}.{type(value).__qualname__}", [*above, value]
-    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+    if value is None or value is ... or isinstance(value, bool | int | float | complex | str | bytes):
         return [kind, repr(value)]
     if isinstance(value, np.ndarray | np.generic) and value.dtype != object:
         return [kind, value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
@@ -65,7 +66,9 @@ def _list_parts(value: Any, above: list[object]) -> Any:  # noqa: PLR0912  # a b
     elif isinstance(value, list | tuple | np.ndarray):
         parts = list(value)
     elif is_dataclass(value):
-        parts = [[name, getattr(value, name)] for name in fields_of_motion(type(value))]
+        kind_of: Any = type(value)
+        named = [(repr(name), getattr(value, name)) for name in fields_of_motion(kind_of)]
+        return [kind, [["builtins.list", [["builtins.str", name], _list_parts(part, inner)]] for name, part in named]]
     else:  # an object: its class and attributes; one of C, without attributes, equals itself only
         slots = {name: getattr(value, name, None) for base in type(value).__mro__ for name in getattr(base, "__slots__", ())}
         parts = [type(value), slots | value.__dict__ if hasattr(value, "__dict__") else slots or id(value)]

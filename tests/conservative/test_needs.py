@@ -2,6 +2,8 @@
 
 import math
 import pickle
+import subprocess
+import sys
 import warnings
 from dataclasses import fields
 
@@ -204,6 +206,13 @@ def test_functions_are_the_same_if_all_that_they_use_is():
     assert digest(build(2.0, math.sin)) == digest(build(2.0, math.sin))
     assert digest(build(2.0, math.sin)) != digest(build(3.0, math.sin))
     assert digest(build(2.0, math.sin)) != digest(build(2.0, math.cos))
+
+
+def test_digests_of_functions_are_the_same_in_another_process():
+    """The Kovalevskaya integral has an ellipsis, which was represented by its address."""
+    code = "import conservative as cv; print(cv.scenes.kovalevskaya_top().key)"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed.split() == [cv.scenes.kovalevskaya_top().key]
 
 
 def test_estimates_are_those_of_the_scene():
