@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arithmetic import cross
+
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
@@ -47,6 +49,10 @@ def from_quaternion(q: ArrayLike) -> Array:
     return R
 
 
+_ROWS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])
+"""Places of 4 w q, 4 x q, 4 y q and 4 z q among the products in `to_quaternion`."""
+
+
 def to_quaternion(R: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3).
 
@@ -56,17 +62,9 @@ def to_quaternion(R: ArrayLike) -> Array:
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     wx, wy, wz = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    candidates = np.stack(
-        [
-            np.stack([1 + xx + yy + zz, wx, wy, wz], axis=-1),
-            np.stack([wx, 1 + xx - yy - zz, xy, xz], axis=-1),
-            np.stack([wy, xy, 1 - xx + yy - zz, yz], axis=-1),
-            np.stack([wz, xz, yz, 1 - xx - yy + zz], axis=-1),
-        ],
-        axis=-2,
-    )
-    largest = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
-    q = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
+    squares = (1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz)
+    products = np.stack([*squares, wx, wy, wz, xy, xz, yz], axis=-1)
+    q = np.take_along_axis(products, _ROWS[np.argmax(products[..., :4], axis=-1)], axis=-1)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0, -q, q)
 
@@ -103,9 +101,9 @@ def axes_about(axis: Array, beside: int | None = None) -> Array:
     the one for which e_z gives the identity.
     """
     other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3 if beside is None else beside]
-    first = np.cross(other, axis)
+    first = np.array(cross(other.tolist(), axis.tolist()))
     first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis], axis=1)
+    return np.stack([first, cross(axis.tolist(), first.tolist()), axis], axis=1)
 
 
 def triple(values: Array) -> Triple:

@@ -55,6 +55,7 @@ def needs_of(part: Any) -> Needs:
     return own | {Need.TIME} if getattr(part, "time_dependent", False) and Need.TURNING not in own else own
 
 
+@lru_cache(maxsize=256)
 def lacking(takes: Needs, needs: Needs, why: str = "") -> str:
     """Return the reason why a scene with these needs is not supported, and the methods and engines that support it.
 
@@ -64,7 +65,6 @@ def lacking(takes: Needs, needs: Needs, why: str = "") -> str:
     return f"it does not take {join(missing)}{why and f' ({why})'}; {_advise(needs)}"
 
 
-@lru_cache(maxsize=256)
 def _advise(needs: Needs) -> str:
     able = []
     for group in (METHODS, ENGINES):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..batch import Batch
 from ..card import Card, Cost, Structure
@@ -20,7 +20,6 @@ from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
 from .many import RunMany
-from .principal_axes import PrincipalStart
 from .run_kernel import KernelRun, prepare_run
 from .taylor_dense import prepare_dense
 from .taylor_lanes import prepare_bodies
@@ -119,8 +118,9 @@ class Taylor(Method):
         set_fields(self, order=order, tolerance=tolerance)
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        parts = 1 if self.tolerance is None else PARTS
-        return bounds_of(scene, Grid(grid.dt, parts * grid.n_steps, parts * grid.n_steps))
+        if self.tolerance is not None:
+            grid = Grid(grid.dt, PARTS * grid.n_steps, PARTS * grid.n_steps)
+        return bounds_of(scene, grid)
 
     @property
     def terms(self) -> int:
@@ -134,7 +134,7 @@ class Taylor(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        label, start, model = scene.derive(convert, self)
+        label, (start, model) = self.label, scene.derive(find_model, self.tolerance is None)
         if self.tolerance is None:
             kernel = kernels("taylor")
             run = prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.terms, grid.dt))
@@ -168,8 +168,3 @@ def find_obstacle(scene: Scene) -> str | None:
         if axis is None or abs(axis @ scene.potential.orbit.normal_W) > RIGHT_ANGLE:
             return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
     return None
-
-
-def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
-    """Return the label of a run, its start in principal axes and the kernel's model of it."""
-    return method.label, *find_model(scene, method.tolerance is None)

@@ -10,7 +10,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, orthonormality, rotation_about
-from conservative.methods.taylor import convert
+from conservative.methods.taylor_model import find_model
 from conservative.references.precise import Precise
 from conservative.scenes.random_body import FIELDS as RANDOM_FIELDS
 from conservative.scenes.random_body import random_body
@@ -150,7 +150,7 @@ def test_tops_away_from_the_vertical_are_reduced_to_their_nutation(top: str) -> 
     R, body = rotation_about((1, 0, 0), angle), cv.RigidBody((0.9, 0.9, 1.2))
     held = cv.Scene(top, body, R, w, 2.0, cv.UniformGravity(1.0, (0, 0, 1.2)))
     exact = Precise(256).prepare(held, cv.Grid(2.0, 1))()
-    field = convert(held, cv.Taylor())[2].field
+    field = find_model(held, True)[1].field
     assert (type(field).__name__ == "Nutation") is reduced
     for order, steps, allowed in ((18, 40, 2e-14), (8, 80, 2e-8)):  # measured up to 6e-15 and 4e-9
         found = cv.Taylor(order).prepare(held, cv.Grid(2.0 / steps, steps, 1))()

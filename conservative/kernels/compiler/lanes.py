@@ -261,12 +261,16 @@ else:
 
 def gather_numbers(values):
     """Return the numbers of a tuple of tuples as an array for `load_rows`, and a tuple of zeros of the same arrangement."""
+    numbers = []
 
     def clear(value):
-        parts = map(clear, value) if isinstance(value, tuple) else ()
-        return value._make(parts) if hasattr(value, "_make") else tuple(parts) if isinstance(value, tuple) else 0.0
+        if isinstance(value, tuple):
+            return tuple.__new__(type(value), map(clear, value))
+        numbers.append(value)
+        return 0.0
 
-    return np.array(_flatten(values), dtype=float), clear(values)
+    like = clear(values)
+    return np.array(numbers, dtype=float), like
 
 
 join = trace(traced.join)

@@ -29,7 +29,7 @@ class Composition(NamedTuple):
     @property
     def stages(self) -> int:
         """Number of stages."""
-        return len(self.weights)
+        return 2 * len(self.half.split()) - 1
 
     def lengths(self, dt: float) -> tuple[float, ...]:
         """Return the lengths of the stages, s, of a step dt, s.
