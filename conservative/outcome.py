@@ -156,7 +156,7 @@ class Choice:
     error
         Requested attitude error over the run, rad.
     estimate
-        Estimated attitude error over the run, rad, from the same run with twice the step size.
+        Estimated attitude error over the run, rad, from the same run with twice the step size and one from a rounded start.
     attempts
         Step sizes of runs over the whole duration, s, and their estimates, rad.
     """

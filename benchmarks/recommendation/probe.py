@@ -187,7 +187,7 @@ class Conditions(Question):
         The error, rad, is by default the window's share of the target.
         """
         wanted = self.target * min(1.0, self.short / self.duration) if error is None else error
-        method, dt = find_cheapest(trials_of(self.scene), wanted, self.short, methods)
+        method, dt = find_cheapest(trials_of(self.scene), wanted, self.short, methods, bodies=1000)
         return method, self.round_step(min(dt, self.short / STEPS))
 
     def window(self, dt: float, cost: float, long: bool) -> Grid:

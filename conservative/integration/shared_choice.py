@@ -46,7 +46,7 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTim
     """
     numbers = pick(bodies)
     chosen, verified = numbers[: HARDEST + RANDOM], numbers[HARDEST + RANDOM :]
-    method, dt = find_cheapest(trials_of(bodies.take(chosen[0])), error, t_end)
+    method, dt = find_cheapest(trials_of(bodies.take(chosen[0])), error, t_end, bodies=len(bodies))
     if method.order is None:
         dt = min(dt, LONGEST * min(method.longest_step(bodies.take(i)) for i in numbers))
     attempts, parts = tuple[tuple[float, float], ...](), parts_for(bodies.scene)

@@ -1,8 +1,9 @@
 """Integrate to a requested error: find the cheapest method and step, run them, and estimate the error of that run.
 
-1. The candidates are tried over a short duration (`search`). Trial runs are cached (`trials`).
+1. The candidates are tried over a short duration (`search`). Trial runs are cached (`trials`). The trial of a short motion is
+   the whole run.
 2. The chosen method makes the whole run, and repeats it with twice the step (Richardson's step doubling). The difference is the
-   reported estimate. The trials cannot provide it, because a scene can amplify errors later. If
+   reported estimate. Shorter trials cannot provide it, because a scene can amplify errors later. If
    the estimate is above the requested error, the step is cut and the run repeated, unless the cause is rounding of the scene.
 """
 
@@ -41,21 +42,14 @@ def integrate_to_error(
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
-    best: tuple[Estimate, Grid, Trajectory | None] | None = (
-        None  # smallest error, its grid, and its trajectory unless remembered
-    )
 
-    def estimate(grid: Grid) -> Estimate:
-        nonlocal best
-        known, trajectory = trials.estimate(method, grid, sensitivity=True)
-        if best is None or known.total <= best[0].total:
-            best = known, grid, trajectory
-        return known
+    def grid_with(dt: float) -> Grid:
+        return grid_of(dt, t_end, samples, parts_for(scene))
 
     dt = dt if samples.at is None else divide_step(scene, method, dt)
-    attempts = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples, parts_for(scene)), estimate)
-    assert best is not None  # `cut_step` has estimated a run
-    estimated, grid, trajectory = best
+    attempts = cut_step(method, dt, error, grid_with, lambda grid: trials.estimate(method, grid, sensitivity=True)[0])
+    grid = grid_with(min(reversed(attempts), key=lambda attempt: attempt[1])[0])  # of the smallest error
+    estimated, trajectory = trials.estimate(method, grid, sensitivity=True)
     choice = Choice(method, grid.dt, error, estimated.total, attempts)
     trajectory = method.solve(scene, grid) if trajectory is None else trajectory
     if samples.at is not None:
@@ -79,7 +73,7 @@ def cut_step(
     while True:
         run = estimate(grid)
         attempts = (*attempts, (grid.dt, run.total))
-        rounding = run.sensitivity or 0.0
+        rounding = run.noise
         within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
         if run.error <= within or rounding >= ASYMPTOTIC or len(attempts) == ATTEMPTS:
             return attempts

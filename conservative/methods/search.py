@@ -7,7 +7,8 @@ next, with a shorter step, and the search ends when that candidate already has a
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
-candidate has reached the error, all others together may cost `MOST_RUNS` times as much as it does.
+candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
+starts at a step that is likely to be short enough, and ends the search.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from .. import registry
 from ..errors import MissingEngine
 from ..grid import Grid
 from ..method import Method, Role
+from ..needs import Need
 from ..scene import Scene
-from .trials import Trials, parts_for
+from .trials import Trials, convergence_factor, parts_for
 from .units import bound_rate
 
 SAFETY = 0.5
@@ -45,8 +47,10 @@ PENALTY = 10.0
 """Factor on the work of a candidate that stalls above the error, so that one that reaches the error is preferred."""
 RESOLVED = 0.01
 """If runs with shorter steps, in radians of that rotation, still differ completely, the sensitivity to rounding is measured."""
-MOST_RUNS = 20.0
-"""Limit to the work of a search after the first candidate that reaches the error, in units of the work of that candidate."""
+TRIAL = 2e5
+"""Time that a trial takes beside its runs, ns."""
+FIRST = 1.5
+"""First step, in units of the step that order and rate predict: short enough for 85 % of random bodies."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ class Candidate:
         Work of a step in the last attempt, ns.
     sensitivity
         Attitude error caused by rounding the scene, rad, if the last attempt measured it; otherwise 0.
+    runs
+        Number of runs of that duration for which the method and the step are chosen.
     """
 
     method: Method
@@ -77,6 +83,7 @@ class Candidate:
     attempts: tuple[tuple[float, float], ...] = ()
     step_work: float = 0.0
     sensitivity: float = 0.0
+    runs: float = 1.0
 
     @property
     def reached(self) -> bool:
@@ -118,16 +125,15 @@ class Candidate:
 
     @cached_property
     def prior_work(self) -> float:
-        """Estimate of the work, ns, from order and rate alone: error = (rate * step)^order."""
-        step = 1.0 if self.method.order is None else (SAFETY * self.error) ** (1 / self.method.order)
-        return self.method.card.cost(self.method).least * self.rate * self.duration / step
+        """Estimate of the work, ns, from order and rate alone."""
+        return self.method.card.cost(self.method).least * self.duration / predict_step(self.method, self.error, self.rate)
 
     def expected_work(self, scale: float) -> float:
-        """Return the smallest work, ns, that may reach the error; before the first attempt `scale` times the prior."""
+        """Return the smallest work, ns, that may reach the error; before the first attempt from `scale` times the prior."""
         if self.hopeless:
             return math.inf
         if not self.attempts:
-            return scale * self.prior_work
+            return scale * self.prior_work + TRIAL / self.runs
         if self.settled:
             return self.work * (1.0 if self.reached or self.method.order is None else PENALTY)
         dt, error = self.attempts[-1]
@@ -137,13 +143,15 @@ class Candidate:
         return max(self.work, self.step_work * steps / LENIENCY)
 
 
-def find_cheapest(trials: Trials, error: float, t_end: float, methods: Sequence[Method] | None = None) -> tuple[Method, float]:
+def find_cheapest(
+    trials: Trials, error: float, t_end: float, methods: Sequence[Method] | None = None, bodies: float = 1.0
+) -> tuple[Method, float]:
     """Return the method with the least work for an attitude error, rad, up to t_end, s, and the step that it needs, s.
 
-    `methods` are by default the `candidates` of the scene.
+    `methods` are by default the `candidates` of the scene. The choice is for runs of so many bodies.
     """
     spent = 0.0
-    running = [begin(method, trials.scene, error, t_end) for method in methods or candidates(trials.scene)]
+    running = [begin(method, trials.scene, error, t_end, bodies) for method in methods or candidates(trials.scene)]
     while True:
         i = most_promising(running)
         if running[i].settled or running[i].hopeless or (len(running) == 1 and running[i].method.order is None):
@@ -151,34 +159,45 @@ def find_cheapest(trials: Trials, error: float, t_end: float, methods: Sequence[
         running[i] = running[i].advance(trials)
         if running[i].sensitivity > error:  # no step of any method helps
             return running[i].method, running[i].attempts[-1][0]
-        spent += 1.5 * running[i].work
-        done = [each for each in running if each.reached]
-        if done and spent > MOST_RUNS * min(each.work for each in done):
-            cheapest = min(done, key=lambda each: each.work)
+        spent += 1.5 * running[i].work + TRIAL
+        cheapest = min((each for each in running if each.reached), key=lambda each: each.work, default=None)
+        if cheapest and spent > cheapest.work * cheapest.runs:
             return cheapest.method, cheapest.dt
 
 
-def begin(method: Method, scene: Scene, error: float, t_end: float) -> Candidate:
-    """Return a candidate before its first trial run, for an attitude error, rad, of a run to t_end, s.
+def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: float = 1.0) -> Candidate:
+    """Return a candidate before its first trial run, for an attitude error, rad, of runs of so many bodies to t_end, s.
 
-    The first step is half the duration, or the longest that is worth trying. If accuracy does not depend on the step, it is
-    half the method's longest, and at most a 16th of t_end.
+    The first step is likely to be short enough, or as short as the time of a trial allows. It is at most half the duration, and
+    the longest that is worth trying, which it is if steps call Python and their cost is unknown. If accuracy does not depend on
+    the step, it is half the method's longest, and at most a 16th of t_end.
     """
-    rate = bound_rate(scene)
+    rate = scene.derive(bound_rate)
     duration = min(t_end, PROBE_RADIANS / rate)
-    dt = min(duration / 2, method.card.longest / rate)
+    error *= min(1.0, 4 * duration / t_end)
+    likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
+    calling = scene.loads or not scene.needs.isdisjoint((Need.FUNCTION, Need.TIME))
+    dt = min(duration / 2, method.card.longest / rate, math.inf if calling else likely)
     if scene.loads:  # runs at two and four times the step have to differ everywhere (`conservative.methods.pieces`)
         breaks, step, _ = scene.smoothness(t_end)
         dt = min(dt, step, t_end / 4 / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
-    return Candidate(method, error * min(1.0, 4 * duration / t_end), duration, rate, dt)
+    return Candidate(method, error, duration, rate, dt, runs=bodies * t_end / duration)
+
+
+def predict_step(method: Method, error: float, rate: float) -> float:
+    """Return a step, s, for an error, rad, if the run differs from that at twice the step by (2 * step * rate)^order."""
+    if method.order is None:
+        return 1 / rate
+    return (convergence_factor(method) * SAFETY * error) ** (1 / method.order) / (2 * rate)
 
 
 def most_promising(running: Sequence[Candidate]) -> int:
-    """Return the index of the candidate with the least expected work; at the very first that of the first rank."""
+    """Return the index of the candidate with the least expected work; at the very first among settings of the first rank."""
     if not any(each.attempts for each in running):
-        return 0
+        first = [each for each in running if each.method.family == running[0].method.family]
+        return running.index(min(first, key=lambda each: each.prior_work))
     # The fastest rotation that the energy allows may be far above the actual one. Candidates that have reached the error
     # show by how much, and the priors of the others are scaled to be lower bounds.
     ratios = (each.work / each.prior_work for each in running if each.reached and each.prior_work > 0)

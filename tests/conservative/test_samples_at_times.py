@@ -139,14 +139,14 @@ def test_progress_of_trial_runs(monkeypatch, capsys):
     monkeypatch.setattr(trials, "QUIET", 0.0)
     monkeypatch.setattr(trials, "PAUSE", 0.0)
     trials.recall.cache_clear()
-    told = []
-    cv.integrate(TOP, error=1e-6, progress=told.append)
+    told, scene = [], cv.scenes.random_body("attraction", 777, 9)
+    cv.integrate(scene, error=1e-6, progress=told.append)
     assert len(told) > 1
     assert [each.runs for each in told] == list(range(0, 2 * len(told), 2))
     told.clear()
-    cv.integrate(TOP, error=1e-6, progress=told.append)
+    cv.integrate(scene, error=1e-6, progress=told.append)
     assert not told  # the trial runs are remembered
-    cv.integrate(TOP, error=1e-5)
+    cv.integrate(scene, error=1e-5)
     assert capsys.readouterr() == ("", "")
 
 
