@@ -25,12 +25,16 @@ from .twofold import minus, over, plus, scale, times, two
 TERMS = 22
 SERIES_RADIUS = 0.125
 DAMPING = 0.3
-LARGEST_POLE = 1.7
+NOWHERE = 1e-40
+"""Square of a distance from the upright position that counts as none, rad^2."""
+LARGEST_POLE, LONGEST_FALL = 1.7, 1.0
+NEARLY_UPRIGHT = 0.01
+"""Energy above that of the upright top, relative to the potential one, below which a top passes by that position."""
 PAUSE = 2**18
 """Parts of steps between two calls of handlers of signals."""
 PARTS_AT_ONCE = 1024
 """Numbers of parts tried between two such calls."""
-PARTS, CONSTANTS, ROWS = 20, 22, 32
+PARTS, CONSTANTS, ROWS = 21, 23, 33
 """Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across
 the axis, then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
 constants, and all."""
@@ -53,7 +57,7 @@ class Coefficients(NamedTuple):
 
 @kernel
 def curve(J, kappa, gamma, L):
-    """Twofold E, z, w3, k/2, -E/6, g2, g3 and the three B (alpha, beta, M); gamma need be a unit vector to round-off only."""
+    """Twofold k/2, -E/6, g2, g3 and the three B (alpha, beta, M); gamma need be a unit vector to round-off only."""
     Ji = over(two(1.0), two(J))
     square = plus(
         plus(times(two(gamma[0]), two(gamma[0])), times(two(gamma[1]), two(gamma[1]))), times(two(gamma[2]), two(gamma[2]))
@@ -73,7 +77,7 @@ def curve(J, kappa, gamma, L):
     slip = times(nu, minus(z, w[2]))
     g3 = plus(minus(scale(4.0, times(upper, times(upper, upper))), times(g2, upper)), times(slip, slip))
     B_M = minus(scale(-2.0, x0), scale(0.25, times(w[2], w[2])))
-    return E, z, w[2], nu, x0, g2, g3, np.array((minus(x0, nu), upper, B_M))
+    return nu, x0, g2, g3, np.array((minus(x0, nu), upper, B_M))
 
 
 @kernel
@@ -155,18 +159,19 @@ def constants(g2, g3, B, h):
 
 
 @kernel
-def split_step(g2, g3, B, h):
+def split_step(g2, g3, B, h, falling):
     """Return the number of equal parts of a step, and the constants of a part.
 
     Multiples of the period of nutation are poles of p, where the formulas cancel, and beyond about half of it the map amplifies
     what leaves the motion that its constants belong to. p(h) h^2 grows from 1 at h = 0 to about 2 there; unstable runs were
-    seen from 3 on.
+    seen from 3 on. A top that passes by the upright position, which it leaves at the rate `falling`, 1/s, needs a few parts on
+    its way there to correct its energy, which then is nearly nothing.
     """
-    parts = 1
+    parts = 1 + int(falling * h / LONGEST_FALL)
     while True:
         part = h / parts
         p, dp, f = constants(g2, g3, B, part)
-        if p * part * part <= LARGEST_POLE:
+        if p * part * part <= LARGEST_POLE and falling * part <= LONGEST_FALL:
             return parts, p, dp, f
         # One more, not twice as many: a step takes as long as it has parts.
         parts += 1
@@ -202,26 +207,38 @@ def unit_vertical(q):
 
 
 @small
-def restore_invariants(E, z, k, rate, gamma, w):
-    """Smallest change (dw0, dw1) of w and small turn (3,) of the attitude that bring w.gamma back to z and the energy to E.
+def invariants(k, spin, q, gamma, w0, w1):
+    """Vertical momentum and energy less those of the top that stands at rest with the same spin, and sin^2 of half the tilt.
+
+    Near there they are sums of small numbers, known to all digits, which decide when a top that falls stands up again: an
+    absolute error of 1e-16 of the energy would be all of it at 1e-8 rad. `spin` is as in `Part`.
+    """
+    low = choose(k < 0.0, q[0] * q[0] + q[3] * q[3], q[1] * q[1] + q[2] * q[2])
+    return w0 * gamma[0] + w1 * gamma[1] - 2.0 * spin * low, 0.5 * (w0 * w0 + w1 * w1) - 2.0 * abs(k) * low, low
+
+
+@small
+def restore_invariants(c, q, gamma, w0, w1):
+    """Smallest change (dw0, dw1) of w and small turn (3,) of the attitude that bring the `invariants` back to c.z and c.E.
 
     One Gauss-Newton correction, damped so much that it takes back a good part of what was lost, step by step, but never turns
-    the rounding error of a residual into a larger one of the state where the gradients are small (a sleeping top) or parallel
-    (steady precession).
+    the rounding error of a residual into a larger one of the state where the gradients are small (a hanging top) or parallel
+    (steady precession). The damping falls with the square of the tilt, as gradients and rounding errors do.
     """
-    w0, w1, w2 = w
+    rate, k = c.rate, c.k
     g0, g1, g2 = gamma
-    r = z - (w0 * g0 + w1 * g1 + w2 * g2)
+    z, E, low = invariants(k, c.spin, q, gamma, w0, w1)
+    r = c.z - z
     i = 1.0 / rate
-    s = i * (E - 0.5 * (w0 * w0 + w1 * w1 + w2 * w2) - k * g2)
+    s = i * (c.E - E)
     a0, a1 = rate * g0, rate * g1
-    a2, a3, a4 = w1 * g2 - w2 * g1, w2 * g0 - w0 * g2, w0 * g1 - w1 * g0
+    a2, a3, a4 = w1 * g2 - c.w2 * g1, c.w2 * g0 - w0 * g2, w0 * g1 - w1 * g0
     f = i * k
     b2, b3 = -f * g1, f * g0
     aa = a0 * a0 + a1 * a1 + a2 * a2 + a3 * a3 + a4 * a4
     ab = a0 * w0 + a1 * w1 + a2 * b2 + a3 * b3
     bb = w0 * w0 + w1 * w1 + b2 * b2 + b3 * b3
-    damping = DAMPING * rate * rate
+    damping = DAMPING * rate * rate * (low + NOWHERE)
     aa, bb = aa + damping, bb + damping
     inverse = 1.0 / (aa * bb - ab * ab)
     m, n = inverse * (bb * r - ab * s), inverse * (aa * s - ab * r)
@@ -229,10 +246,14 @@ def restore_invariants(E, z, k, rate, gamma, w):
 
 
 class Part(NamedTuple):
-    """Constants of a part of a step: of the motion (E to w2, and `rate`, which residuals are scaled by), then of the length."""
+    """Constants of a part of a step: of the motion (E to w2, and `rate`, which residuals are scaled by), then of the length.
+
+    E and z are less those of the upright top with the same spin; `spin` is w2, or -w2 if the axis points down there.
+    """
 
     E: Any
     z: Any
+    spin: Any
     k: Any
     nu: Any
     x0: Any
@@ -257,17 +278,21 @@ class Part(NamedTuple):
 def divide_step(model, h):
     """Return the number of equal parts of a step (`split_step`), and the constants of a part."""
     J, kappa, q, L = model
-    E, z, spin, nu, x0, g2, g3, B = curve(J, kappa, unit_vertical(q), L)
-    parts, p_h, dp_h, f = split_step(g2, g3, B, h)
+    nu, x0, g2, g3, B = curve(J, kappa, unit_vertical(q), L)
+    w2, k = L[2] / J, kappa / J
+    spin = -w2 if kappa < 0.0 else w2
+    kept = invariants(k, spin, q, unit_vertical(q), L[0] / J, L[1] / J)
+    falling = math.sqrt(max(0.0, abs(k) - 0.25 * w2 * w2)) if abs(kept[1]) < NEARLY_UPRIGHT * abs(k) else 0.0
+    parts, p_h, dp_h, f = split_step(g2, g3, B, h, falling)
     h /= parts
     rate = scale_of(g2, g3, B)
     rate = rate if rate > 0.0 else 1.0 / h
     (ya, da), (yb, db), (ym, dm) = (f[0, 0], f[0, 1]), (f[1, 0], f[1, 1]), (f[2, 0], f[2, 1])
     ca, cb, cm = p_h + B[0, 0], p_h + B[1, 0], p_h + B[2, 0]
-    w2 = spin[0]
     half = 0.5 * w2
     cos, sin = math.cos(half * h), math.sin(half * h)
-    return parts, Part(E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin)
+    of_motion = kept[1], kept[0], spin, k, nu[0], x0[0], w2, rate
+    return parts, Part(*of_motion, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin)
 
 
 @small
@@ -286,7 +311,7 @@ def advance(c, q, gamma, w0, w1):
     w0, w1 = c.cos * m0 + c.sin * m1, c.cos * m1 - c.sin * m0
     q = product(q, d)
     gamma = unit_vertical(q)
-    dw, t = restore_invariants(c.E, c.z, c.k, c.rate, gamma, (w0, w1, c.w2))
+    dw, t = restore_invariants(c, q, gamma, w0, w1)
     w0, w1 = w0 + dw[0], w1 + dw[1]
     # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
     # gamma must be of unit length: left alone, an error of its length would grow from step to step.

@@ -22,7 +22,8 @@ doubled arguments. No state is singular: an axis through a pole, a sleeping top,
 gravity need no special case.
 
 The constants belong to one energy and one momentum. Round-off would let both drift, linearly, or exponentially near a steady
-precession. Each step therefore ends with the smallest change of the state that restores them.
+precession. Each step therefore ends with the smallest change of the state that restores them. Both are measured from the
+upright position, so that a top which starts within 1e-12 rad of it, falls, and stands up again loses no digits.
 
 Alternatives on tops are slower or less accurate. `Gauss` iterates, and a Taylor series of (axis, momentum) evaluates six
 products to a high order, compared with one division here. Compositions of free rotations and kicks have a truncation error and
@@ -65,6 +66,9 @@ class Lame(Method):
     The accuracy does not depend on dt: a step adds about 1e-15 rad to the attitude error. Energy, momenta and orthonormality
     are conserved to round-off, but a free body's momentum turns by 6e-19 rad a step. Steps longer than about half a period of
     nutation are divided, counted in `Counters.stages`. Steps with turns of more than 10^6 rad raise `BadInput`.
+
+    Near the upright position round-off of the initial state grows, in every method. A top that starts d rad from there and falls
+    is off by about 1e-16/d rad, or 1e-13 if its body axes are principal axes; one that passes at d rad later by 1e-16/d^2.
 
     References: F. Klein and A. Sommerfeld, Theorie des Kreisels, for alpha and beta as elliptic functions of the second kind;
     E. T. Whittaker and G. N. Watson, Modern Analysis, chapters 20 and 23, for p and Lame's equation.

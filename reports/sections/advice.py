@@ -56,7 +56,7 @@ def section(measured: Measured) -> Section:
         parts.append(f"{first}; ✗ in the table: another is faster.")
     if closed:
         names = " and ".join(f"`{family}` ({scene})" for scene, family in closed)
-        parts.append(f"Closed forms are exact to round-off, but each solves only some motions: {names}.")
+        parts.append(f"Closed forms have no truncation error, but each solves only some motions: {names}.")
     random = random_bodies.sentence(measured.ratios) if measured.ratios else ""
     caption = "Our fastest method at each attitude error. Only the final state is stored. ✗: the other is faster."
     table = Table(HEADER, rows, caption)
