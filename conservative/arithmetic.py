@@ -183,14 +183,22 @@ def vertical(q: Sequence[Any]) -> Any:
 
 def in_body(q: Sequence[Any], v: Vector) -> Any:
     """Return a world vector v in the axes that the quaternion q, of any length, turns into world axes."""
+    n, r = in_long_body(q, v)
+    return scale(n, r)
+
+
+def in_long_body(q: Sequence[Any], v: Vector) -> Any:
+    """Return one over |q|^2, and |q|^2 times `in_body`. Rounding |q|^2, which is nearly constant, changes the length only."""
     u = (-q[1], -q[2], -q[3])
-    t = cross(u, v)
-    ut, f = cross(u, t), 2.0 / _square(q)
-    return (
-        fuse(f, fuse(q[0], t[0], ut[0]), v[0]),
-        fuse(f, fuse(q[0], t[1], ut[1]), v[1]),
-        fuse(f, fuse(q[0], t[2], ut[2]), v[2]),
-    )
+    t, uv = cross(u, v), dot(u, v)
+    along, across, rest = 2.0 * uv, 2.0 * q[0], fuse(q[0], q[0], -dot(u, u))
+    return 1.0 / _square(q), tuple(fuse(rest, v[k], fuse(along, u[k], across * t[k])) for k in range(3))
+
+
+def swing(a: Vector, c: Vector) -> Any:
+    """Return s and v with M c = c + s v, half of the way c + 2 s v from c to Cay(2 a) c."""
+    ac = cross(a, c)
+    return 1.0 / (1.0 + dot(a, a)), add(ac, cross(a, ac))
 
 
 def halfway(a: Vector, c: Vector) -> Any:
@@ -198,9 +206,8 @@ def halfway(a: Vector, c: Vector) -> Any:
 
     M c is the mean of c over a step, in the axes of its start: M = 1 + (hat(a) + hat(a)^2) / (1 + a.a), and M' is M at -a.
     """
-    s = 1.0 / (1.0 + dot(a, a))
-    ac = cross(a, c)
-    m = add(c, scale(s, add(ac, cross(a, ac))))
+    s, v = swing(a, c)
+    m = add(c, scale(s, v))
     # d(M c)/da_k = s (e_k x c + (a.c) e_k + c_k a - 2 a_k M c)
     f, t = dot(a, c), scale(2.0, m)
     turned = ((f, -c[2], c[1]), (c[2], f, -c[0]), (-c[1], c[0], f))

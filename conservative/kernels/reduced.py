@@ -13,7 +13,7 @@ Q1 (L1 + r1) = Q0 (L0 + r0) without a torque, and w* is unchanged.
 Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
 constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
 residual has the size of L1 - L0 instead of L. L1 follows from its other side. The round-off left to an asymmetric body has no
-mean, so errors grow with the square root of the number of steps. Steps of symmetric bodies can repeat it.
+mean, in fields neither, so errors grow with the square root of the number of steps. Steps of symmetric bodies can repeat it.
 
 The arithmetic is a chain of dependent operations, so its length counts, not their number. The first guess and its
 tangent do not need L: the processor works on them while it waits for the L of the last step.
@@ -172,30 +172,43 @@ def inverse_tangent(h, J, field, rotor, q, a):
 
 @small
 def final_correction(h, J, field, rotor, q, L, carry, rows, a):
-    """Return a after one more correction with the tangent of the last, and L1 - L0; `rows` are that tangent's inverse.
+    """Return a after one more correction with the last tangent, whose inverse is `rows`, and L1 with its carry.
 
-    Of J w + a x (J w) = L0 + (h/2) (T - a x T), a = (h/2) w, the difference u = J w - L0 is rounded once and includes what L0
-    lost to rounding. L1 - L0 = 2 u, and the correction is added to u, where it is not rounded away as it is in a. Each
-    component of a x (J w) is one constant times two rates: rounding that constant changes the conserved energy and momentum in
-    the last place, but they are conserved all the same. With a rotor they would not be, because the mean of w1 w2 w3 is not 0.
+    Of J w + a x (J w) = L0 + (h/2) (T - a x T), a = (h/2) w, the difference u = J w - L0 is rounded once. The correction c of w
+    and what the sum L0 = L - carry lost to rounding are added to L + 2 u, and remain in the carry of L1 with all their digits:
+    their part of order h c would have a mean if it was rounded as u is.
+
+    Without field and rotor each component of a x (J w) is one constant times two rates: rounding that constant changes the
+    conserved energy and momentum in the last place, but they are conserved all the same. With a field or a rotor they would
+    not be, because the mean of w1 w2 w3 is not 0.
     """
     half = 0.5 * h
     w = scale(2.0 / h, a)
-    u = add(subtract(times(J, w), L), carry)
-    if rotor is None:
+    u = (fuse(J[0], w[0], -L[0]), fuse(J[1], w[1], -L[1]), fuse(J[2], w[2], -L[2]))
+    if rotor is None and field is None:
         turning = times(scale(half, gaps(J)), (w[1] * w[2], w[2] * w[0], w[0] * w[1]))
     else:
-        turning = scale(half, cross(w, add(times(J, w), rotor)))
+        turning = cross(a, whole(rotor, times(J, w)))
     if field is not None:
         half_T = scale(half, finite_torque(field, q, a)[0])
         turning = subtract(add(turning, cross(a, half_T)), half_T)
-    correction = apply(rows, add(u, turning))
-    return subtract(a, scale(half, correction)), scale(2.0, subtract(u, times(J, correction)))
+    correction = apply(rows, add(add(u, turning), carry))
+    x, cx = add_twice(L[0], u[0], fuse(-2.0 * J[0], correction[0], carry[0]))
+    y, cy = add_twice(L[1], u[1], fuse(-2.0 * J[1], correction[1], carry[1]))
+    z, cz = add_twice(L[2], u[2], fuse(-2.0 * J[2], correction[2], carry[2]))
+    return subtract(a, scale(half, correction)), (x, y, z), (cx, cy, cz)
+
+
+@small
+def add_twice(total, u, rest):
+    """Return total + 2 u + rest and its rounding error, as `accumulate` does, for a small rest."""
+    new = total + fuse(2.0, u, rest)
+    return new, fuse(-2.0, u, new - total) - rest
 
 
 @small
 def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
-    """Return (a, L1 - L0, corrections made, size of the last, whether to trust it), from a first guess of a.
+    """Return (a, L1, its carry, corrections made, size of the last, whether to trust it), from a first guess of a.
 
     Newton's answer is trusted where it takes at most `FEW` corrections, stays near the guess (`near`), and the determinant of
     the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
@@ -223,9 +236,9 @@ def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
         enough = enough | (square <= tolerance * aa)
         close = dot(away, away) <= near * aa + NEAR_ZERO
         iterations += 1
-    a, gain = final_correction(h, J, field, rotor, q, L, carry, rows, a)
+    a, L, carry = final_correction(h, J, field, rotor, q, L, carry, rows, a)
     # The determinant of the tangent is positive at a = 0. On the continuous branch it cannot change its sign.
-    return a, gain, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
+    return a, L, carry, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
 
 
 @kernel
@@ -243,13 +256,15 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
         guess = (
             add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, rotor, q, L)
         )
-        found, gain, iterations, size, trusted = newton_solve(hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, tolerance)
+        found, L1, carry1, iterations, size, trusted = newton_solve(
+            hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, tolerance
+        )
         corrections += iterations
         if not trusted:
             part *= 0.5
             continue
         if aim == 1.0:
-            return found, gain, corrections, size, True
+            return found, L1, carry1, corrections, size, True
         # Parts that were halved before a bend of the branch grow again behind it.
         a, reached, part = found, aim, 2.0 * part
         rows = inverse_tangent(hs, J, field, rotor, q, a)
@@ -257,7 +272,7 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
         slope = scale(0.5, apply(rows, forcing(hs, field, rotor, q, L, a)))
     r = residual(h, J, field, rotor, q, L, a)
     f = forcing(0.5 * h, field, rotor, q, L, a)
-    return a, a, corrections, math.sqrt(dot(r, r) / dot(f, f)) / abs(0.5 * h), False
+    return a, L, carry, corrections, math.sqrt(dot(r, r) / dot(f, f)) / abs(0.5 * h), False
 
 
 @small
@@ -320,13 +335,12 @@ def march(model, coefficients, workspace):
             now = at_step(field, t, h)
             mean, half = step_rotor(field, rotor, t, h)
             L, L_carry = react(L, L_carry, half)
-            a, gain, more, size, found = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
+            a, L1, L1_carry, more, size, found = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
             corrections += more
             if not found:
                 elsewhere = find_solution(h, J, J_inverse, now, mean, q, L)
                 return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
-            L, L_carry = add_momentum(L, L_carry, gain)
-            L, L_carry = react(L, L_carry, half)
+            L, L_carry = react(L1, L1_carry, half)
             supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
             # The history lacks this stage, so its solutions are no longer the last ones at equal distances.
@@ -367,7 +381,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
             # L stays as it is before the stage: if the solution is not trusted, `march` solves the stage from there.
             M, M_carry = react(L, L_carry, half)
             a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
-            a, gain, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
+            a, M, M_carry, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
@@ -375,8 +389,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
-            L, L_carry = add_momentum(M, M_carry, gain)
-            L, L_carry = react(L, L_carry, half)
+            L, L_carry = react(M, M_carry, half)
             supplied = supply(now, h, q, a, supplied)
             q, q_carry = turn_attitude(a, q, q_carry)
         first = 0
@@ -459,8 +472,8 @@ def put(v, i, x):
 
 
 @kernel
-def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted, finished, first):
-    """Solve for the lanes that are not trusted, one by one; return solutions, gains, and momenta of all with what they lost.
+def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, trusted, finished, first):
+    """Solve for the lanes that are not trusted, one by one; return solutions and momenta of all with what they lost.
 
     A body without a solution is brought to rest, where it needs no further work, and noted in `finished`.
     """
@@ -472,12 +485,14 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted
             own_field = None if field is None else UniformField(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
             own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
             own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
-            found, own_gain, _, _, exists = continue_branch(h, own[0], own[1], own[2], None, own[3], own[4], own[5], tolerance)
+            found, own_L1, own_carry1, _, _, exists = continue_branch(
+                h, own[0], own[1], own[2], None, own[3], own[4], own[5], tolerance
+            )
             if not exists:
                 finished[first + i] = False
-                found, own_gain, L, carry = rest, rest, put(L, i, rest), put(carry, i, rest)
-            a, gain = put(a, i, found), put(gain, i, own_gain)
-    return a, gain, L, carry
+                found, own_L1, own_carry1 = rest, rest, rest
+            a, L1, carry1 = put(a, i, found), put(L1, i, own_L1), put(carry1, i, own_carry1)
+    return a, L1, carry1
 
 
 @entry
@@ -515,10 +530,10 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                 a = guess_ahead((newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]))
                 if not every(enough):
                     a = choose(enough, a, explicit_guess(h, J_inverse, field, None, q, L))
-                a, gain, _, _, trusted = newton_solve(h, J, field, None, q, L, L_carry, a, NEAR, tolerance)
+                a, L1, L1_carry, _, _, trusted = newton_solve(h, J, field, None, q, L, L_carry, a, NEAR, tolerance)
                 if not every(trusted):
-                    a, gain, L, L_carry = solve_alone(
-                        h, J, J_inverse, field, q, L, L_carry, tolerance, a, gain, trusted, finished, i
+                    a, L1, L1_carry = solve_alone(
+                        h, J, J_inverse, field, q, L, L_carry, tolerance, a, L1, L1_carry, trusted, finished, i
                     )
                     known = choose(trusted, known, zero)
                 if stages == 1:
@@ -526,7 +541,7 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                     place = push(ring, place, newest)
                     newest = a
                     known = choose(dot(change, change) <= SMOOTH * dot(a, a), known + 1.0, zero)
-                L, L_carry = add_momentum(L, L_carry, gain)
+                L, L_carry = L1, L1_carry
                 q, q_carry = turn_attitude(a, q, q_carry)
             until_sample -= 1
             if until_sample == 0 or step == n_steps:

@@ -67,8 +67,8 @@ class Lame(Method):
     are conserved to round-off, but a free body's momentum turns by 6e-19 rad a step. Steps longer than about half a period of
     nutation are divided, counted in `Counters.stages`. Steps with turns of more than 10^6 rad raise `BadInput`.
 
-    Near the upright position round-off of the initial state grows, in every method. A top that starts d rad from there and falls
-    is off by about 1e-16/d rad, or 1e-13 if its body axes are principal axes; one that passes at d rad later by 1e-16/d^2.
+    Near the upright position round-off of the initial state grows, in every method. A top that starts d rad from there and
+    falls is off by about 1e-16/d rad, or 1e-13 if its body axes are principal axes; one that passes at d later by 1e-16/d^2.
 
     References: F. Klein and A. Sommerfeld, Theorie des Kreisels, for alpha and beta as elliptic functions of the second kind;
     E. T. Whittaker and G. N. Watson, Modern Analysis, chapters 20 and 23, for p and Lame's equation.

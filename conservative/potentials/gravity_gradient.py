@@ -142,7 +142,11 @@ class GravityGradient(FieldPotential):
     def build_field(R_BP: Array | None, rate: Any, inertia: Any, direction_W: Any) -> GradientField:
         """Return the field in axes R_BP."""
         turned = inertia if R_BP is None else np.swapaxes(R_BP, -1, -2) @ inertia @ R_BP
-        return GradientField(3 * np.asarray(rate)[..., None, None] ** 2 * turned, direction_W)
+        # A matrix that is not symmetric has work in a closed path, and an element below round-off acts in some sums only.
+        symmetric = (turned + np.swapaxes(turned, -1, -2)) / 2
+        least = 16 * np.finfo(float).eps * np.abs(symmetric).max(axis=(-1, -2), keepdims=True)
+        symmetric = np.where(np.abs(symmetric) < least, 0.0, symmetric)
+        return GradientField(3 * np.asarray(rate)[..., None, None] ** 2 * symmetric, direction_W)
 
     @property
     def axis_W(self) -> Array:

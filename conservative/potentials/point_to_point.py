@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, root, scale, subtract
+from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, in_long_body, root, scale, subtract, swing
 from ..attitude import Array
 from ..check import finite_array, finite_number, positive_number, replace_unchecked, set_fields
 from ..errors import BadInput
@@ -54,9 +54,13 @@ class PointField:
 
     def finite_torque(self, q: Any, a: Any) -> Any:
         """Return T = -2 slope A x m, m = M b, and its derivative: the slope changes with s1, and ds1 = 4 x1.dm."""
-        A = in_body(q, self.A)
+        n, r = in_long_body(q, self.A)
+        A = scale(n, r)
         m, dm = halfway(a, self.b)
-        x0, x1 = subtract(self.b, A), subtract(subtract(scale(2.0, m), self.b), A)
+        s, v = swing(a, self.b)
+        # Sums of the constant b with rounded numbers would always drop the same of its digits, and the mean would not be 0.
+        x0 = tuple(fuse(-n, y, x) for x, y in zip(self.b, r, strict=True))
+        x1 = tuple(fuse(2.0 * s, y, x) for x, y in zip(x0, v, strict=True))
         slope, change = self.divided(dot(x0, x0), dot(x1, x1))
         Am, f = cross(A, m), -2.0 * slope
 

@@ -151,6 +151,31 @@ def test_no_special_value_makes_it_walk(order, dt):
         assert grown.rms < 5e-15  # measured 4e-16 to 2.7e-15
 
 
+def random_body_in(field, index):
+    scene = cv.scenes.random_body(field, 31, index)
+    return scene, 0.05 / float(np.linalg.norm(scene.w_WB_B0))
+
+
+@pytest.mark.parametrize("order", [2, 6])
+@pytest.mark.parametrize(("field", "index"), [("gravity", 26), ("spring", 14), ("attraction", 2), ("fixed_gradient", 1)])
+def test_fields_walk(field, index, order):
+    """The energy of these drifted by 7e-20 to 6e-19 a step, with chances of 1e-148 to 1e-30 of a walk."""
+    scene, dt = random_body_in(field, index)
+    for name, grown in measure_growth(cv.Reduced(order), scene, dt, 800_000 if order == 2 else 100_000, 5).items():
+        assert not grown.linear, f"{name}: {grown}"  # measured: chances from 7e-3 on
+
+
+@pytest.mark.attack
+@pytest.mark.parametrize("field", ["gravity", "spring", "attraction", "fixed_gradient"])
+def test_fields_walk_for_long(field):
+    """With a chance of 1e-3 each, 39 of 40 random bodies have to walk."""
+    found = []
+    for index in range(40):
+        scene, dt = random_body_in(field, index)
+        found.append(measure_growth(cv.Reduced(), scene, dt, count(1_000_000), 1)["energy"].chance)
+    assert np.sum(np.array(found) < 1e-3) <= 1, found
+
+
 @pytest.mark.attack
 @pytest.mark.parametrize("method", [cv.Reduced(), cv.Reduced(4), cv.MoserVeselov(), cv.Gauss(2)], ids=lambda each: each.name)
 @pytest.mark.parametrize("scene", [cv.scenes.brick_flip(), generic()], ids=lambda each: each.name)

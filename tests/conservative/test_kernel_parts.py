@@ -52,8 +52,9 @@ def gain_of_steps(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
 
 
 def gain_of_branch(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
-    """Return the same gain by continuation, without the sum."""
-    return np.array(reduced.continue_branch(H, J, INVERSE, None, None, Q, tuple(start.tolist()), carry, TIGHT)[1])
+    """Return the same gain by continuation."""
+    found = reduced.continue_branch(H, J, INVERSE, None, None, Q, tuple(start.tolist()), carry, TIGHT)
+    return np.array(found[1]) - found[2] - (start - carry)
 
 
 @pytest.mark.parametrize("gain", [gain_of_steps, gain_of_branch])
@@ -68,7 +69,7 @@ def trust(size: float, near: float, momentum: tuple[float, ...] = L) -> bool:
     a = np.array(reduced.continue_branch(H, J, INVERSE, None, None, Q, momentum, (0.0, 0.0, 0.0), 1e-20)[0])
     aside = np.array([0.0, 0.6, -0.8]) * np.sqrt(size) * np.linalg.norm(a)
     guess = tuple((a + aside).tolist())
-    _, _, _, _, trusted = reduced.newton_solve(H, J, None, None, Q, momentum, (0.0, 0.0, 0.0), guess, near, 1e-8)
+    *_, trusted = reduced.newton_solve(H, J, None, None, Q, momentum, (0.0, 0.0, 0.0), guess, near, 1e-8)
     return bool(trusted)
 
 
