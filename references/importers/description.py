@@ -1,6 +1,7 @@
-"""The rigid body of a model file: mass, centre of mass and inertia as URDF, SDF, USD or MJCF define them.
+"""The rigid body of a model file with one body: mass, centre of mass and inertia as URDF, SDF, USD or MJCF define them.
 
-URDF and SDF are read here, USD by usd-core, meshes by trimesh. MuJoCo defines MJCF, so MJCF is what MuJoCo compiles.
+This is the second opinion: `readers` has the reference readers, and `mjcf` the second one of MJCF. Every element and attribute
+is used, known to be irrelevant to a free body, or named in the notes. trimesh reads meshes, usd-core opens the stage of a file.
 
 References
 ----------
@@ -13,8 +14,7 @@ MJCF: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,349 +23,297 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
-from conservative.errors import BadInput, require_extra
+from conservative.errors import BadInput
 
 from ..engine import load
+from .files import kind_of, load_mesh, parse, qualified, reason, refuse
+from .pieces import DENSITY, SHAPES, Link, Piece, Reading, join, make_pose, weigh
+from .usd import read_usd
 
-ROOTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf"}
-DENSITY = 1000.0
-"""Density of geometry that has none in a file, kg/m^3."""
 ONE = "one free rigid body, whose parts are on fixed joints"
+_POSE = "relative_to degrees rotation_format"
+_I = "ixx iyy izz ixy ixz iyz"
+KNOWN: dict[str, dict[str, tuple[str, str]]] = {
+    "urdf": {
+        "robot": ("name version link joint", "material transmission sensor"),
+        "link": ("name inertial collision", "type visual"),
+        "inertial": ("origin mass inertia", ""),
+        "origin": ("xyz rpy quat_xyzw", ""),
+        "mass": ("value", ""),
+        "inertia": (_I, ""),
+        "collision": ("name origin geometry", "verbose"),
+        "joint": ("name type origin parent child", "axis limit dynamics mimic calibration safety_controller"),
+    },
+    "sdf": {
+        "sdf": ("version model world", ""),
+        "world": ("name model", "*"),
+        "model": (
+            "name link frame joint",
+            "canonical_link placement_frame pose static self_collide allow_auto_disable enable_wind gripper",
+        ),
+        "link": (
+            "name pose inertial collision",
+            "visual sensor projector audio_sink audio_source battery light particle_emitter kinematic gravity enable_wind"
+            " self_collide velocity_decay must_be_base_link",
+        ),
+        "inertial": ("auto pose mass inertia density", ""),
+        "pose": (_POSE, ""),
+        "inertia": (_I, ""),
+        "collision": ("name pose geometry density", "surface laser_retro max_contacts"),
+        "frame": ("name attached_to pose", ""),
+        "joint": ("name type pose parent child", "axis axis2 physics sensor screw_thread_pitch thread_pitch gearbox_ratio"),
+    },
+}
+"""Names of attributes and children by format and element: those that are read, and those that do not matter to a free body."""
+MASS = ("inertial", "origin", "pose", "mass", "inertia")
+EXTENSIONS = {"mujoco": "mujoco", "drake": "drake"}
+"""Names and prefixes of elements that ask one engine for something."""
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """Mass, kg, centre of mass (3,), m, and inertia about it (3, 3), kg m^2."""
-
-    mass: float
-    com: Array
-    inertia: Array
-
-    def place(self, pose: Array) -> Piece:
-        """Return the part in other axes, in which its own have a pose (4, 4)."""
-        R = pose[:3, :3]
-        return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T)
-
-    def scale(self, factor: float) -> Piece:
-        """Return the part with another density."""
-        return Piece(factor * self.mass, self.com, factor * self.inertia)
-
-    @property
-    def flaw(self) -> str:
-        """Why no body has this mass and inertia; empty if one has. Files may round the moments of a planar body."""
-        moments = np.linalg.eigvalsh(self.inertia)
-        if not (self.mass > 0 and moments[0] > 0):
-            return "mass and principal moments are not all positive"
-        return "a moment exceeds the sum of the others" if moments[2] > (moments[0] + moments[1]) * (1 + 1e-6) else ""
+def read_links(path: Path, angles: float = 1.0, search: Sequence[Path] = ()) -> list[Link]:
+    """Return the links of `read_own`."""
+    return read_own(path, angles, search).links
 
 
-@dataclass(frozen=True, eq=False)
-class Link:
-    """A link, fixed to the root link.
+def read_own(path: Path, angles: float = 1.0, search: Sequence[Path] = ()) -> Reading:
+    """Return the links of a URDF, SDF or USD file with one rigid body as this package reads them, and of MJCF as MuJoCo does.
 
-    `pose` (4, 4) is its pose in the root link, and `frame` (4, 4) that of the inertial frame in the link, m. `inertia` (3, 3)
-    is in the inertial frame, kg m^2. `geometry` is its geometry with `DENSITY`.
-    """
-
-    pose: Array
-    mass: float = 0.0
-    frame: Array = field(default_factory=lambda: np.eye(4))
-    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
-
-    def filled(self, part: Piece) -> Link:
-        """Return the link with mass and inertia of a part in its axes."""
-        return replace(self, mass=part.mass, frame=make_pose(part.com), inertia=part.inertia)
-
-
-def join_links(links: Iterable[Link]) -> Piece:
-    """Return links as one part, in the axes of the root link."""
-    return join(Piece(each.mass, np.zeros(3), each.inertia).place(each.frame).place(each.pose) for each in links)
-
-
-def join(parts: Iterable[Piece]) -> Piece:
-    """Return several parts as one: J = sum J_i + m_i (d_i.d_i 1 - d_i d_i'), d_i = c_i - c (Steiner)."""
-    parts = list(parts)
-    mass = sum(part.mass for part in parts)
-    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
-    inertia = np.zeros((3, 3))
-    for part in parts:
-        d = part.com - com
-        inertia = inertia + part.inertia + steiner(part.mass, d)
-    return Piece(mass, com, inertia)
-
-
-def steiner(mass: float, d: Array) -> Array:
-    """Return the inertia (3, 3) of a point mass at d (3,) about the origin."""
-    return mass * (d @ d * np.eye(3) - np.outer(d, d))
-
-
-def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Array:
-    """Return the pose (4, 4) of a place (3,) and a rotation."""
-    T = np.eye(4)
-    T[:3, 3] = place
-    T[:3, :3] = np.eye(3) if R is None else R.as_matrix() if isinstance(R, Rotation) else R
-    return T
-
-
-def kind_of(path: Path) -> str:
-    """Return "urdf", "mjcf", "sdf" or "usd". Raise as `read_links`."""
-    if path.suffix.lower() in (".usd", ".usda", ".usdc"):
-        return "usd"
-    try:
-        return ROOTS[ElementTree.fromstring(path.read_bytes()).tag]
-    except (OSError, ElementTree.ParseError, KeyError) as error:
-        reason = f"the root element {error}" if isinstance(error, KeyError) else getattr(error, "strerror", None) or error
-        allowed = f"a file of XML with the root element {', '.join(ROOTS)}, or .usd, .usda, .usdc"
-        raise BadInput("file", f"{str(path)!r}: {reason}", allowed) from None
-
-
-def read_links(path: Path, angles: float = 1.0) -> list[Link]:
-    """Return the links of a URDF, SDF, USD or MJCF file with one rigid body, the root link first.
-
-    All angles in URDF and SDF are multiplied by `angles`; if it is not 1, MJCF is read with the other unit of angles.
+    All angles in URDF and SDF are multiplied by `angles`; if it is not 1, MJCF is read with the other unit of angles. Meshes
+    may lie in the folder of the file or in those of `search`.
 
     Raises
     ------
     BadInput
         The file cannot be read, has a joint that moves, no inertia, a missing mesh, or no units.
     MissingEngine, MissingExtra
-        MuJoCo, usd-core or trimesh is not installed.
+        MuJoCo, usd-core, lxml or trimesh is not installed.
     """
-    file = _File(path, angles)
+    kind = kind_of(path)
+    file = File(path, angles, search)
     try:
-        links = {"mjcf": _read_mjcf, "usd": _read_usd}.get(kind_of(path), _read_xml)(file)
+        file.read.links = read_usd(path, search, file.read) if kind == "usd" else {"mjcf": read_mjcf}.get(kind, _read_xml)(file)
+    except RecursionError:
+        raise refuse(path, "frames that refer to each other in a circle", "frames that lead to the model") from None
     except (ValueError, LookupError, AttributeError, TypeError) as error:
         if isinstance(error, BadInput):
             raise
-        raise file.refuse(
-            f"what cannot be read ({type(error).__name__}: {error})", "elements and numbers of its format"
-        ) from None
+        what = f"what cannot be read ({type(error).__name__}: {error})"
+        raise refuse(path, what, "elements and numbers of its format") from None
+    links = file.read.links
+    if not all(
+        np.isfinite([*link.inertia.ravel(), *link.frame.ravel(), *link.pose.ravel(), link.mass]).all() for link in links
+    ):
+        raise refuse(path, "numbers that are not finite", "finite numbers in m, kg and kg m^2")
     if not any(link.mass for link in links):
-        raise file.refuse("no mass in any link", "mass and inertia of a link")
+        raise refuse(path, "no mass in any link", "mass and inertia of a link")
     base = np.linalg.inv(links[0].pose)
-    return [replace(link, pose=base @ link.pose) for link in links]
+    file.read.links = [replace(link, pose=base @ link.pose) for link in links]
+    return file.read
 
 
 @dataclass(frozen=True)
-class _File:
-    """A file, for messages, poses and geometry."""
+class File:
+    """A file, for messages, poses and geometry; `read` collects what has to be said."""
 
     path: Path
     angles: float
+    search: Sequence[Path] = ()
+    read: Reading = field(default_factory=Reading)
 
     def refuse(self, what: str, allowed: str) -> BadInput:
-        return BadInput("file", f"{str(self.path)!r} with {what}", allowed)
+        return refuse(self.path, what, allowed)
 
-    def pose(self, element: ElementTree.Element | None) -> Array:
-        """Return the pose (4, 4) in an <origin> of URDF or a <pose> of SDF; without one the identity."""
+    def pose(self, element: Any, of: str = "", version: str = "9") -> Array:
+        """Return the pose (4, 4) in an <origin> of URDF or a <pose> of SDF, of a link `of`; without one the identity."""
         if element is None:
             return np.eye(4)
-        values = _numbers(
-            f"{element.get('xyz', '0 0 0')} {element.get('rpy', '0 0 0')}" if element.tag == "origin" else element.text
-        )
+        if element.tag == "pose":
+            values = numbers(element.text)
+        else:
+            values = numbers(f"{element.get('xyz', '0 0 0')} {element.get('rpy', '0 0 0')}")
+        if of and (base := element.get("relative_to", of)):
+            said = f"the pose in <{element.getparent().tag}> of {of!r} is relative to {base!r}, which the format does not allow"
+            (self.read.doubts if base == of else self.read.invalid).extend([said] * ("relative_to" in element.attrib))
+        if "quat_xyzw" in element.attrib:
+            if tuple(map(int, version.split("."))) >= (1, 1):
+                return make_pose(values[:3], Rotation.from_quat(numbers(element.get("quat_xyzw"))))
+            self.read.notes.append("quat_xyzw is ignored in URDF 1.0, which has no such attribute")
         if element.get("rotation_format") == "quat_xyzw":
             return make_pose(values[:3], Rotation.from_quat(values[3:]))
         unit = self.angles * (math.pi / 180 if element.get("degrees") in ("true", "1") else 1.0)
         return make_pose(values[:3], Rotation.from_euler("xyz", unit * np.array(values[3:] or [0, 0, 0])))
 
-    def weigh(self, element: ElementTree.Element, place: Array, density: float = DENSITY) -> list[Piece]:
-        """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane."""
+    def weigh(self, element: Any, place: Array, density: float = DENSITY) -> list[Piece]:
+        """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane.
+
+        Raise `BadInput` for a mesh that cannot be read, and for another shape than those of `weigh`.
+        """
         form = element[0]
         values = _values(form)
         if form.tag == "mesh":
             name = values.get("filename", values.get("uri", ""))
-            path = self.path.parent / name.removeprefix("file://")
-            if not path.is_file():
-                raise self.refuse(
-                    f"the mesh {name!r}, which is not there", "meshes that exist, with paths relative to the file"
-                )
-            require_extra("a mesh", "models", "trimesh")
-            import trimesh
+            vertices, faces = load_mesh(self.path, name, self.search)
+            return weigh("mesh", [vertices * numbers(values.get("scale", "1 1 1")), faces], place, density)
+        names = {"box": ("size",), "ellipsoid": ("radii",), "sphere": ("radius",), "plane": ()}.get(
+            form.tag, ("radius", "length")
+        )
+        if form.tag not in SHAPES or not set(names) <= set(values):
+            raise self.refuse(f"the shape <{form.tag}>", f"shapes whose volume is known: {', '.join(SHAPES)}")
+        return weigh(form.tag, numbers(" ".join(values[name] for name in names)), place, density)
 
-            mesh: Any = trimesh.load(path, force="mesh")
-            return weigh("mesh", [mesh.vertices * _numbers(values.get("scale", "1 1 1")), mesh.faces], place, density)
-        names = {"box": ("size",), "ellipsoid": ("radii",), "sphere": ("radius",)}.get(form.tag, ("radius", "length"))
-        sizes = _numbers(" ".join(values[name] for name in names)) if form.tag != "plane" else []
-        return weigh(form.tag, sizes, place, density)
-
-
-def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
-    """Return the part of a shape after an affine map `pose` (4, 4), which may scale it; none for another kind.
-
-    Shapes are centred and about the third axis: "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" and
-    "capsule" (radius, length of the cylinder), "mesh" (vertices and triangles), m. The density is that after the map, kg/m^3.
-    """
-    centroid = np.zeros(3)
-    if kind == "mesh":  # tetrahedra from the origin
-        corners = np.asarray(sizes[0], float)[np.asarray(sizes[1])]
-        total, weight = corners.sum(axis=1), np.linalg.det(corners)
-        volume = weight.sum() / 6
-        centroid = weight @ total / 24 / volume
-        second = (total.T * weight) @ total + np.einsum("n,nki,nkj->ij", weight, corners, corners)
-        second = second / 120 - volume * np.outer(centroid, centroid)
-    elif kind in ("box", "ellipsoid", "sphere"):
-        sides = np.broadcast_to(sizes, 3)
-        volume = np.prod(sides) * (1 if kind == "box" else 4 / 3 * math.pi)
-        second = volume * np.diag(sides**2) / (12 if kind == "box" else 5)
-    elif kind in ("cylinder", "capsule"):
-        r, length = sizes
-        rod, ball = math.pi * r * r * length, 4 / 3 * math.pi * r**3 * (kind == "capsule")
-        ends = ball * (length**2 / 4 + 3 * length * r / 8)  # of the hemispheres along the axis, in addition to those of a ball
-        volume = rod + ball
-        second = np.diag([rod * r * r / 4] * 2 + [rod * length**2 / 12 + ends]) + ball * r * r / 5 * np.eye(3)
-    else:
-        return []
-    A, size = pose[:3, :3], density * abs(np.linalg.det(pose[:3, :3])) * math.copysign(1, volume)  # a mesh may be inside out
-    second = size * A @ second @ A.T
-    return [Piece(size * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]
+    def look(self, element: Any, format_: str) -> None:
+        """Note what no rule here covers, in an element and its children: in the parts with a mass it is a doubt."""
+        tag = element.tag
+        used, ignored = (names.split() for names in KNOWN[format_].get(tag, ("*", "")))
+        owners = [*((name, element) for name in element.attrib), *((child.tag, child) for child in element)]
+        for name, owner in () if used == ["*"] else owners:
+            if name not in used and name not in ignored:
+                plain = qualified(owner, name)
+                if engine := EXTENSIONS.get(plain.partition(":")[0]):
+                    inside = [each for each in owner.iter() if each is not element and owner is not element]
+                    values = [f"{each.tag} {key}={value!r}" for each in inside for key, value in each.attrib.items()]
+                    self.read.asks.setdefault(engine, []).append(" ".join([f"<{plain}>", *values]))
+                else:
+                    said = f"<{tag}> has {plain!r}, which is not read here"
+                    (self.read.doubts if tag in MASS else self.read.notes).append(said)
+            if name in MASS and len(element.findall(name)) > 1:
+                self.read.invalid.append(f"<{tag}> has several elements <{name}>")
+        for child in element:
+            if child.tag in used:
+                self.look(child, format_)
 
 
-def _numbers(text: str | None) -> list[float]:
-    return [float(word) for word in (text or "").split()]
+def numbers(text: str | None) -> list[float]:
+    """Return the finite numbers of a text. Raise ValueError for others."""
+    values = [float(word) for word in (text or "").split()]
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f"{text!r} is not finite")
+    return values
 
 
-def _read_xml(file: _File) -> list[Link]:
+@dataclass(frozen=True)
+class Joint:
+    """A joint of URDF or SDF: its name and kind, the links that it joins, and its pose (4, 4) in the parent of URDF."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    pose: Array
+
+
+class Frames:
+    """The joints of a model of URDF or SDF, and the poses of its links, joints and frames."""
+
+    def __init__(self, file: File, model: Any) -> None:
+        self.urdf = model.tag == "robot"
+        self._file, version = file, model.get("version", "1.0") if self.urdf else "1.0"
+        self.own, attribute = ("origin", "link") if self.urdf else ("pose", "name")
+        tags = ("link",) if self.urdf else ("joint", "frame", "link")  # a joint of URDF may have the name of its link
+        self.elements = {each.get("name", ""): each for tag in tags for each in model.findall(tag)}
+        self.joints = []
+        for each in model.findall("joint"):
+            ends = [each.find(name) for name in ("parent", "child")]
+            names = ["" if end is None else (end.get(attribute) or end.text or "").strip() for end in ends]
+            pose = file.pose(each.find(self.own), version=version) if self.urdf else np.eye(4)
+            self.joints.append(Joint(each.get("name", ""), each.get("type", ""), names[0], names[1], pose))
+        self._bases = {joint.child: joint for joint in self.joints if joint.kind == "fixed"}
+
+    def place(self, name: str) -> Array:
+        """Return the pose (4, 4) of a link, frame or joint in the model, in URDF in the link that it is fixed to."""
+        if name in ("", "__model__"):
+            return np.eye(4)
+        if self.urdf:
+            return self.place(self._bases[name].parent) @ self._bases[name].pose if name in self._bases else np.eye(4)
+        element = self.elements[name]
+        pose = element.find(self.own)
+        base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
+        return self.place(base or element.findtext("child", "")) @ self._file.pose(pose)
+
+
+def _read_xml(file: File) -> list[Link]:
     """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
-    root = ElementTree.fromstring(file.path.read_bytes())
+    root = parse(file.path)
     urdf = root.tag == "robot"
+    version = root.get("version", "1.0") if urdf else "sdf"
+    file.look(root, "urdf" if urdf else "sdf")
     models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
         raise file.refuse(f"{len(models)} models, or one within another", "one model without includes")
     (model,) = models
-    own, attribute = ("origin", "link") if urdf else ("pose", "")
-    frames = {each.attrib["name"]: each for tag in ("link", "frame", "joint") for each in model.findall(tag)}
-    bases, free = dict[str, tuple[str, Array]](), []
-    for joint in model.findall("joint"):
-        parent, child = ((end.get(attribute) or end.text or "") for name in ("parent", "child") for end in joint.findall(name))
-        if urdf and joint.get("type") == "floating" and frames[parent].find("inertial") is None:
-            free.append(parent)
-        elif joint.get("type") == "fixed" and parent != "world":
-            bases[child] = parent, file.pose(joint.find(own))
-        else:
-            raise file.refuse(f"the joint {joint.get('name')!r}, which moves or holds the body ({joint.get('type')})", ONE)
-
-    def place(name: str) -> Array:
-        """Return the pose of a link, frame or joint in the model."""
-        if name in ("", "__model__"):
-            return np.eye(4)
-        if urdf:
-            return place(bases[name][0]) @ bases[name][1] if name in bases else np.eye(4)
-        pose, element = frames[name].find(own), frames[name]
-        base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
-        return place(base or element.findtext("child", "")) @ file.pose(pose)
-
+    frames, free = Frames(file, model), list[str]()
+    for joint in frames.joints:
+        if urdf and joint.kind == "floating" and frames.elements[joint.parent].find("inertial") is None:
+            free.append(joint.parent)
+        elif joint.kind != "fixed" or joint.parent == "world":
+            raise file.refuse(f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
     links = {}
-    for name in (each.attrib["name"] for each in model.findall("link") if each.get("name") not in free):
-        inertial, link, forms = frames[name].find("inertial"), Link(place(name)), []
-        if inertial is None and not urdf:
-            raise file.refuse(f"the link {name!r} without inertia", "<inertial> in each link")
-        for each in frames[name].findall("collision"):
-            density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
-            forms += file.weigh(each.find("geometry"), file.pose(each.find(own)), float(density))  # type: ignore[arg-type]
-        link = replace(link, geometry=join(forms))
-        if inertial is not None and inertial.get("auto") in ("true", "1"):
+    for name in (each.get("name", "") for each in model.findall("link") if each.get("name") not in free):
+        element, link = frames.elements[name], Link(frames.place(name))
+        inertial = element.find("inertial")
+        auto = inertial is not None and inertial.get("auto") in ("true", "1")
+        try:
+            link = replace(link, geometry=join(_shapes(file, frames, name, inertial)))
+        except BadInput as error:
+            if auto:
+                raise
+            file.read.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
+        if auto:
             link = link.filled(link.geometry)
-        elif inertial is not None:
-            mass: Any = inertial.find("mass")
-            given = _values(inertial.find("inertia"))
-            inertia = np.array(
-                [[float(given.get(f"i{min(a, b)}{max(a, b)}", a == b and not urdf)) for a in "xyz"] for b in "xyz"]
-            )
-            link = replace(
-                link, mass=float(mass.get("value") or mass.text), frame=file.pose(inertial.find(own)), inertia=inertia
-            )
+        elif inertial is not None or not urdf:
+            link = _inertial(file, link, element.makeelement("inertial") if inertial is None else inertial, name, version)
         links[name] = link
-    roots = [name for name in links if name not in bases]
+    roots = [name for name in links if name not in [joint.child for joint in frames.joints if joint.kind == "fixed"]]
     if len(roots) != 1:
         raise file.refuse(f"{len(roots)} root links", ONE)
     return [links.pop(roots[0]), *links.values()]
 
 
-def _values(element: ElementTree.Element | None) -> dict[str, str]:
+def _shapes(file: File, frames: Frames, name: str, inertial: Any) -> list[Piece]:
+    """Return the parts of the collision geometry of a link. Raise `BadInput` if one cannot be weighed."""
+    forms = []
+    for each in frames.elements[name].findall("collision"):
+        density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
+        pose = each.find(frames.own)
+        at = file.pose(pose)
+        if pose is not None and pose.get("relative_to"):
+            at = np.linalg.inv(frames.place(name)) @ frames.place(pose.get("relative_to")) @ at
+        forms += file.weigh(each.find("geometry"), at, float(density))
+    return forms
+
+
+def _inertial(file: File, link: Link, inertial: Any, name: str, version: str) -> Link:
+    """Return a link with the <inertial> of URDF, where all values are required, or of SDF, where the defaults are 1 and 0."""
+    urdf = version != "sdf"
+    mass, given = inertial.find("mass"), _values(inertial.find("inertia"))
+    missing = [each for each in KNOWN["urdf"]["inertia"][0].split() if each not in given] if urdf else []
+    weight = None if mass is None else mass.get("value") if urdf else mass.text
+    missing += ["mass"] * (urdf and weight is None)
+    if missing:
+        file.read.invalid.append(f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires")
+    inertia = [[float(given.get(f"i{min(a, b)}{max(a, b)}", a == b and not urdf)) for a in "xyz"] for b in "xyz"]
+    frame = file.pose(inertial.find("origin" if urdf else "pose"), name, version if urdf else "1.0")
+    return replace(link, mass=float(weight or not urdf), frame=frame, inertia=np.array(inertia))
+
+
+def _values(element: Any) -> dict[str, str]:
     """Return the attributes and the texts of the children of an element."""
     return {} if element is None else {**element.attrib, **{child.tag: child.text or "" for child in element}}
 
 
-def _read_usd(file: _File) -> list[Link]:
-    require_extra("a USD file", "models", "pxr")
-    from pxr import Tf, Usd, UsdGeom, UsdPhysics
-
-    try:
-        stage = Usd.Stage.Open(str(file.path))
-    except Tf.ErrorException as error:
-        raise file.refuse(f"an error ({' '.join(str(error).split())[:200]})", "a stage that usd-core opens") from None
-    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
-        raise file.refuse("no unit of length", "metersPerUnit in the metadata of the stage")
-    metre, kilogram = UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage)
-    units, cache, prims = np.diag((metre, metre, metre, 1.0)), UsdGeom.XformCache(), list(stage.Traverse())
-
-    def world(prim: Any) -> Array:
-        return units @ np.array(cache.GetLocalToWorldTransform(prim)).T
-
-    def read(prim: Any, *names: str) -> list[Any]:
-        """Return authored attributes; None for others."""
-        attributes = [prim.GetAttribute(name) for name in names]
-        return [each.Get() if each and each.HasAuthoredValue() else None for each in attributes]
-
-    def form(prim: Any, pose: Array, density: float) -> list[Piece]:
-        kind = prim.GetTypeName().lower()
-        if kind == "mesh":
-            points, counts, corners = map(np.array, read(prim, "points", "faceVertexCounts", "faceVertexIndices"))
-            starts = np.cumsum(counts) - counts
-            fans = [(s, s + k, s + k + 1) for s, count in zip(starts, counts, strict=True) for k in range(1, count - 1)]
-            return weigh(kind, [points, corners[np.array(fans)]], pose, density)
-        names = {"cube": ("size",), "sphere": ("radius",)}.get(kind, ("radius", "height"))
-        sizes = [prim.GetAttribute(name).Get() for name in names]
-        axis = "XYZ".index(prim.GetAttribute("axis").Get()) if len(sizes) == 2 else 2
-        turn = make_pose(R=np.roll(np.eye(3), axis - 2, axis=0))
-        return weigh({"cube": "box"}.get(kind, kind), sizes if len(sizes) == 2 else sizes[0], pose @ turn, density)
-
-    links, joints = [], [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
-    bodies = [prim for prim in prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
-    if not bodies or len(joints) != len(bodies) - 1 or not all(joint.IsA(UsdPhysics.FixedJoint) for joint in joints):
-        raise file.refuse(f"{len(bodies)} rigid bodies and the joints {[joint.GetName() for joint in joints]}", ONE)
-    for body in bodies:
-        pose = world(body)
-        pose[:3, :3] /= metre
-        if np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max() > 1e-5:
-            raise file.refuse(f"the scaled body {str(body.GetPath())!r}", "rigid bodies whose transforms have no scale")
-        mass, density, com, moments, q = read(
-            body, *(f"physics:{name}" for name in ("mass", "density", "centerOfMass", "diagonalInertia", "principalAxes"))
-        )
-        forms = []
-        for prim in (each for each in Usd.PrimRange(body) if each.HasAPI(UsdPhysics.CollisionAPI)):
-            own, its_density = read(prim, "physics:mass", "physics:density")
-            si = (density or its_density or 0) * kilogram / metre**3 or DENSITY
-            parts = form(prim, np.linalg.inv(pose) @ world(prim), si)
-            forms += [part.scale(own * kilogram / part.mass) if own else part for part in parts]
-        whole = join(forms)
-        whole = whole.scale(mass * kilogram / whole.mass) if mass and whole.mass else whole
-        link = Link(pose, geometry=whole).filled(whole)
-        if com is not None:
-            link = replace(link, frame=make_pose(metre * np.array(com)))
-        if mass:
-            link = replace(link, mass=mass * kilogram)
-        if moments:
-            turn = Rotation.from_quat([*q.GetImaginary(), q.GetReal()]) if q and q.GetLength() else None
-            inertia = np.diag(np.array(moments, float)) * kilogram * metre**2
-            link = replace(link, frame=make_pose(link.frame[:3, 3], turn), inertia=inertia)
-        links.append(link)
-    return links
-
-
-def _read_mjcf(file: _File) -> list[Link]:
+def read_mjcf(file: File) -> list[Link]:
+    """Return the links of an MJCF file as MuJoCo compiles it, with their geometry."""
     mujoco = load("mujoco", "mujoco", "MuJoCo")
     try:
         spec = mujoco.MjSpec.from_file(str(file.path))
         spec.compiler.degree ^= file.angles != 1
         model = spec.compile()
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         raise file.refuse(f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
     spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     try:
         shapes = spec.compile()
-    except ValueError:  # bodies without geometry
+    except (ValueError, mujoco.FatalError):  # bodies without geometry
         shapes = None
     if model.njnt > (model.nq == 7):
         raise file.refuse(f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)

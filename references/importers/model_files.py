@@ -8,7 +8,6 @@ MJCF file of one line can contain 10^5 copies of a body, and 10^5 copies of each
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -24,6 +23,8 @@ from conservative.shapes import MassDistribution
 from ..engine import load, version
 from ..worker.calls import python_worker
 from ..worker.client import EngineCrashed, EngineTimeout, time_limit
+from .files import parse
+from .pieces import Piece
 
 SECONDS = 60.0
 """Time in seconds that reading a file may take."""
@@ -167,38 +168,55 @@ def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | No
 
 def read_urdf(path: str, name: str) -> MassDistribution:
     """Return the link of a URDF file, as `body_from_urdf`."""
+    bodies = urdf_bodies(path)
     pin = load(*ENGINES["urdf"])
-    _require_xml(path, "robot")
-    try:
-        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-    except ValueError as error:
-        raise _unusable(path, error, "a URDF file that Pinocchio reads") from None
-    # A link and the links welded to it are one body for Pinocchio, in the axes of its joint.
-    links = {frame.name: frame for frame in model.frames if frame.type == pin.FrameType.BODY}
-    _require_name(path, name, links)
-    owners = {link for link, frame in links.items() if model.frames[frame.parentFrame].type == pin.FrameType.JOINT}
-    kinds = {link: model.joints[links[link].parentJoint].shortname() for link in owners}
-    able = {
-        link for link, kind in kinds.items() if kind.startswith(("JointModelR", "JointModelSpherical", "JointModelFreeFlyer"))
-    }
+    _require_name(path, name, [frame.name for frame in _build(pin, path).frames if frame.type == pin.FrameType.BODY])
+    able = [each for each, (_, kind) in bodies.items() if kind.startswith(_TURNING)]
     if name not in able:
         raise _not_turning(name, sorted(able))
-    inertia = model.inertias[links[name].parentJoint]
-    if not inertia.mass > 0:
+    part, kind = bodies[name]
+    if not part.mass > 0:
         raise BadInput("name", f"{name!r}, which has no mass", "a link with mass and inertia")
-    com = np.zeros(3) if kinds[name] == "JointModelFreeFlyer" else inertia.lever
-    return MassDistribution(inertia.mass, com, inertia.inertia)
+    return MassDistribution(part.mass, np.zeros(3) if kind == _FREE else part.com, part.inertia)
+
+
+_FREE = "JointModelFreeFlyer"
+_TURNING = ("JointModelR", "JointModelSpherical", _FREE)
+
+
+def urdf_bodies(path: str) -> dict[str, tuple[Piece, str]]:
+    """Return the bodies of a URDF file as urdfdom reads it, by the names of their links, and the joint that moves each.
+
+    A link and those welded to it are one body, in the axes of the link. Raise `BadInput` and `MissingEngine`.
+    """
+    pin = load(*ENGINES["urdf"])
+    _require_xml(path, "robot")
+    model = _build(pin, path)
+    owners = [
+        frame
+        for frame in model.frames
+        if frame.type == pin.FrameType.BODY and model.frames[frame.parentFrame].type == pin.FrameType.JOINT
+    ]
+    inertias = [(frame, model.inertias[frame.parentJoint]) for frame in owners]
+    return {
+        frame.name: (Piece(of.mass, np.array(of.lever), np.array(of.inertia)), model.joints[frame.parentJoint].shortname())
+        for frame, of in inertias
+    }
+
+
+def _build(pin: Any, path: str) -> Any:
+    try:
+        return pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer())
+    except ValueError as error:
+        raise _unusable(path, error, "a URDF file that Pinocchio reads") from None
 
 
 def _require_xml(path: str, root: str) -> None:
-    """Raise `BadInput` unless a file can be read and is XML with the right root. The engines' own messages say less."""
-    allowed = f"a file of XML with the root element <{root}>"
+    """Raise `BadInput` unless a file is safe XML with the right root. The engines' own messages say less."""
     try:
-        tag = ElementTree.fromstring(Path(path).read_bytes()).tag
-    except (OSError, ElementTree.ParseError) as error:
-        raise _unusable(path, getattr(error, "strerror", None) or error, allowed) from None
-    if tag != root:
-        raise _unusable(path, f"root element <{tag}>", allowed)
+        parse(Path(path), root)
+    except BadInput as error:
+        raise BadInput("path", error.got, error.allowed) from None
 
 
 def _unusable(path: str, reason: object, allowed: str) -> BadInput:

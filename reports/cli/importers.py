@@ -23,14 +23,21 @@ from .options import FilePath, Output, OutputCommand, epilog, json_option, names
 )
 @click.argument("files", nargs=-1, type=FilePath())
 @names_option("engines", "Engines or programs: NAME or NAME@VERSION.  [default: engines that are installed]", "E,F")
+@click.option(
+    "--search", multiple=True, type=FilePath(), help="Folder of meshes and packages, next to that of the file; repeatable."
+)
 @json_option
 @click.option("--junit", type=Output('name="conservative importers"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output("# Importers: "), help="Write the tables as Markdown.")
-def importers(files: tuple[Path, ...], engines: tuple[str, ...], as_json: bool, **outputs: Path | None) -> None:
+def importers(
+    files: tuple[Path, ...], engines: tuple[str, ...], search: tuple[Path, ...], as_json: bool, **outputs: Path | None
+) -> None:
     """Load each of FILES (URDF, SDF, MJCF or USD) in each engine, and compare its motion with that of the body in the file.
 
-    Without FILES: small models of this package, each with one trap. The engine's own loader reads the file. If its motion is
-    wrong, the mistake that explains it is named. The exit code is 1 if an engine is wrong, or refuses a valid file.
+    Without FILES: small models of this package, each with one trap. Every link of a robot is a free body of its own. The
+    engine's own loader reads the file. If its motion is wrong, the mistake that explains it is named. If the reference reader
+    of the format and that of this package disagree, the answer is undecided. The exit code is 1 if an engine is wrong, refuses
+    a valid file, or accepts a body that cannot exist.
     """
     require_extra("conservative importers", "report")
     from conservative.references.importers.compare import compare_files
@@ -40,6 +47,6 @@ def importers(files: tuple[Path, ...], engines: tuple[str, ...], as_json: bool, 
 
     with output_files(None, (), **outputs) as write:
         with progress() as step:
-            document = build(compare_files(files, split_names("engines", engines), step))
+            document = build(compare_files(files, split_names("engines", engines), step, search))
         write(document)
     show(document, as_json, silent=True)

@@ -1,0 +1,166 @@
+"""Mass, centre of mass and inertia: of parts, of links, of shapes, and what is said about a file that has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array
+
+DENSITY = 1000.0
+"""Density of geometry that has none in a file, kg/m^3."""
+SHAPES = ("box", "sphere", "ellipsoid", "cylinder", "capsule", "cone", "mesh", "plane")
+"""Shapes of `weigh`; a plane has no mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Mass, kg, centre of mass (3,), m, and inertia about it (3, 3), kg m^2."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    def place(self, pose: Array) -> Piece:
+        """Return the part in other axes, in which its own have a pose (4, 4)."""
+        R = pose[:3, :3]
+        return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T)
+
+    def scale(self, factor: float) -> Piece:
+        """Return the part with another density."""
+        return Piece(factor * self.mass, self.com, factor * self.inertia)
+
+    @property
+    def flaw(self) -> str:
+        """Why no body has this mass and inertia; empty if one has. Files may round the moments of a planar body."""
+        moments = np.linalg.eigvalsh(self.inertia)
+        if not self.mass > 0:
+            return "the mass is not positive"
+        if not self.inertia.any():
+            return "there is a mass without inertia"
+        if not moments[0] > 0:
+            return "a principal moment is not positive"
+        return "a moment exceeds the sum of the others" if moments[2] > (moments[0] + moments[1]) * (1 + 1e-6) else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link, fixed to the root link.
+
+    `pose` (4, 4) is its pose in the root link, and `frame` (4, 4) that of the inertial frame in the link, m. `inertia` (3, 3)
+    is in the inertial frame, kg m^2. `geometry` is its geometry with `DENSITY`.
+    """
+
+    pose: Array
+    mass: float = 0.0
+    frame: Array = field(default_factory=lambda: np.eye(4))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
+
+    def filled(self, part: Piece) -> Link:
+        """Return the link with mass and inertia of a part in its axes."""
+        return replace(self, mass=part.mass, frame=make_pose(part.com), inertia=part.inertia)
+
+
+def join_links(links: Iterable[Link]) -> Piece:
+    """Return links as one part, in the axes of the root link."""
+    return join(Piece(each.mass, np.zeros(3), each.inertia).place(each.frame).place(each.pose) for each in links)
+
+
+def join(parts: Iterable[Piece]) -> Piece:
+    """Return several parts as one: J = sum J_i + m_i (d_i.d_i 1 - d_i d_i'), d_i = c_i - c (Steiner)."""
+    parts = list(parts)
+    mass = sum(part.mass for part in parts)
+    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        d = part.com - com
+        inertia = inertia + part.inertia + steiner(part.mass, d)
+    return Piece(mass, com, inertia)
+
+
+def steiner(mass: float, d: Array) -> Array:
+    """Return the inertia (3, 3) of a point mass at d (3,) about the origin."""
+    return mass * (d @ d * np.eye(3) - np.outer(d, d))
+
+
+def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Array:
+    """Return the pose (4, 4) of a place (3,) and a rotation."""
+    T = np.eye(4)
+    T[:3, 3] = place
+    T[:3, :3] = np.eye(3) if R is None else R.as_matrix() if isinstance(R, Rotation) else R
+    return T
+
+
+def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
+    """Return the largest difference of mass, centre of mass and inertia, relative to those of `scale`, by default `part`."""
+    unit = scale or part
+    size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass)) if unit.mass else 0.0
+    size = max(size, 1e-9 * np.linalg.norm(unit.com)) or 1.0  # below that the centre of mass is round-off
+    parts = (other.mass - part.mass, unit.mass), (other.com - part.com, size), (other.inertia - part.inertia, unit.inertia)
+    errors = [np.linalg.norm(each) and np.linalg.norm(each) / (np.linalg.norm(of) or 1e-300) for each, of in parts]
+    return float(np.nan_to_num(max(errors), nan=np.inf))
+
+
+@dataclass
+class Reading:
+    """What this package reads of a file: its links, the root first, and what has to be said about the file.
+
+    Attributes
+    ----------
+    notes
+        What is not read because it does not matter, or because no rule of the format covers it.
+    doubts
+        Why another body than that of `links` may be right, too. No engine is called wrong against them.
+    invalid
+        How the file breaks the rules of its format. An engine that refuses it is right.
+    asks
+        Options of the file for one engine, by the engine's name.
+    """
+
+    links: list[Link] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    invalid: list[str] = field(default_factory=list)
+    asks: dict[str, list[str]] = field(default_factory=dict)
+
+
+def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
+    """Return the part of a shape after an affine map `pose` (4, 4), which may scale it; none for another kind.
+
+    Shapes are centred and about the third axis: "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" and
+    "capsule" (radius, length of the cylinder), "cone" (radius, height, centred at half of it, the tip up), "mesh" (vertices and
+    triangles), m. The density is that after the map, kg/m^3.
+    """
+    centroid = np.zeros(3)
+    if kind == "mesh":  # tetrahedra from the origin
+        corners = np.asarray(sizes[0], float)[np.asarray(sizes[1])]
+        total, weight = corners.sum(axis=1), np.linalg.det(corners)
+        volume = weight.sum() / 6
+        centroid = weight @ total / 24 / volume
+        second = (total.T * weight) @ total + np.einsum("n,nki,nkj->ij", weight, corners, corners)
+        second = second / 120 - volume * np.outer(centroid, centroid)
+    elif kind in ("box", "ellipsoid", "sphere"):
+        sides = np.broadcast_to(sizes, 3)
+        volume = np.prod(sides) * (1 if kind == "box" else 4 / 3 * math.pi)
+        second = volume * np.diag(sides**2) / (12 if kind == "box" else 5)
+    elif kind in ("cylinder", "capsule"):
+        r, length = sizes
+        rod, ball = math.pi * r * r * length, 4 / 3 * math.pi * r**3 * (kind == "capsule")
+        ends = ball * (length**2 / 4 + 3 * length * r / 8)  # of the hemispheres along the axis, in addition to those of a ball
+        volume = rod + ball
+        second = np.diag([rod * r * r / 4] * 2 + [rod * length**2 / 12 + ends]) + ball * r * r / 5 * np.eye(3)
+    elif kind == "cone":
+        r, length = sizes
+        volume, centroid = math.pi * r * r * length / 3, np.array([0, 0, -length / 4])
+        second = volume * np.diag([r * r * 3 / 20] * 2 + [length**2 * 3 / 80])
+    else:
+        return []
+    A, size = pose[:3, :3], density * abs(np.linalg.det(pose[:3, :3])) * math.copysign(1, volume)  # a mesh may be inside out
+    second = size * A @ second @ A.T
+    return [Piece(size * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]

@@ -1,0 +1,321 @@
+"""Robots as free bodies: one file for every link and what is fixed to it. Joints that move are left out, and not simulated.
+
+A file with one free body stays as it is. Copies have no visuals, and no mesh where mass and inertia are written in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .description import File, Frames
+from .files import find, included, parse, refuse
+from .mjcf import inline
+
+Bodies = list[tuple[str, Path, list[str]]]
+"""For each body its name, empty if it is the only one, its file, and notes."""
+FREE = "the joints of {} are left out: it is checked as a free body"
+MOST = 1000
+"""Largest number of bodies of a file."""
+
+
+def split(path: Path, kind: str, folder: Path, search: Sequence[Path] = ()) -> Bodies:
+    """Return the free bodies of a model file of a kind, as files of which copies are written into a folder.
+
+    Raise `BadInput` if the joints form a circle or refer to links that are not there, and for a file without a body.
+    """
+    bodies = {"mjcf": _mjcf, "usd": _usd}.get(kind, _links)(path, folder, search)
+    if not 0 < len(bodies) <= MOST:
+        raise refuse(path, f"{len(bodies) or 'no'} bodies that have a mass", f"1 to {MOST} bodies")
+    return [("", *bodies[0][1:])] if len(bodies) == 1 else bodies
+
+
+def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the names that are fixed to each root, itself first; `parents` has the parents of those that are fixed."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        root, seen = name, {name}
+        while root in parents:
+            root = parents[root]
+            if root in seen:
+                raise refuse(path, f"joints that form a circle through {root!r}", "joints that form a tree")
+            if root not in names:
+                raise refuse(path, f"a joint to {root!r}, which is not there", "joints between links of the file")
+            seen.add(root)
+        found.setdefault(root, []).append(name)
+    return {root: [root, *(each for each in members if each != root)] for root, members in found.items()}
+
+
+def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
+    """Return the bodies of a URDF or SDF file."""
+    root = parse(path)
+    urdf = root.tag == "robot"
+    models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
+    several = len(models) > 1
+    bodies: Bodies = []
+    for model in models:
+        if model.find("include") is not None or model.find("model") is not None:
+            raise refuse(path, "a model within another, or an include", "models without includes")
+        prefix = f"{model.get('name')}: " if several else ""
+        bodies += [(prefix + name, place, notes) for name, place, notes in _links_of(path, model, folder, search, several)]
+    return bodies
+
+
+def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], several: bool) -> Bodies:
+    urdf, frames = model.tag == "robot", Frames(File(path, 1.0, search), model)
+    links = {each.get("name", ""): each for each in model.findall("link")}
+    parents, moving = _tree(path, frames, links)
+    groups = group(path, list(links), parents)
+    if urdf:  # links without inertia are frames
+        full = {name for name, link in links.items() if (inertial := link.find("inertial")) is not None and len(inertial)}
+        groups = {name: members for name, members in groups.items() if full.intersection(members)}
+    meshes, elsewhere = _meshes(path, links, search)
+    held = model.findtext("static") in ("true", "1")
+    # a floating joint from a link without inertia is how URDF writes a free body
+    free = urdf and len(groups) == 1 and all(joint.kind in ("fixed", "floating") for joint in frames.joints)
+    one = set(groups) == {next(iter(links), "")} and not moving
+    if (free or one) and not (several or held or elsewhere or meshes):
+        return [(name, path, []) for name in groups]
+    notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
+    root = None if urdf else model.getroottree().getroot()
+    bodies: Bodies = []
+    for name, members in groups.items():
+        copy = _copy(model, frames, members)
+        for link in copy.findall("link"):
+            _strip(path, link, search)
+        loose = [FREE.format(repr(name))] if moving or held else []
+        bodies.append((name, _write(folder, copy, path, root), notes + loose))
+    return bodies
+
+
+def _tree(path: Path, frames: Frames, links: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the parents of the links that are fixed, and of those that move or are held.
+
+    Raise `BadInput` for a circle of fixed joints, and in URDF, where joints form a tree, for any.
+    """
+    parents, moving = dict[str, str](), dict[str, str]()
+    for joint in frames.joints:
+        if joint.child in parents or (frames.urdf and joint.child in moving):
+            raise refuse(path, f"two joints to {joint.child!r}", "joints that form a tree")
+        if joint.child not in links:
+            raise refuse(path, f"a joint to {joint.child!r}, which is not there", "joints between links of the file")
+        world = joint.parent == "world" and ("world" not in links or links["world"].find("inertial") is None)
+        (parents if joint.kind == "fixed" and not world else moving)[joint.child] = joint.parent
+    group(path, [*links, "world"], {**parents, **moving} if frames.urdf else parents)
+    return parents, moving
+
+
+def _meshes(path: Path, links: Mapping[str, Any], search: Sequence[Path]) -> tuple[str, bool]:
+    """Return which meshes are not there, as text, and whether one is there that an engine would not find."""
+    missing, elsewhere = dict[str, None](), False
+    for shape in [each for link in links.values() for each in link.iterfind(".//geometry/*")]:
+        name = shape.get("filename") or shape.findtext("uri") or ""
+        try:
+            elsewhere |= bool(name) and find(path, name, search) != path.parent / name.removeprefix("file://")
+        except ValueError as error:
+            missing[str(error)] = None
+    return ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1)), elsewhere
+
+
+def _copy(model: Any, frames: Frames, members: Sequence[str]) -> Any:
+    """Return a copy of a model with the links of one body and the joints between them."""
+    copy = deepcopy(model)
+    dropped = {"joint", "link", "frame", "static", "pose", "transmission", "gripper"}
+    for each in [each for each in copy if each.tag in dropped]:
+        joins = each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]
+        if not joins and not (each.tag == "link" and each.get("name") in members):
+            copy.remove(each)
+    if not frames.urdf:  # poses and joints of SDF may refer to frames that are left out
+        base = np.linalg.inv(frames.place(members[0]))
+        for link in copy.findall("link"):
+            _place(link, base @ frames.place(link.get("name")))
+        for child in members[1:]:
+            joint = copy.makeelement("joint", name=f"{child}_is_fixed", type="fixed")
+            joint.extend([_text(copy, "parent", members[0]), _text(copy, "child", child)])
+            copy.append(joint)
+    return copy
+
+
+def _strip(path: Path, link: Any, search: Sequence[Path]) -> None:
+    """Remove visuals, and meshes unless the mass follows from them. Other meshes get their absolute path."""
+    inertial = link.find("inertial")
+    auto = inertial is not None and inertial.get("auto") in ("true", "1")
+    for each in [*link.findall("visual"), *link.findall("collision")]:
+        mesh = each.find("geometry/mesh")
+        if each.tag == "visual" or (mesh is not None and not auto):
+            link.remove(each)
+        elif mesh is not None and mesh.find("uri") is not None:
+            mesh.find("uri").text = str(find(path, mesh.findtext("uri"), search).resolve())
+
+
+def _text(element: Any, tag: str, text: str) -> Any:
+    made = element.makeelement(tag)
+    made.text = text
+    return made
+
+
+def _place(link: Any, pose: Any) -> None:
+    """Give a link of SDF its pose (4, 4) in the model as numbers."""
+    from scipy.spatial.transform import Rotation
+
+    for each in link.findall("pose"):
+        link.remove(each)
+    if np.abs(pose - np.eye(4)).max() > 1e-15:
+        angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
+        link.insert(0, _text(link, "pose", " ".join(map(repr, [*pose[:3, 3].tolist(), *angles.tolist()]))))
+
+
+def _write(folder: Path, made: Any, path: Path, sdf: Any = None) -> Path:
+    """Write a model into a folder of its own, named as the file. Return the path."""
+    from lxml import etree
+
+    place = folder / str(len(list(folder.iterdir())))
+    place.mkdir()
+    if sdf is not None:
+        outer = sdf.makeelement("sdf", dict(sdf.attrib))
+        outer.append(made)
+        made = outer
+    (place / path.name).write_bytes(etree.tostring(made))
+    return place / path.name
+
+
+def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
+    """Return the bodies of an MJCF file: those in the world, and those on joints."""
+    missing = included(path, search)
+    root = inline(path, search)
+    found: list[tuple[Any, str]] = []
+
+    def walk(element: Any, inherited: str, world: bool) -> None:
+        inherited = element.get("childclass", inherited)
+        for child in element:
+            if child.tag == "body":
+                if world or child.find("joint") is not None or child.find("freejoint") is not None:
+                    found.append((child, child.get("childclass", inherited)))
+                walk(child, inherited, False)
+            elif child.tag in ("frame", "replicate"):
+                walk(child, inherited, world)
+
+    for world in root.findall("worldbody"):
+        walk(world, "main", True)
+    free = all(len(body.findall("joint")) + len(body.findall("freejoint")) <= 1 and _is_free(body) for body, _ in found)
+    if len(found) == 1 and free and not missing:
+        return [("", path, [])]
+    notes = (
+        [f"engines get a copy of the file without {missing[0]!r}, which is not in its folder or a search path"]
+        if missing
+        else []
+    )
+    for each in root.findall("compiler"):
+        if float(each.attrib.pop("settotalmass", "-1")) > 0:
+            notes.append("settotalmass is left out: masses are those before they are scaled")
+    wanted, bodies = {"compiler", "default", "asset", "option"}, []
+    for number, (body, inherited) in enumerate(found):
+        made = root.makeelement("mujoco", dict(root.attrib))
+        made.extend(deepcopy(each) for each in root if each.tag in wanted)
+        copy = deepcopy(body)
+        copy.set("childclass", inherited) if inherited != "main" else None
+        for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
+            copy.attrib.pop(key, None)
+        _loosen(copy)
+        rule = next((each.get("inertiafromgeom") for each in root.findall("compiler") if each.get("inertiafromgeom")), "auto")
+        _lighten(path, made, copy, root, rule, search)
+        if not any(each.find("inertial") is not None or each.find("geom") is not None for each in copy.iter("body")):
+            continue
+        copy.insert(0, copy.makeelement("freejoint"))
+        world = made.makeelement("worldbody")
+        world.append(copy)
+        made.append(world)
+        name = body.get("name") or f"body {number}"
+        bodies.append((name, _write(folder, made, path), [*notes, FREE.format(repr(name))]))
+    return bodies
+
+
+def _is_free(body: Any) -> bool:
+    joint = body.find("joint")
+    return joint is None or joint.get("type") == "free"
+
+
+def _loosen(body: Any) -> None:
+    """Remove joints of a body and the bodies below it that move, and what refers to other parts of the model."""
+    for child in list(body):
+        moves = child.tag == "body" and (child.find("joint") is not None or child.find("freejoint") is not None)
+        if moves or child.tag in ("joint", "freejoint", "site", "camera", "light"):
+            body.remove(child)
+        elif child.tag in ("body", "frame"):
+            _loosen(child)
+
+
+def _lighten(path: Path, made: Any, body: Any, root: Any, rule: str, search: Sequence[Path]) -> None:
+    """Remove materials, and meshes that do not matter; the others get their absolute path."""
+    for each in list(body.iter("body")):
+        for geom in list(each.iter("geom")):
+            owner = next(geom.iterancestors("body"))
+            if (
+                owner.find("inertial") is not None
+                and rule != "true"
+                and (geom.get("mesh") or geom.get("type") in (None, "mesh"))
+            ):
+                geom.getparent().remove(geom)
+    for each in [*made.iter("geom"), *body.iter("geom")]:
+        each.attrib.pop("material", None)
+    used = {each.get("mesh") for each in body.iter("geom")}
+    folders = {key: each.get(key) for each in root.findall("compiler") for key in ("assetdir", "meshdir") if each.get(key)}
+    for each in made.iter("compiler"):
+        for key in ("assetdir", "meshdir", "texturedir"):
+            each.attrib.pop(key, None)
+    for asset in made.findall("asset"):
+        for each in list(asset):
+            if each.tag != "mesh" or (each.get("name") or Path(each.get("file", "")).stem) not in used:
+                asset.remove(each)
+            elif name := each.get("file"):
+                base = folders.get("meshdir", folders.get("assetdir", ""))
+                each.set("name", each.get("name") or Path(name).stem)
+                try:
+                    each.set("file", str(find(path, f"{base}/{name}" if base else name, search).resolve()))
+                except ValueError as error:
+                    allowed = "the mesh in the folder of the file or in one of --search"
+                    raise refuse(path, f"a body whose mass follows from {error}", allowed) from None
+
+
+def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
+    """Return the bodies of a USD file. In a copy all other bodies and the joints that move are not active."""
+    from pxr import Usd, UsdPhysics
+
+    from .usd import Stage, open_stage
+
+    stage = Stage(path, open_stage(path, search))
+    names, parents, moving = [str(body.GetPath()) for body in stage.bodies], dict[str, str](), []
+    for joint in stage.joints:
+        ends = [
+            [str(each) for each in relation.GetTargets()]
+            for relation in (UsdPhysics.Joint(joint).GetBody0Rel(), UsdPhysics.Joint(joint).GetBody1Rel())
+        ]
+        if joint.IsA(UsdPhysics.FixedJoint) and all(ends) and all(each[0] in names for each in ends):
+            parents[ends[1][0]] = ends[0][0]
+        else:
+            moving.append(joint.GetPath())
+    groups = group(path, names, parents)
+    if len(groups) == 1 and not moving:
+        return [("", path, [])]
+    bodies: Bodies = []
+    for name, members in groups.items():
+        copy = Usd.Stage.Open(stage.stage.Flatten())
+        for joint in [each for each in copy.Traverse() if each.IsA(UsdPhysics.Joint)]:
+            target = UsdPhysics.Joint(joint).GetBody1Rel().GetTargets()
+            if joint.GetPath() in moving or not target or str(target[0]) not in members:
+                joint.SetActive(False)
+        for other in set(names) - set(members):
+            prim = copy.GetPrimAtPath(other)
+            if any(each.startswith(f"{other}/") for each in members):
+                prim.RemoveAPI(UsdPhysics.RigidBodyAPI)
+            elif prim:
+                prim.SetActive(False)
+        place = folder / str(len(list(folder.iterdir())))
+        place.mkdir()
+        copy.GetRootLayer().Export(str(place / f"{path.stem}.usda"))
+        bodies.append((name, place / f"{path.stem}.usda", [FREE.format(repr(name))]))
+    return bodies

@@ -1,0 +1,503 @@
+"""Model files of others: hostile ones, robots, what the formats leave open, and readers that disagree."""
+
+import json
+import math
+import os
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from conservative import registry
+from conservative.errors import BadInput
+from conservative.references.importers import readers
+from conservative.references.importers.compare import CATALOGUE, Program, accelerations, judge_body, judge_refusal
+from conservative.references.importers.pieces import Piece, distance, weigh
+from conservative.references.importers.readers import read_files, read_here
+from conservative.reports.cli.main import main
+
+pytest.importorskip("lxml")
+pytest.importorskip("pxr")
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["importers", *map(str, arguments)])
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Return a function that writes a model file and returns its bodies."""
+
+    def write_and_read(name, text, search=()):
+        path = tmp_path / name
+        path.write_text(text) if isinstance(text, str) else path.write_bytes(text)
+        folder = tmp_path / "copies"
+        folder.mkdir(exist_ok=True)
+        return read_here(path, name, folder, search)
+
+    return write_and_read
+
+
+MOMENTS = 'ixx="0.010" ixy="0.001" ixz="0" iyy="0.024" iyz="0.002" izz="0.030"'
+TENSOR = np.array([[0.010, 0.001, 0], [0.001, 0.024, 0.002], [0, 0.002, 0.030]])
+INERTIAL = f'<inertial><mass value="2"/><inertia {MOMENTS}/></inertial>'
+SDF_INERTIA = "<inertia><ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz></inertia>"
+
+
+def urdf(inside=INERTIAL, more="", attributes=""):
+    return f'<robot name="r"{attributes}><link name="a">{inside}</link>{more}</robot>'
+
+
+def sdf(inside, model=""):
+    return f'<sdf version="1.11"><model name="m"><link name="a">{inside}</link>{model}</model></sdf>'
+
+
+def mjcf(inside, head="", attributes=""):
+    return f'<mujoco>{head}<worldbody><body name="a"{attributes}>{inside}</body></worldbody></mujoco>'
+
+
+def usda(inside, apis='"PhysicsRigidBodyAPI", "PhysicsMassAPI"', units="metersPerUnit = 1\n kilogramsPerUnit = 1"):
+    return f'#usda 1.0\n(\n {units}\n)\ndef Xform "b" (prepend apiSchemas = [{apis}])\n{{\n{inside}\n}}\n'
+
+
+# ------------------------------------------------------------------------------------------------------------- hostile files
+
+
+def mesh(name):
+    return sdf(f'<inertial auto="true"/><collision name="c"><geometry><mesh><uri>{name}</uri></mesh></geometry></collision>')
+
+
+ENTITY = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
+LOL = "<!DOCTYPE r [<!ENTITY a0 'lol'>" + "".join(f"<!ENTITY a{i + 1} '{f'&a{i};' * 10}'>" for i in range(9)) + "]>"
+
+
+def joint(kind, parent, child):
+    return f'<joint name="{child}j" type="{kind}"><parent link="{parent}"/><child link="{child}"/></joint>'
+
+
+LINKS = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in "bcd")
+SDF_LINKS = "".join(f'<link name="{name}"/>' for name in "bcd")
+SDF_CIRCLE = "".join(
+    f'<joint name="{b}j" type="fixed"><parent>{a}</parent><child>{b}</child></joint>' for a, b in ("bc", "cd", "db")
+)
+HOSTILE = {
+    "external entity.urdf": (ENTITY + urdf("&x;" + INERTIAL), "DOCTYPE"),
+    "entities.urdf": (LOL + urdf("&a9;" + INERTIAL), "amplification|DOCTYPE"),
+    "entities in an attribute.sdf": (LOL + sdf("").replace('"m"', '"&a9;"'), "amplification|DOCTYPE"),
+    "deep.urdf": ("<robot>" * 10_000 + "</robot>" * 10_000, "depth"),
+    "nan.urdf": (urdf(INERTIAL.replace("0.024", "nan")), "not finite"),
+    "overflow.urdf": (urdf(INERTIAL.replace("0.024", "1e999")), "not finite"),
+    "nan.sdf": (sdf(f"<inertial><mass>nan</mass>{SDF_INERTIA}</inertial>"), "not finite"),
+    "nan.usda": (usda("float physics:mass = nan\nfloat3 physics:diagonalInertia = (1, 2, nan)"), "finite"),
+    "words.urdf": (urdf(INERTIAL.replace("0.024", "heavy")), "heavy"),
+    "circle.urdf": (
+        urdf(more=LINKS + joint("fixed", "b", "c") + joint("fixed", "c", "d") + joint("fixed", "d", "b")),
+        "circle",
+    ),
+    "turning circle.urdf": (urdf(more=LINKS + joint("continuous", "b", "c") + joint("fixed", "c", "b")), "circle"),
+    "own parent.urdf": (urdf(more=joint("fixed", "a", "a")), "circle"),
+    "circle.sdf": (sdf("", SDF_LINKS + SDF_CIRCLE), "circle"),
+    "circle of frames.sdf": (
+        sdf('<pose relative_to="f"/>', '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>'),
+        "circle",
+    ),
+    "two parents.urdf": (urdf(more=LINKS + joint("fixed", "a", "b") + joint("fixed", "c", "b")), "two joints"),
+    "no parent.urdf": (urdf(more=LINKS + joint("fixed", "x", "b")), "'x', which is not there"),
+    "no child.urdf": (urdf(more=joint("fixed", "a", "x")), "'x', which is not there"),
+    "mesh.json.sdf": (mesh("data.json"), "obj, stl, ply, off"),
+    "mesh.npy.sdf": (mesh("data.npy"), "obj, stl, ply, off"),
+    "mesh.pkl.sdf": (mesh("data.pkl"), "obj, stl, ply, off"),
+    "mesh.zip.sdf": (mesh("data.zip"), "obj, stl, ply, off"),
+    "broken.dae.sdf": (mesh("data.dae"), "obj, stl, ply, off"),
+    "broken.stl.sdf": (mesh("data.stl"), "data.stl"),
+    "empty.obj.sdf": (mesh("data.obj"), "data.obj"),
+    "system.sdf": (mesh("/etc/passwd"), "outside"),
+    "file uri.sdf": (mesh("file:///etc/passwd"), "outside"),
+    "above.sdf": (mesh("../outside.obj"), "outside"),
+    "link.sdf": (mesh("link.obj"), "outside"),
+    "include.xml": ('<mujoco><include file="../outside.xml"/></mujoco>', "outside"),
+    "include itself.xml": ('<mujoco><include file="include itself.xml"/></mujoco>', "include each other"),
+    "mesh above.xml": (
+        mjcf('<geom type="mesh" mesh="outside"/>', '<asset><mesh file="../outside.obj"/></asset>'),
+        "outside",
+    ),
+    "layer.usda": ("#usda 1.0\n(\n subLayers = [@../outside.usda@]\n metersPerUnit = 1\n)\n", "outside"),
+    "nothing.urdf": ("", "empty|no XML"),
+    "zeros.urdf": (b"\0" * 100, "XML|Document|Start"),
+    "zeros.usd": (b"\0" * 100, "usd-core|error"),
+    "zip.urdf": (b"PK\3\4" + b"\0" * 50, "XML|Document|Start|empty"),
+    "no inertia of a mesh.usda": (
+        usda('def Mesh "m" (prepend apiSchemas = ["PhysicsCollisionAPI"])\n{\n}\n', '"PhysicsRigidBodyAPI"'),
+        "",
+    ),
+    "reference to nothing.usda": (
+        usda("", '"PhysicsRigidBodyAPI"').replace("(prepend", "(references = @none.usda@\n prepend"),
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_files_are_refused_in_a_sentence(read, tmp_path, name):
+    text, words = HOSTILE[name]
+    for kind in ("json", "npy", "pkl", "dae", "stl"):
+        (tmp_path / f"data.{kind}").write_bytes(b"\x80\x04garbage")
+    (tmp_path / "data.obj").write_text("v 0 0 0\n")
+    with zipfile.ZipFile(tmp_path / "data.zip", "w") as archive:
+        archive.writestr("part.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for outside in ("outside.obj", "outside.xml", "outside.usda"):
+        (tmp_path.parent / outside).write_text((CATALOGUE / "part.obj").read_text())
+    (tmp_path / "link.obj").symlink_to(tmp_path.parent / "outside.obj")
+    with pytest.raises(BadInput, match=rf"(?s)file: got .*({words})") as caught:
+        read(name, text)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_reading_has_limits_of_time_memory_and_size(tmp_path, monkeypatch):
+    copies = '<replicate count="10000"><replicate count="10000"><geom size="0.1"/></replicate></replicate>'
+    bomb = tmp_path / "bomb.xml"
+    bomb.write_text(mjcf("<freejoint/>" + copies))
+    with monkeypatch.context() as patch:
+        patch.setattr(readers, "SECONDS", 2.0)
+        with pytest.raises(BadInput, match=r"reading ended|error"):
+            read_files([bomb], tmp_path)
+    large = tmp_path / "large.urdf"
+    with large.open("wb") as stream:
+        stream.truncate(100 << 20)  # no bytes on disk
+    with pytest.raises(BadInput, match="100 MiB, more than 64 MiB"):
+        read_files([large], tmp_path)
+    os.mkfifo(fifo := tmp_path / "fifo.urdf")
+    with pytest.raises(BadInput, match="no ordinary file"):
+        read_files([fifo], tmp_path)
+
+
+# ------------------------------------------------------------------------------------ what the formats say, by hand, and do not
+
+
+def body_of(models):
+    (model,) = models
+    assert not model.disagree
+    return model.truth
+
+
+def test_urdf_1_1_has_quaternions_and_1_0_ignores_them(read):
+    """A turn of 45 degrees about z, by hand; the two readers agree to 1e-16."""
+    quaternion = f'quat_xyzw="0 0 {math.sin(math.pi / 8)!r} {math.cos(math.pi / 8)!r}"'
+    inertial = f'<inertial><origin xyz="0 0 0" {quaternion}/><mass value="2"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.024"'
+    inertial += ' iyz="0" izz="0.03"/></inertial>'
+    turned = body_of(read("new.urdf", urdf(inertial, attributes=' version="1.1"'))).inertia
+    np.testing.assert_allclose(turned, [[0.017, -0.007, 0], [-0.007, 0.017, 0], [0, 0, 0.03]], atol=1e-15)
+    (model,) = read("old.urdf", urdf(inertial, attributes=' version="1.0"'))
+    np.testing.assert_allclose(model.truth.inertia, np.diag([0.01, 0.024, 0.03]), atol=1e-15)
+    assert any("quat_xyzw" in note for note in model.notes)
+
+
+def test_the_readers_of_scenes_and_of_importers_agree_about_a_urdf(read, tmp_path):
+    quaternion = '<origin xyz="0.02 -0.01 0.03" quat_xyzw="0 0 0.6 0.8"/>'
+    ours = body_of(read("a.urdf", urdf(INERTIAL.replace("<mass", f"{quaternion}<mass"), attributes=' version="1.1"')))
+    (tmp_path / "s.toml").write_text('t_end = 1.0\n[body]\nurdf = "a.urdf"\nname = "a"\n[start]\nw_WB_B = [1, 2, 3]\n')
+    assert np.abs(registry.scene(str(tmp_path / "s.toml")).body.inertia - ours.inertia).max() < 1e-16  # measured 7e-18
+
+
+def cube(*lines):
+    """A cube of 1 m with attributes, one a line."""
+    inside = "\n".join(["double size = 1", *lines])
+    return f'def Cube "c" (prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMassAPI"])\n{{\n{inside}\n}}\n'
+
+
+def scaled(x, y, z):
+    return f'double3 xformOp:scale = ({x}, {y}, {z})\nuniform token[] xformOpOrder = ["xformOp:scale"]\n'
+
+
+MASS, COM = "float physics:mass = {}\n", "point3f physics:centerOfMass = ({}, 0, 0)\n"
+DIAGONAL, DENSITY = "float3 physics:diagonalInertia = ({}, {}, {})\n", "float physics:density = {}\n"
+BODY = '"PhysicsRigidBodyAPI"'
+OFF = cube("bool physics:collisionEnabled = 0").replace('"c"', '"d"')
+BELOW = f'def Xform "e" (prepend apiSchemas = [{BODY}])\n{{\nbool physics:rigidBodyEnabled = 0\n{cube()}}}\n'
+ONE = np.eye(3)
+USD = {
+    "mass, centre and inertia of the collider": (
+        usda(cube(MASS.format(3), DIAGONAL.format(1, 2, 2.5), COM.format(0.1)), BODY),
+        Piece(3.0, np.array([0.1, 0, 0]), np.diag([1, 2, 2.5])),
+    ),
+    "a collider that is not enabled": (usda(cube(MASS.format(3)) + OFF, BODY), Piece(3.0, np.zeros(3), ONE / 2)),
+    "the density of the collider before that of the body": (
+        usda(DENSITY.format(7) + cube(DENSITY.format(500))),
+        Piece(500.0, np.zeros(3), ONE * 500 / 6),
+    ),
+    "a density of the body": (usda(DENSITY.format(7) + cube()), Piece(7.0, np.zeros(3), ONE * 7 / 6)),
+    "a mass of the body before those of colliders": (
+        usda(MASS.format(12) + cube(MASS.format(3))),
+        Piece(12.0, np.zeros(3), ONE * 2.0),
+    ),
+    "a scaled body": (
+        usda(scaled(2, 2, 2) + MASS.format(2) + COM.format(0.3) + DIAGONAL.format(0.1, 0.2, 0.25)),
+        Piece(2.0, np.array([0.6, 0, 0]), np.diag([0.1, 0.2, 0.25])),
+    ),
+    "a scaled collider of the density of water": (
+        usda(cube(scaled(1, 2, 3))),
+        Piece(6000.0, np.zeros(3), 500.0 * np.diag([13, 10, 5])),
+    ),
+    "grams and centimetres": (
+        usda(MASS.format(12e3) + cube(), units="metersPerUnit = 0.01\n kilogramsPerUnit = 0.001"),
+        Piece(12.0, np.zeros(3), ONE * 12 * 1e-4 / 6),
+    ),
+    "a body below a body": (usda(MASS.format(6) + cube() + BELOW), Piece(6.0, np.zeros(3), ONE)),
+}
+
+
+@pytest.mark.parametrize("name", USD)
+def test_usd_by_hand(read, name):
+    """usd-core has single precision: measured up to 2e-7."""
+    text, wanted = USD[name]
+    assert distance(wanted, body_of(read("b.usda", text))) < 1e-6
+
+
+def test_usd_leaves_open_whether_inertia_moves_to_another_centre_of_mass(read):
+    (model,) = read("b.usda", usda(COM.format(0.2) + MASS.format(6) + cube(scaled(1, 2, 3))))
+    assert "disagree" in model.disagree
+    assert (
+        judge_body(model, "newton", model.own, 1e-4)[0] == judge_body(model, "newton", model.reference, 1e-4)[0] == "undecided"
+    )
+    assert judge_body(model, "newton", replace(model.own, mass=9.0), 1e-4)[0] == "undecided"
+
+
+def test_meshes_that_are_not_needed_are_not_required(read):
+    mesh = '<visual><geometry><mesh filename="package://p/a.dae"/></geometry></visual>'
+    collision = mesh.replace("visual", "collision")
+    (model,) = read("a.urdf", urdf(INERTIAL + mesh + collision))
+    np.testing.assert_allclose(model.truth.inertia, TENSOR, atol=1e-18)
+    assert "mesh" not in model.path.read_text()
+    assert any("package://p/a.dae" in note for note in model.notes)
+    inertial = f"<inertial><mass>1.2</mass>{SDF_INERTIA}</inertial>"
+    for shape in ("<mesh><uri>model://t/a.stl</uri></mesh>", "<polyline><point>0 0</point></polyline>", "<heightmap/>"):
+        (model,) = read("a.sdf", sdf(f'{inertial}<collision name="c"><geometry>{shape}</geometry></collision>'))
+        assert model.truth.mass == 1.2
+        assert model.notes
+
+
+def test_packages_are_found_in_search_paths(read, tmp_path):
+    (tmp_path / "else" / "p").mkdir(parents=True)
+    (tmp_path / "else" / "p" / "part.obj").write_text((CATALOGUE / "part.obj").read_text())
+    text = mesh("package://p/part.obj")
+    with pytest.raises(BadInput, match="which is not there"):
+        read("a.sdf", text)
+    (found,) = read("a.sdf", text, (tmp_path / "else",))
+    assert found.truth.mass > 0
+    assert str(tmp_path / "else") in found.path.read_text()  # for the engines, which do not know the search path
+
+
+SDF_MASS = f"<mass>1</mass>{SDF_INERTIA}"
+RELATIVE = '<inertial><pose relative_to="{}">0 0 1 0 0 0</pose>' + f"{SDF_MASS}</inertial>"
+FRAME = '<frame name="f"><pose>0 0 1 0 0 0</pose></frame>'
+TETRAHEDRON = """def Mesh "m" (prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI"])
+{
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    int[] faceVertexCounts = [3, 3, 3, 3]
+    int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+    uniform token physics:approximation = "boundingCube"
+}"""
+NOTED = {
+    "an unknown attribute": (urdf(INERTIAL.replace('value="2"', 'value="2" unit="g"')), "unit", "doubts"),
+    "an unknown element": (sdf(f"<inertial>{SDF_MASS}<fluid_added_mass/></inertial>"), "fluid_added_mass", "doubts"),
+    "a pose relative to a frame": (sdf(RELATIVE.format("f"), FRAME), "'f'", "invalid"),
+    "a pose relative to its link": (sdf(RELATIVE.format("a")), "'a'", "doubts"),
+    "products that are missing": (
+        urdf('<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'),
+        "ixy, ixz, iyz",
+        "invalid",
+    ),
+    "two inertials": (urdf(INERTIAL + INERTIAL), "several elements <inertial>", "invalid"),
+    "an extension of Gazebo": (urdf(more='<gazebo reference="a"><mass>3</mass></gazebo>'), "gazebo", "notes"),
+    "an extension of MuJoCo": (urdf(more='<mujoco><compiler balanceinertia="true"/></mujoco>'), "balanceinertia", "asks"),
+    "an extension of Drake": (urdf(more='<drake:mass value="3"/>'), "drake:mass", "asks"),
+    "one with a namespace": (sdf(f'<inertial>{SDF_MASS}</inertial><drake:x xmlns:drake="d"/>'), "drake:x", "asks"),
+    "an attribute of a vendor": (
+        usda(MASS.format(2) + DIAGONAL.format(1, 2, 2) + COM.format(0) + "float physxRigidBody:x = 1"),
+        "physxRigidBody:x",
+        "notes",
+    ),
+    "an approximation of a mesh": (usda(TETRAHEDRON), "boundingCube", "doubts"),
+}
+
+
+@pytest.mark.parametrize("name", NOTED)
+def test_nothing_is_ignored_silently(read, name):
+    text, words, where = NOTED[name]
+    suffix = {"<rob": "urdf", "<sdf": "sdf", "#usd": "usda"}[text[:4]]
+    (model,) = read(f"a.{suffix}", text)
+    assert words in str(getattr(model, where))
+    assert words in str(model.notes)
+    if where in ("doubts", "invalid"):  # no engine is wrong or refuses without a reason
+        other = replace(model.truth, mass=9 * model.truth.mass)
+        assert judge_body(model, "dart", other, 1e-4)[0] == "undecided"
+        assert judge_refusal(model, "dart", "no")[0] in ("right", "undecided")
+
+
+def test_a_plain_file_has_no_notes_and_every_outcome(read):
+    """The negative control of the notes: a wrong body, a refusal and a right one are called so."""
+    (model,) = read("a.urdf", urdf())
+    assert not model.notes
+    assert judge_body(model, "dart", model.truth, 1e-4) == ("right", "")
+    assert judge_body(model, "dart", replace(model.truth, mass=9.0), 1e-4)[0] == "wrong"
+    assert judge_refusal(model, "dart", "no") == ("refused", "no")
+
+
+def test_an_engine_that_does_what_its_own_extension_asks_is_right(read):
+    """MuJoCo's own options, on bodies by hand; another engine is not asked."""
+    box = '<collision><geometry><box size="0.2 0.3 0.4"/></geometry></collision>'
+    (asks,) = read("g.urdf", urdf(INERTIAL + box, '<mujoco><compiler inertiafromgeom="true"/></mujoco>'))
+    of_box = Piece(24.0, np.zeros(3), 2 * np.diag([0.25, 0.2, 0.13]))
+    outcome, words = judge_body(asks, "mujoco", of_box, 1e-4)
+    assert outcome == "right"
+    assert "inertiafromgeom" in words
+    assert judge_body(asks, "dart", of_box, 1e-4)[0] == "wrong"
+    assert judge_body(asks, "mujoco", replace(of_box, mass=3.0), 1e-4)[0] == "undecided"
+    (plain,) = read("p.urdf", urdf(INERTIAL + box))
+    outcome, words = judge_body(plain, "mujoco", of_box, 1e-4)
+    assert outcome == "wrong"
+    assert words == "mass and inertia are those of the geometry at 1000 kg/m^3"
+
+
+def test_what_is_said_about_an_impossible_inertia_is_true_of_the_engine(read):
+    thin = '<inertial><mass value="2"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.04"/></inertial>'
+    (model,) = read("a.urdf", urdf(thin))
+    assert model.flaw == "a moment exceeds the sum of the others"
+    assert judge_body(model, "dart", model.truth, 1e-4)[1].startswith("a moment exceeds the sum of the others")
+    mean = replace(model.truth, inertia=np.eye(3) * 0.07 / 3)
+    outcome, words = judge_body(model, "dart", mean, 1e-4)
+    assert outcome == "accepted"
+    assert words.startswith("it changes the inertia without a word")
+    assert judge_body(model, "dart", mean, 1e-4, " (it prints: inertia)")[0] == "right"
+    (asks,) = read("b.urdf", urdf(thin, '<mujoco><compiler balanceinertia="true"/></mujoco>'))
+    assert judge_body(asks, "mujoco", mean, 1e-4)[0] == "right"
+
+
+@pytest.mark.parametrize("shift", [0.01, -0.3])
+def test_a_wrong_centre_of_mass_is_seen(read, shift):
+    """A program that loads the file with another centre of mass is wrong, and right without that."""
+    (model,) = read("a.urdf", urdf(INERTIAL.replace("<mass", '<origin xyz="0.02 -0.01 0.03"/><mass')))
+    program = Program.__new__(Program)
+    program.engine, program.label, program.single = "dart", "dart", False
+    for moved, outcome in ((0.0, "right"), (shift, "wrong")):
+        loaded = replace(model.truth, com=model.truth.com + np.array([0, moved, 0]))
+        program._load = lambda model, cases, loaded=loaded: {
+            "refused": "", "output": "", "accelerations": accelerations(loaded, cases)
+        }  # fmt: skip
+        answer = program.check(model)
+        assert answer.outcome == outcome
+        np.testing.assert_allclose(answer.seen["com"], loaded.com, atol=1e-12)  # of the engine and not of the file
+
+
+def test_numbers_of_an_engine_are_those_it_has(read):
+    """Forces that suit a body of 1e-15 kg m^2 say nothing about the unit inertia that an engine has instead."""
+    tiny = '<inertial><mass value="1e-7"/><inertia ixx="1e-15" ixy="0" ixz="0" iyy="2e-15" iyz="0" izz="2.5e-15"/></inertial>'
+    (model,) = read("a.urdf", urdf(tiny))
+    program = Program.__new__(Program)
+    program.engine, program.label, program.single = "dart", "dart", False
+    loaded = Piece(1.0, np.array([0.1, 0, 0]), np.diag([1, 1.5, 2.0]))
+    program._load = lambda model, cases: {"refused": "", "output": "", "accelerations": accelerations(loaded, cases)}
+    seen = Piece(**{name: np.array(value) for name, value in program.check(model).seen.items()})
+    assert distance(loaded, seen) < 1e-12
+    program._load = lambda model, cases: {
+        "refused": "", "output": "", "accelerations": np.hstack([cases[:, 1, :3], np.zeros((len(cases), 3))])
+    }  # fmt: skip
+    answer = program.check(model)
+    assert answer.seen is None
+    assert "as if its inertia were infinite" in answer.words
+
+
+# ----------------------------------------------------------------------------------------------------------------------- robots
+
+
+HIP = INERTIAL.replace(MOMENTS, 'ixx="-0.0012" ixy="0" ixz="0" iyy="-0.0011" iyz="0" izz="0.0003"')
+FOOT = f'<link name="hip">{HIP}</link><link name="foot">{INERTIAL}</link><link name="tip"/>'
+ROBOT = urdf(more=FOOT + joint("revolute", "a", "hip") + joint("fixed", "hip", "foot") + joint("fixed", "foot", "tip"))
+SDF_ROBOT = sdf(
+    f"<inertial><mass>2</mass>{SDF_INERTIA}</inertial>",
+    f"""<link name="arm"><pose relative_to="f">0 0.1 0 0 0 0.3</pose><inertial><mass>1</mass>{SDF_INERTIA}</inertial></link>
+    <link name="hand"><pose relative_to="arm">0.2 0 0 0.1 0 0</pose><inertial><mass>0.5</mass>{SDF_INERTIA}</inertial></link>
+    <frame name="f"><pose>1 2 3 0.1 0.2 0.3</pose></frame>
+    <joint name="j" type="revolute"><parent>a</parent><child>arm</child><axis><xyz>0 0 1</xyz></axis></joint>
+    <joint name="k" type="fixed"><parent>arm</parent><child>hand</child></joint>""",
+)
+MJCF_ROBOT = mjcf(
+    """<joint type="slide"/><geom size="0.1" mass="2"/>
+    <body name="arm" pos="1 2 3" euler="10 20 30" childclass="c"><joint/><geom class="d" mass="1"/>
+    <body name="hand" pos="0.2 0 0"><geom size="0.1" mass="0.5"/></body></body>""",
+    '<default><default class="c"><geom type="box" size="0.1 0.2 0.3"/></default><default class="d"><geom type="capsule"'
+    ' size="0.1 0.2"/></default></default>',
+)
+
+
+def usd_joint(kind, name, first, second):
+    return f'def Physics{kind}Joint "{name}"\n{{\nrel physics:body0 = </{first}>\nrel physics:body1 = </{second}>\n}}\n'
+
+
+def placed(name, mass, at):
+    place = f'double3 xformOp:translate = ({at}, 0, 0)\nuniform token[] xformOpOrder = ["xformOp:translate"]\n'
+    return f'def Xform "{name}" (prepend apiSchemas = [{BODY}, "PhysicsMassAPI"])\n{{\n{MASS.format(mass)}{place}{cube()}}}\n'
+
+
+USD_ROBOT = usda(MASS.format(2) + cube()) + placed("arm", 1, 5) + placed("hand", 0.5, 5.2)
+USD_ROBOT += usd_joint("Revolute", "j", "b", "arm") + usd_joint("Fixed", "k", "arm", "hand")
+
+
+@pytest.mark.parametrize(("name", "text"), [("r.sdf", SDF_ROBOT), ("r.xml", MJCF_ROBOT), ("r.usda", USD_ROBOT)])
+def test_every_link_of_a_robot_is_a_free_body_with_what_is_fixed_to_it(read, name, text):
+    base, arm = read(name, text)
+    assert base.label.endswith(("a", "b"))
+    assert arm.label.endswith("arm")
+    assert base.truth.mass == 2.0
+    assert arm.truth.mass == 1.5
+    assert not base.disagree + arm.disagree
+    if name == "r.sdf" or name == "r.xml":
+        np.testing.assert_allclose(arm.truth.com, [0.2 / 3, 0, 0], atol=1e-15)
+    else:
+        np.testing.assert_allclose(arm.truth.com, [0.2 / 3, 0, 0], atol=1e-6)
+    assert all("free body" in str(each.notes) for each in (base, arm))
+
+
+def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
+    base, hip = read("robot.urdf", ROBOT)
+    assert [(each.label, each.truth.mass) for each in (base, hip)] == [("robot.urdf: a", 2.0), ("robot.urdf: hip", 4.0)]
+    path = tmp_path / "robot.urdf"
+    path.write_text(ROBOT.replace(joint("fixed", "hip", "foot"), joint("revolute", "hip", "foot")))
+    done = run(path, "--engines", "mujoco,pinocchio", "--json")
+    assert done.exit_code == 1, done.output
+    answers = {(each["file"], each["engine"].split()[0]): each for each in json.loads(done.stdout)["findings"]}
+    assert {key: each["outcome"] for key, each in answers.items()} == {
+        ("robot.urdf: a", "mujoco"): "right",
+        ("robot.urdf: a", "pinocchio"): "right",
+        ("robot.urdf: hip", "mujoco"): "right",  # it refuses the link
+        ("robot.urdf: hip", "pinocchio"): "accepted",
+        ("robot.urdf: foot", "mujoco"): "right",
+        ("robot.urdf: foot", "pinocchio"): "right",
+    }
+    assert "-0.0012, -0.0011, 0.0003" in str(answers["robot.urdf: hip", "mujoco"]["notes"])
+
+
+# ----------------------------------------------------------------------------------------------------------------------- shapes
+
+
+def test_volumes_are_those_of_trimesh():
+    """Closed formulas and a mesh of the same shape: measured up to 6e-3 for the facets of round shapes, 1e-15 for boxes."""
+    trimesh = pytest.importorskip("trimesh")
+    made = trimesh.creation
+    cases = {
+        ("box", (0.5, 0.7, 1.1)): made.box((0.5, 0.7, 1.1)),
+        ("sphere", 0.4): made.icosphere(5, 0.4),
+        ("cylinder", (0.4, 0.9)): made.cylinder(0.4, 0.9, sections=400),
+        ("capsule", (0.4, 0.9)): made.capsule(0.9, 0.4, count=[128, 128]),
+        ("cone", (0.4, 0.9)): made.cone(0.4, 0.9, sections=400),
+    }
+    for (kind, sizes), solid in cases.items():
+        (part,) = weigh(kind, sizes, np.eye(4), 1.0)
+        own = weigh("mesh", [solid.vertices, solid.faces], np.eye(4), 1.0)[0]
+        theirs = Piece(solid.volume, solid.center_mass, solid.moment_inertia)
+        assert distance(theirs, own) < 1e-9, kind
+        centre = np.array([0, 0, 0.45 * (kind == "cone")])  # trimesh puts the base of a cone at 0
+        assert distance(replace(part, com=part.com + centre), theirs) < 1e-2, kind
