@@ -26,6 +26,12 @@ SMALLEST, LARGEST = 1e-30, 1e30
 
 The product of three such numbers does not overflow or underflow, so energies and momenta do not either.
 """
+FREE_BODIES = 1e-60, 1e60
+"""Range of the largest component of an inertia, kg m^2: molecules have 1e-47, planets 1e38.
+
+A free body depends on the ratios of its moments only. With scales of 1e-100 to 1e100 every method returned the same attitudes
+and rates up to round-off. Beside a field or a load an inertia has the range of all numbers; see `require_size`.
+"""
 TENSOR_CONDITION = 1e13
 """Largest ratio of the principal moments of a tensor that is not diagonal.
 
@@ -47,10 +53,16 @@ def describe(value: object) -> str:
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 
-def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...], ...], allowed: str) -> Array:
+def finite_array(
+    argument: str,
+    value: ArrayLike,
+    shapes: tuple[tuple[int, ...], ...],
+    allowed: str,
+    limits: tuple[float, float] = (SMALLEST, LARGEST),
+) -> Array:
     """Return `value` as a new read-only array of finite numbers, with one of `shapes`, such as (3,) or (3, 3).
 
-    Its largest component has to be 0 or of magnitude `SMALLEST` to `LARGEST`.
+    Its largest component has to be 0 or of a magnitude within the limits.
     """
     array = real_array(value)
     if array is None:
@@ -59,14 +71,17 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
         raise BadInput(argument, f"shape {array.shape}", allowed)
     if not np.isfinite(array).all():
         raise BadInput(argument, f"{describe(array.tolist())}, not finite", allowed)
-    if not _in_range(float(np.abs(array).max(initial=0.0))):
-        raise BadInput(argument, describe(array.tolist()), f"{allowed}, the largest {_RANGE}")
+    size = float(np.abs(array).max(initial=0.0))
+    if size and not limits[0] <= size <= limits[1]:
+        raise BadInput(
+            argument, describe(array.tolist()), f"{allowed}, the largest 0 or of magnitude {limits[0]:g} to {limits[1]:g}"
+        )
     return read_only(array)
 
 
 def read_inertia(value: ArrayLike) -> Array:
     """Return moments (3,) or a tensor (3, 3), kg m^2, as a symmetric read-only tensor of a possible body; see `RigidBody`."""
-    inertia = finite_array("inertia", value, ((3,), (3, 3)), _INERTIA)
+    inertia = finite_array("inertia", value, ((3,), (3, 3)), _INERTIA, FREE_BODIES)
     tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
     asymmetry = np.abs(tensor - tensor.T).max()
     if asymmetry > 1e-12 * np.abs(tensor).max():
@@ -74,11 +89,25 @@ def read_inertia(value: ArrayLike) -> Array:
     is_diagonal = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
     moments = np.sort(np.diag(tensor)) if is_diagonal else np.linalg.eigvalsh(tensor)
     if moments[0] <= 0:
-        raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _INERTIA)
+        rod = f"{_INERTIA}; for a rod or a linear molecule (1e-9 I, I, I), without a rate about the first axis"
+        allowed = rod if 0 == moments[0] < moments[1] == moments[2] else _INERTIA
+        raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", allowed)
     condition = LARGEST if is_diagonal else TENSOR_CONDITION
     if moments[-1] > condition * moments[0]:
         raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_INERTIA}, their ratio up to {condition:g}")
     return read_only((tensor + tensor.T) / 2)
+
+
+def require_size(inertia: Array) -> None:
+    """Raise `BadInput` if an inertia (3, 3), kg m^2, is out of the range beside a field or a load, whose size matters, too."""
+    if not _in_range(float(np.abs(inertia).max())):
+        allowed = (
+            f"the largest component of magnitude {SMALLEST:g} to {LARGEST:g} beside a field or a load. Use larger or smaller"
+        )
+        got = describe((inertia if np.count_nonzero(inertia) > 3 else np.diag(inertia)).tolist())
+        raise BadInput(
+            "inertia", got, f"{allowed} units for mass, length and time, or leave a free body alone: only ratios matter"
+        )
 
 
 def real_array(value: object) -> Array | None:

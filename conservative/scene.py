@@ -13,7 +13,17 @@ from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import SMALLEST, PickledByFields, describe, finite_array, positive_number, printable_text, rotation, set_fields
+from .check import (
+    SMALLEST,
+    PickledByFields,
+    describe,
+    finite_array,
+    positive_number,
+    printable_text,
+    require_size,
+    rotation,
+    set_fields,
+)
 from .errors import BadInput
 from .flight import Flight, read_flight
 from .identity import NOT_OF_MOTION, digest
@@ -39,8 +49,8 @@ MOST_DERIVATIONS = 64
 class Scene(PickledByFields):
     """A rigid body that rotates about a fixed point, or flies freely: body, potential, initial state and duration.
 
-    Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component. In that range our
-    methods are correct or report a failure. Engines get the numbers unchanged.
+    Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component; the inertia of a free
+    body 1e-60 to 1e60. In that range our methods are correct or report a failure. Engines get the numbers unchanged.
 
     Parameters
     ----------
@@ -151,6 +161,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
+        if self.needs:
+            require_size(body.inertia)
         for varying in self.loads:
             varying.require(end, self.R_WB0)  # for its exception
 

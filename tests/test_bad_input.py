@@ -113,7 +113,11 @@ API = [
     (lambda: method.free_body(BODY, ONE, (0, 0, 1), [0.0, NAN]), "t", "nan", "finite"),
     # numbers that no float can follow, and those out of range
     (lambda: cv.RigidBody((HUGE, 1, 1)), "inertia", "1000", "three positive moments"),
-    (lambda: cv.RigidBody((1e31, 1, 1)), "inertia", "1e+31", "the largest 0 or of magnitude 1e-30 to 1e+30"),
+    (lambda: cv.RigidBody((1e61, 1, 1)), "inertia", "1e+61", "the largest 0 or of magnitude 1e-60 to 1e+60"),
+    (lambda: cv.RigidBody((0, 1, 1)), "inertia", "not all positive", "for a rod or a linear molecule (1e-9 I, I, I)"),
+    (lambda: cv.RigidBody((-1, 1, 1)), "inertia", "not all positive", "three positive moments"),
+    (lambda: scene(body=cv.RigidBody((1e31, 1e31, 1e31)), potential=field()), "inertia", "1e+31", "beside a field or a load"),
+    (lambda: scene(body=cv.RigidBody((1e31, 1e31, 1e31), (0, 0, 1))), "inertia", "1e+31", "only ratios matter"),
     (lambda: cv.RigidBody(("1", "2", "3")), "inertia", "'1'", "three positive moments"),
     (lambda: cv.RigidBody(FLAT), "inertia", "e-15", "ratio up to 1e+13"),
     (lambda: scene(t_end=HUGE), "t_end", "1000", "above 0"),
@@ -121,7 +125,7 @@ API = [
     (lambda: scene(w_WB_B0=(Fraction(HUGE), 0, 0)), "w_WB_B0", "Fraction", "three finite rates"),
     (lambda: cv.UniformGravity(-1e-200, (0, 0, 1)), "weight", "-1e-200", "0 or of magnitude"),
     (lambda: cv.shapes.box((1, 2, 3), mass=HUGE), "mass", "1000", "above 0"),
-    (lambda: cv.scenes.lagrange_top(height=1e-30), "inertia", "e-", "1e-30"),
+    (lambda: cv.scenes.lagrange_top(height=1e-30), "inertia", "e-", "1e-60"),
     (lambda: Heyoka(tol=1e-99), "tol", "1e-99", "from 1e-20"),
     # resources
     (lambda: cv.integrate(BRICK, 1e-15), "sample_every", "5999999994000000 steps", "samples fit in memory"),

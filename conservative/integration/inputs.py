@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
 from ..batch import Batch
 from ..body import RigidBody
-from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
+from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, require_size, rotation
 from ..errors import BadInput, nearest
 from ..potentials.turning import static_part
 from ..scene import Scene
@@ -53,6 +53,8 @@ def read_bodies(
     if "w_WB_B0" in given:
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
+    if J is not None and scene.needs:
+        _refuse_first("inertia", J, ~_are_in_range(J), require_size)
     if J is not None and hasattr(static_part(scene.potential), "inertia") and "inertia" not in values:
         allowed = "{'inertia': ...} too, because the field has an inertia, which should equal the body's"
         raise BadInput("parameters", describe(parameters), allowed)
