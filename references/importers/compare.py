@@ -42,6 +42,7 @@ LIMIT, MEMORY = 300.0, 2**33
 NOT_FINITE = "accelerations that are not finite"
 NO_BODY = "its accelerations are those of no rigid body"
 RIGID = "no force or torque turns it, as if its inertia were infinite"
+HELD = "the engine holds the body, so that its mass cannot be seen: no force moves it"
 ROUNDS = 4
 """Largest number of loads by which forces are adapted to the body that an engine has."""
 CASES = 24
@@ -262,8 +263,8 @@ def compare_files(
 
 def judge_refusal(model: Model, engine: str, words: str) -> tuple[str, str]:
     """Return outcome and words for an engine that refuses a file."""
-    if wrong := model.flaw or "; ".join(model.invalid):
-        return "right", f"it refuses the file, in which {wrong}: {words}"
+    if wrong := model.flaw or "; ".join([*model.invalid, *model.bad]):
+        return "right", f"it refuses the file ({wrong}): {words}"
     doubt = model.doubt(engine)
     return ("undecided", f"{doubt}. It refuses the file: {words}") if doubt else ("refused", words)
 
@@ -353,8 +354,9 @@ class Program:
         prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
         if (seen := self._identify(model, cases, measured, model.truth)) is None:
             words = NOT_FINITE if not np.isfinite(measured).all() else NO_BODY if measured[:, 3:].any() else RIGID
+            words = words if measured.any() else HELD
             doubt, flaw = model.doubt(self.engine), model.flaw
-            outcome = "undecided" if doubt else "accepted" if flaw else "wrong"
+            outcome = "undecided" if doubt or words == HELD else "accepted" if flaw else "wrong"
             return answer(outcome, "; ".join(filter(None, [words, doubt or flaw])) + prints)
         outcome, words = judge_body(model, self.engine, seen, self.tolerance, prints)
         expected = accelerations(model.truth, cases) if outcome == "right" and not words else measured
@@ -402,7 +404,10 @@ class Program:
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:
         if not self.formats:
             given = {"engine": self.engine, "path": path, "kind": kind, "cases": cases}
-            return self.worker.ask("call", adapter=self._adapter, function="probe", **given)
+            try:
+                return self.worker.ask("call", adapter=self._adapter, function="probe", **given)
+            except EngineError as error:  # at the first step
+                return {"refused": error.reason}
         if kind not in self.formats:
             raise NotImplementedError
         given = {"adapter": self._adapter, "path": path, "kind": kind}

@@ -14,6 +14,7 @@ MJCF: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from .pieces import DENSITY, SHAPES, Link, Piece, Reading, join, make_pose, weig
 from .usd import read_usd
 
 ONE = "one free rigid body, whose parts are on fixed joints"
-_POSE = "relative_to degrees rotation_format"
+_POSE = "relative_to degrees rotation_format frame"
 _I = "ixx iyy izz ixy ixz iyz"
 KNOWN: dict[str, dict[str, tuple[str, str]]] = {
     "urdf": {
@@ -129,6 +130,10 @@ class File:
             return np.eye(4)
         if element.tag == "pose":
             values = numbers(element.text)
+            if element.get("frame"):
+                self.read.doubts.append(
+                    f"a pose has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
+                )
         else:
             values = numbers(f"{element.get('xyz', '0 0 0')} {element.get('rpy', '0 0 0')}")
         if of and (base := element.get("relative_to", of)):
@@ -249,7 +254,7 @@ def _read_xml(file: File) -> list[Link]:
             raise file.refuse(f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
     links = {}
     for name in (each.get("name", "") for each in model.findall("link") if each.get("name") not in free):
-        element, link = frames.elements[name], Link(frames.place(name))
+        element, link = frames.elements[name], Link(frames.place(name), name=name)
         inertial = element.find("inertial")
         auto = inertial is not None and inertial.get("auto") in ("true", "1")
         try:
@@ -304,17 +309,20 @@ def _values(element: Any) -> dict[str, str]:
 def read_mjcf(file: File) -> list[Link]:
     """Return the links of an MJCF file as MuJoCo compiles it, with their geometry."""
     mujoco = load("mujoco", "mujoco", "MuJoCo")
-    try:
-        spec = mujoco.MjSpec.from_file(str(file.path))
-        spec.compiler.degree ^= file.angles != 1
-        model = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise file.refuse(f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
-    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
-    try:
-        shapes = spec.compile()
-    except (ValueError, mujoco.FatalError):  # bodies without geometry
-        shapes = None
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            spec = mujoco.MjSpec.from_file(str(file.path))
+            spec.compiler.degree ^= file.angles != 1
+            model = spec.compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise file.refuse(f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
+        file.read.notes.extend(f"MuJoCo warns: {each.message}" for each in said)
+        spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+        try:
+            shapes = spec.compile()
+        except (ValueError, mujoco.FatalError):  # bodies without geometry
+            shapes = None
     if model.njnt > (model.nq == 7):
         raise file.refuse(f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
     if (model.body_parentid[1:] == 0).sum() != 1:
@@ -327,6 +335,7 @@ def read_mjcf(file: File) -> list[Link]:
         return Piece(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body])).place(place)
 
     for body in range(1, model.nbody):
-        link = Link(make_pose(data.xpos[body], data.xmat[body].reshape(3, 3))).filled(part(model, body))
+        link = Link(make_pose(data.xpos[body], data.xmat[body].reshape(3, 3)), name=model.body(body).name)
+        link = link.filled(part(model, body))
         links.append(replace(link, geometry=part(shapes, body)) if shapes else link)
     return links

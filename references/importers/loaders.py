@@ -50,13 +50,18 @@ def _linear(vector):
 
 
 def _compile_mujoco(path, kind):
-    """Return MuJoCo's model of a file, on a free joint, without gravity and contacts."""
+    """Return MuJoCo's model of a file, on a free joint, without forces, fluid and the armature of the joint."""
     import mujoco
 
     spec = _choose(kind, urdf=mujoco.MjSpec, mjcf=mujoco.MjSpec).from_file(path)
     if not spec.joints:
         spec.worldbody.first_body().add_freejoint()
-    spec.option.gravity, spec.option.disableflags = [0, 0, 0], int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    option, flags = spec.option, mujoco.mjtDisableBit
+    option.gravity, option.wind, option.density, option.viscosity = [0, 0, 0], [0, 0, 0], 0, 0
+    forces = ("CONTACT", "CONSTRAINT", "PASSIVE", "SPRING", "DAMPER", "ACTUATION")  # some only in some versions
+    option.disableflags = sum(int(getattr(flags, f"mjDSBL_{name}", 0)) for name in forces)
+    for joint in spec.joints:
+        joint.armature = joint.frictionloss = 0
     return mujoco, spec.compile()
 
 
@@ -121,6 +126,9 @@ def _pinocchio(path, kind):
     model = build(path) if kind == "mjcf" else build(path, pin.JointModelFreeFlyer())
     data, place = model.createData(), np.roll(PLACE, 3)  # zeros and a quaternion, scalar last
     model.gravity.linear = np.zeros(3)
+    for name in ("armature", "rotorInertia", "damping", "friction"):  # of the joint, some only in some versions
+        if hasattr(model, name):
+            setattr(model, name, np.zeros(model.nv))
     return lambda v, force: pin.aba(model, data, place, v, force) + _linear(np.cross(v[3:], v[:3]))  # it is spatial
 
 

@@ -61,6 +61,12 @@ class Link:
     frame: Array = field(default_factory=lambda: np.eye(4))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
+    name: str = ""
+
+    @property
+    def flaw(self) -> str:
+        """Why no body has this mass and inertia, as `Piece.flaw`; empty for a link without both, which is a frame."""
+        return Piece(self.mass, np.zeros(3), self.inertia).flaw if self.mass or self.inertia.any() else ""
 
     def filled(self, part: Piece) -> Link:
         """Return the link with mass and inertia of a part in its axes."""

@@ -89,6 +89,11 @@ class Model:
         return "" if self.disagree else self.truth.flaw
 
     @property
+    def bad(self) -> list[str]:
+        """Links that no body is like, although the whole body may be possible."""
+        return [f"{link.name!r}, a link of the body: {link.flaw}" for link in self.links if link.flaw and len(self.links) > 1]
+
+    @property
     def lonely(self) -> str:
         """Why there is one reader only; "" if there are two."""
         if self.own and not self.reader:
@@ -98,7 +103,7 @@ class Model:
     def doubt(self, engine: str) -> str:
         """Return why nothing can be said against an engine; "" if it can."""
         asks = [f"the file asks for {', '.join(asks)}" for name, asks in self.asks.items() if engine in _family(name)]
-        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.doubts, *asks]))
+        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *asks]))
 
     def alone(self, engine: str) -> bool:
         """Whether an engine would be compared with itself."""
@@ -207,6 +212,7 @@ def _read(model: Model, search: Sequence[Path]) -> Model:
         model.notes.append(f"no body is like this: {flaw} (mass {model.truth.mass:.4g} kg, principal moments {moments} kg m^2)")
     model.notes += [
         *model.invalid,
+        *model.bad,
         *model.doubts,
         *(f"the file asks {name} for {', '.join(asks)}" for name, asks in model.asks.items()),
     ]

@@ -19,6 +19,8 @@ from .mjcf import inline
 Bodies = list[tuple[str, Path, list[str]]]
 """For each body its name, empty if it is the only one, its file, and notes."""
 FREE = "the joints of {} are left out: it is checked as a free body"
+PLAIN = {"type": "free", **dict.fromkeys(("armature", "damping", "stiffness", "frictionloss"), "0"), "limited": "false"}
+"""The joint of a free body in MJCF, against defaults of the file. More engines know it than <freejoint>."""
 MOST = 1000
 """Largest number of bodies of a file."""
 
@@ -129,6 +131,9 @@ def _copy(model: Any, frames: Frames, members: Sequence[str]) -> Any:
         joins = each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]
         if not joins and not (each.tag == "link" and each.get("name") in members):
             copy.remove(each)
+        elif joins:  # such as <mimic>, which refers to other joints
+            for child in [child for child in each if child.tag not in ("origin", "parent", "child")]:
+                each.remove(child)
     if not frames.urdf:  # poses and joints of SDF may refer to frames that are left out
         base = np.linalg.inv(frames.place(members[0]))
         for link in copy.findall("link"):
@@ -212,24 +217,25 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     for each in root.findall("compiler"):
         if float(each.attrib.pop("settotalmass", "-1")) > 0:
             notes.append("settotalmass is left out: masses are those before they are scaled")
-    wanted, bodies = {"compiler", "default", "asset", "option"}, []
+    wanted, bodies = {"compiler", "default", "asset"}, []
     for number, (body, inherited) in enumerate(found):
         made = root.makeelement("mujoco", dict(root.attrib))
         made.extend(deepcopy(each) for each in root if each.tag in wanted)
-        copy = deepcopy(body)
-        copy.set("childclass", inherited) if inherited != "main" else None
+        copy, name = deepcopy(body), body.get("name") or f"body {number}"
+        copy.set("name", name)
+        if inherited != "main":
+            copy.set("childclass", inherited)
         for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
             copy.attrib.pop(key, None)
         _loosen(copy)
         rule = next((each.get("inertiafromgeom") for each in root.findall("compiler") if each.get("inertiafromgeom")), "auto")
         _lighten(path, made, copy, root, rule, search)
-        if not any(each.find("inertial") is not None or each.find("geom") is not None for each in copy.iter("body")):
+        if next(copy.iter("inertial", "geom"), None) is None:
             continue
-        copy.insert(0, copy.makeelement("freejoint"))
+        copy.insert(0, copy.makeelement("joint", PLAIN))
         world = made.makeelement("worldbody")
         world.append(copy)
         made.append(world)
-        name = body.get("name") or f"body {number}"
         bodies.append((name, _write(folder, made, path), [*notes, FREE.format(repr(name))]))
     return bodies
 

@@ -230,7 +230,7 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
         forms.append(Piece(part.mass, centre, part.inertia if its_inertia is None else its_inertia).place(place))
     whole = join(forms)
     whole = whole.scale(mass / whole.mass) if mass and whole.mass else whole
-    link = Link(pose, geometry=whole).filled(whole)
+    link = Link(pose, geometry=whole, name=str(body.GetPath())).filled(whole)
     if com is not None:
         link = replace(link, frame=make_pose(scale @ com))
     return replace(link, mass=mass or link.mass, inertia=link.inertia if inertia is None else inertia)

@@ -5,6 +5,8 @@ import math
 import os
 import zipfile
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -478,6 +480,67 @@ def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
         ("robot.urdf: foot", "pinocchio"): "right",
     }
     assert "-0.0012, -0.0011, 0.0003" in str(answers["robot.urdf: hip", "mujoco"]["notes"])
+
+
+def test_a_bad_link_below_a_good_body_excuses_a_refusal_and_a_repair(read):
+    """MuJoCo refuses such a body, Drake warns and repairs the link, and the whole body may be possible."""
+    bad = HIP.replace("0.0003", "0.00003")
+    (model,) = read("a.urdf", urdf(more=f'<link name="foot">{bad}</link>' + joint("fixed", "a", "foot")))
+    assert not model.flaw
+    assert "'foot', a link of the body: a principal moment is not positive" in str(model.notes)
+    assert judge_refusal(model, "mujoco", "no")[0] == "right"
+    assert judge_body(model, "drake", replace(model.truth, mass=2.0), 1e-4)[0] == "undecided"
+    assert judge_body(model, "pinocchio", model.truth, 1e-4) == ("right", "")
+
+
+def test_what_a_model_has_beside_mass_does_not_change_the_body_that_mujoco_has(tmp_path):
+    """Armature, damping and a fluid act on the accelerations of a body and are not its mass."""
+    path = tmp_path / "a.xml"
+    head = '<option density="1000" viscosity="1" wind="1 2 3"/><default><joint armature="1" damping="1"/></default>'
+    path.write_text(mjcf('<joint type="free"/><geom type="box" size="0.1 0.2 0.3"/>', head))
+    done = run(path, "--engines", "mujoco,pinocchio", "--json")
+    assert [each["outcome"] for each in json.loads(done.stdout)["findings"]] == ["right", "right"], done.output
+
+
+@pytest.mark.slow
+def test_robots_of_packages(tmp_path):
+    """Ten robots with 210 links: what is right in four engines, and that no engine is wrong where it was checked by hand.
+
+    pip install example-robot-data gymnasium
+    """
+    links, wrong = 0, set()
+    for package, names in ROBOTS.items():
+        try:
+            files = distribution(package).files or []
+        except PackageNotFoundError:
+            pytest.skip(f"{package} is not installed")
+        paths = [Path(str(each.locate())) for each in files if str(each).endswith(names)]
+        assert len(paths) == len(names)
+        done = run(*paths, "--engines", "mujoco,pinocchio", "--json")
+        answers = json.loads(done.stdout)["findings"]
+        links += len({each["file"] for each in answers})
+        wrong |= {
+            (each["engine"].split()[0], each["file"], each["words"])
+            for each in answers
+            if each["outcome"] in ("wrong", "refused")
+        }
+    assert links == 210
+    assert not wrong  # MuJoCo and Pinocchio read all possible links of these robots right
+
+
+ROBOTS = {
+    "example-robot-data": (
+        "urdf/panda.urdf",
+        "robots/talos_reduced.urdf",
+        "robots/icub_reduced.urdf",
+        "anymal_c_simple_description/urdf/anymal.urdf",
+        "urdf/ur5_robot.urdf",
+        "robots/tiago.urdf",
+        "robots/hyq_no_sensors.urdf",
+        "robots/cassie.sdf",
+    ),
+    "gymnasium": ("mujoco/assets/humanoid.xml", "mujoco/assets/ant.xml"),
+}
 
 
 # ----------------------------------------------------------------------------------------------------------------------- shapes
