@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -40,7 +41,8 @@ def run(*arguments):
 
 def model_of(path, links=None):
     """The body of a file with one body, read here; with other links if they are given."""
-    (model,) = read_here(path, path.name, path.parent)
+    with tempfile.TemporaryDirectory() as folder:
+        (model,) = read_here(path, path.name, Path(folder))
     return replace(model, links=links) if links else model
 
 
@@ -320,7 +322,8 @@ def outcomes(name, suffix=".urdf"):
     """The answers of an engine for the files of the catalogue with a suffix, by default those in URDF, by trap."""
     program = compare.Program(name)
     try:
-        paths = [path for path in TRAPS if path.suffix.endswith(suffix)]
+        copied = ("robot", "missing_mesh", "body_below_a_body")  # engines do not get the file itself
+        paths = [path for path in TRAPS if path.suffix.endswith(suffix) and path.stem not in copied]
         return {path.stem if suffix else path.name: program.check(model_of(path)) for path in paths}
     finally:
         program.worker.close()
@@ -336,7 +339,7 @@ def test_mujoco_lost_the_rotation_of_inertial_frames_until_3_14():
     before, after = outcomes("mujoco@3.13.0"), outcomes("mujoco@3.14.0")
     lost = wrong(before, "the rotation of the inertial frame is ignored")
     assert {"turned_inertial_frame", "large_angles", "gimbal_lock", "turned_frame_with_products"} <= lost
-    assert not wrong(after, "")
+    assert wrong(after, "") == {"quaternion", "quaternion_of_a_joint"}  # of URDF 1.1, which it does not read
 
 
 @pytest.mark.engine("newton@1.0.0")
