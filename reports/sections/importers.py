@@ -35,7 +35,9 @@ def build(findings: Sequence[FileAnswer]) -> Document:
     lead += f" {len(open_)} are undecided." * bool(open_)
     notes = dict.fromkeys((each.file, note) for each in findings for note in each.notes)
     parties = [
-        [each.file, each.engine, *_readings(each), "–" if each.seen is None else _body(each.seen)] for each in [*bad, *open_]
+        [each.file, each.engine, *_readings(each), "–" if each.seen is None else _body(each.seen)]
+        for each in [*bad, *open_]
+        if each.seen or each in open_
     ]
     blocks = filled(
         Paragraph(lead, Emphasis.LEAD),
