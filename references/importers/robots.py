@@ -72,13 +72,13 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     links = {each.get("name", ""): each for each in model.findall("link")}
     parents, moving = _tree(path, frames, links)
     groups = group(path, list(links), parents)
-    if urdf:  # links without inertia are frames
+    held = model.findtext("static") in ("true", "1")
+    if urdf or held:  # links without inertia are frames, or scenery
         full = {name for name, link in links.items() if (inertial := link.find("inertial")) is not None and len(inertial)}
         groups = {name: members for name, members in groups.items() if full.intersection(members)}
     meshes, elsewhere = _meshes(path, links, search)
-    held = model.findtext("static") in ("true", "1")
     # a floating joint from a link without inertia is how URDF writes a free body
-    free = urdf and len(groups) == 1 and all(joint.kind in ("fixed", "floating") for joint in frames.joints)
+    free = urdf and len(groups) == 1 and all(each.kind == "floating" for each in frames.joints if each.child in moving)
     one = set(groups) == {next(iter(links), "")} and not moving
     if (free or one) and not (several or held or elsewhere or meshes):
         return [(name, path, []) for name in groups]
@@ -219,7 +219,7 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
             notes.append("settotalmass is left out: masses are those before they are scaled")
     wanted, bodies = {"compiler", "default", "asset"}, []
     for number, (body, inherited) in enumerate(found):
-        made = root.makeelement("mujoco", dict(root.attrib))
+        made = root.makeelement("mujoco", {"model": path.stem, **root.attrib})  # Drake needs a name
         made.extend(deepcopy(each) for each in root if each.tag in wanted)
         copy, name = deepcopy(body), body.get("name") or f"body {number}"
         copy.set("name", name)
@@ -242,7 +242,7 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
 def _is_free(body: Any) -> bool:
     joint = body.find("joint")
-    return joint is None or joint.get("type") == "free"
+    return body.find("freejoint") is not None or (joint is not None and joint.get("type") == "free")
 
 
 def _loosen(body: Any) -> None:

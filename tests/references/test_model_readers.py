@@ -463,6 +463,25 @@ def test_every_link_of_a_robot_is_a_free_body_with_what_is_fixed_to_it(read, nam
     assert all("free body" in str(each.notes) for each in (base, arm))
 
 
+HELD = {
+    "world.urdf": urdf(more='<link name="world"/>' + joint("fixed", "world", "a")),
+    "held.xml": mjcf(
+        '<inertial pos="0 0 0" mass="2" diaginertia="0.02 0.03 0.04"/>', '<worldbody><geom size="1"/></worldbody>'
+    ),
+    "static.sdf": sdf(f"<inertial><mass>2</mass>{SDF_INERTIA}</inertial>", '<static>true</static><link name="ground"/>'),
+}
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_a_body_that_the_file_holds_is_set_free(read, name):
+    (model,) = read(name, HELD[name])
+    assert model.truth.mass == 2.0
+    assert "free body" in str(model.notes)
+    text = model.path.read_text()
+    assert "static" not in text
+    assert "world" not in text.replace("worldbody", "")
+
+
 def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
     base, hip = read("robot.urdf", ROBOT)
     assert [(each.label, each.truth.mass) for each in (base, hip)] == [("robot.urdf: a", 2.0), ("robot.urdf: hip", 4.0)]
