@@ -117,6 +117,15 @@ def _collapsed(links: list[Link]) -> list[Link]:
     return [Link(np.eye(4)).filled(replace(whole, inertia=moved))]
 
 
+def _steiner(links: list[Link], outer: float, sign: float = 1.0) -> list[Link]:
+    """Join links by a parallel axis theorem of another sign, or with another factor of d d'."""
+    whole, parts = join_links(links), [join_links([link]) for link in links]
+    away = [(part.mass, part.com - whole.com) for part in parts]
+    terms = [sign * steiner(mass, d) + outer * mass * np.outer(d, d) for mass, d in away]
+    inertia = sum((part.inertia + term for part, term in zip(parts, terms, strict=True)), np.zeros((3, 3)))
+    return [Link(np.eye(4)).filled(replace(whole, inertia=inertia))]
+
+
 MISTAKES: dict[str, Mistake] = {
     "the rotation of the inertial frame is ignored": _all(lambda k: {"frame": make_pose(k.frame[:3, 3])}),
     "R I instead of R I R'": _all(lambda k: {"frame": make_pose(k.frame[:3, 3]), "inertia": k.frame[:3, :3] @ k.inertia}),
@@ -139,6 +148,8 @@ MISTAKES: dict[str, Mistake] = {
     "the rotation of fixed children is ignored": _children(lambda k: {"pose": make_pose(k.pose[:3, 3])}),
     "the place of fixed children is ignored": _children(lambda k: {"pose": make_pose(R=k.pose[:3, :3])}),
     "fixed children are moved to the origin of the root link, not to the common centre of mass": _collapsed,
+    "d d' has the wrong sign in the parallel axis theorem": lambda links: _steiner(links, 2.0),
+    "the term of the parallel axis theorem has the wrong sign": lambda links: _steiner(links, 0.0, -1.0),
     "links without inertia have mass 1 and the unit inertia": _all(
         lambda k: {} if k.mass else {"mass": 1.0, "inertia": np.eye(3)}
     ),
