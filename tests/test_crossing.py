@@ -285,14 +285,14 @@ def sweep(cell: Cell) -> None:
 
 def judge(cell: Cell) -> None:
     """The right motion is right, and the motion without the part is wrong; what explains it is left out, because it is slow."""
-    with patch("conservative.benchmarks.judge.diagnose.diagnose", return_value=(None, [])):
+    with patch("conservative.benchmarks.judge.diagnose.diagnose", return_value=([], [])):
         judge_and_explain(cell)
 
 
 def judge_and_explain(cell: Cell) -> None:
     for (R_WB, w), right in ((motion(cell.row.case, T), True), (motion(cell.row.without, T), False)):
         write_motion(cell.folder / "run.csv", R_WB, w)
-        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1))
+        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1, 3))
         assert found["right"] is right, found["error"]
         assert not right or max(found["error"]) < 1e-9
 
@@ -301,8 +301,8 @@ def judge_later(cell: Cell) -> None:
     """A file that begins after t = 0 is judged at its own times."""
     R_WB, w = motion(cell.row.case, T)
     write_motion(cell.folder / "run.csv", R_WB, w, 50)
-    with patch("conservative.benchmarks.judge.diagnose.diagnose", return_value=(None, [])):
-        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1))
+    with patch("conservative.benchmarks.judge.diagnose.diagnose", return_value=([], [])):
+        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1, 3))
     assert found["right"], found["error"]
 
 

@@ -1,126 +1,254 @@
-"""A recorded motion next to the exact motion, and next to motions with a fault."""
+"""Exact motions at the times of a file, and motions by other equations, of many initial states at once. Nothing is compiled."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
-from conservative.attitude import Array, from_quaternion, hat
-from conservative.references.engine import principal_axes
+from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.errors import PotentialFailed, TorqueFailed
+from conservative.needs import IN_TIME
+from conservative.potentials.load import Window
+from conservative.potentials.potential import torque_W
 from conservative.references.exact.method import Exact, free_body, lagrange_top
-from conservative.references.solvers.scipy import Derivative, SolveIvp, list_derivatives, solve_pieces, wheel_rates
 from conservative.scene import Scene
 
 States = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
-TOLERANCE, COARSER = 2.3e-14, 20.0  # the smallest relative one of SciPy; its multiple that shows the error of a motion
+NODES, ANGLE, SWEEPS = 32, 2.0, 60  # of a stretch: Chebyshev points, first length, rad, and Picard's iterations at most
+SMALLEST, TAIL = 1e-6, 3e-15  # stretches, relative to the first, that are not halved again; last coefficients of a good one
+_EPS = 2.0**-52
+
+_X = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_X, NODES - 1))
+_INTEGRAL = chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), lbnd=-1) @ _COEFFICIENTS
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
-    """A recorded motion at times t (n,), s, and the scene whose motion it should be.
+class Equations:
+    """The equations of motion of a scene, J w' = (J w + h) x w - h' + T and q' = q w / 2, and changes of them.
 
-    If `from_row` is True, the scene starts in the first row, otherwise as the user's scene does. `start` is the time of that
-    state, s: a field or a load that depends on time has its value then. `tolerance` is the relative one of SciPy, for motions
-    without a closed form.
+    A state (7, ...) is a quaternion, scalar first, body to world, and u = w, rad/s, body axes; with a motor u = w + J^-1 h.
+    `gyroscopic` scales the first term, `field` the torque of the potential, `damping` (B,) is an additional one, 1/s, and
+    `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn with the body.
     """
 
     scene: Scene
-    t: Array
-    data: States
-    from_row: bool
-    start: float = 0.0
-    tolerance: float = TOLERANCE
+    gyroscopic: float = 1.0
+    field: float = 1.0
+    damping: float | Array = 0.0
+    fixed: Array | None = None
 
-    def read(self, R_WB: Array | None, w_WB_B: Array | None) -> Compared:
-        """Return the case of other attitudes and rates. The scene keeps the part of its initial state that they do not have."""
-        data = {"R_WB0": R_WB, "w_WB_B0": w_WB_B}
-        start = {name: values[0] for name, values in data.items() if self.from_row and values is not None}
-        return replace(self, scene=self.scene.rename(self.scene.name, **start), data=(R_WB, w_WB_B))
+    def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Callable[[Array], Array]:
+        """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
+        body = self.scene.body
+        J, inverse = body.inertia, body.inverse
+        motor = None if body.motor is None else np.array([body.motor.at(each, None, window) for each in t.tolist()]).T
+        turning = None if motor is None else inverse @ motor
+        rotor = np.zeros(3) if body.rotor_momentum is None or motor is not None else body.rotor_momentum
+        load = self._loads(t, window)
 
-    def take(self, rows: slice) -> Compared:
-        """Return some of the rows, with the same initial state."""
-        R, w = (None if each is None else each[rows] for each in self.data)
-        return replace(self, t=self.t[rows], data=(R, w))
+        def slope(y: Array) -> Array:
+            shape = y.shape[1:]
+            w = y[4:] if turning is None else y[4:] - turning.reshape(3, *(1,) * (y.ndim - 2), -1)
+            (q0, q1, q2, q3), (w1, w2, w3) = y[:4], 0.5 * w
+            out = np.empty_like(y)
+            out[0] = -(q1 * w1 + q2 * w2 + q3 * w3)
+            out[1] = q0 * w1 + q2 * w3 - q3 * w2
+            out[2] = q0 * w2 + q3 * w1 - q1 * w3
+            out[3] = q0 * w3 + q1 * w2 - q2 * w1
+            if self.fixed is None:
+                L = _apply(J, y[4:]) + rotor.reshape(3, *(1,) * len(shape))
+                torque = self.gyroscopic * cross(L, w)
+                out[4:] = _apply(inverse, torque if load is None else torque + load(y, w))
+            else:
+                R = _matrix(y)
+                L = _turn(R, 0 * w + rotor.reshape(3, *(1,) * len(shape)))
+                spin = _turn(R, w)
+                torque = self.gyroscopic * cross(L + _apply(self.fixed, spin), spin)
+                torque = torque if load is None else torque + _turn(R, load(y, w))
+                out[4:] = _turn(np.swapaxes(R, -1, -2), _apply(np.linalg.inv(self.fixed).astype(float), torque))
+            if np.any(self.damping):
+                out[4:] -= np.asarray(self.damping).reshape(-1, 1) * w
+            return out
 
-    def first(self, angle: float, least: int) -> Compared:
-        """Return the rows in which the body turns by an angle, rad, or at least so many."""
-        return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
+        return slope
 
-    @cached_property
-    def scale(self) -> float:
-        """Rate, rad/s, that errors of rates are relative to: the largest."""
-        rates = self.scene.w_WB_B0[None] if self.data[1] is None else self.data[1]
-        return float(np.linalg.norm(rates, axis=1).max()) or 1.0
+    def _loads(self, t: Array, window: Window) -> Callable[[Array, Array], Array] | None:
+        """Return the torque (3, ...) of field and loads, N m, body axes, as a function of states and rates."""
+        scene, torque, damping = self.scene, self.scene.torque, self.scene.damping
+        if scene.potential is None and torque is None and damping is None:
+            return None
+        of_time = damping and damping.of_time
+        M: Array | None = None
+        D: Array | None = None
+        if torque is not None and not torque.of_attitude:
+            M = np.array([torque.at(each, None, window) for each in t.tolist()])
+        if damping is not None and not (of_time and of_time.of_attitude):
+            D = np.array([damping.at(each, None, window) for each in t.tolist()])
+        turned = scene.potential is not None or (torque is not None and (torque.frame != "body" or torque.of_attitude))
+        turned = turned or bool(of_time and of_time.of_attitude)
 
-    @cached_property
-    def closed(self) -> bool:
-        """Whether the exact motion is known in closed form."""
-        scene = self.scene
-        return Exact().unsupported(scene) is None and (scene.potential is None or scene.symmetry_axis_B is not None)
+        def load(y: Array, w: Array) -> Array:
+            rates, out = np.moveaxis(w, 0, -1), np.zeros((*w.shape[1:], 3))
+            R = _matrix(y) if turned else np.eye(3)
+            times = np.broadcast_to(t, rates.shape[:-1])
+            if scene.potential is not None:
+                out += self.field * (torque_W(scene.potential, R, times)[..., None, :] @ R)[..., 0, :]
+            if torque is not None:
+                value = M if M is not None else _each(torque.at, times, R, window)
+                out += value if torque.frame == "body" else (np.broadcast_to(value, rates.shape)[..., None, :] @ R)[..., 0, :]
+            if damping is not None:
+                value = D if D is not None else _each(damping.at, times, R, window)
+                out -= (value @ rates[..., None])[..., 0]
+            return np.moveaxis(out, -1, 0)
+
+        return load
 
     @property
-    def torque_free(self) -> bool:
-        """Whether nothing acts on the body, and no rotor in it: only the ratios of its moments matter."""
-        return self.closed and self.scene.potential is None
+    def steady(self) -> bool:
+        """Whether the equations do not depend on time."""
+        return not self.scene.loads and not self.scene.needs & IN_TIME
 
-    @cached_property
-    def error(self) -> Array:
-        """The errors (2, n) of the data."""
-        return self.errors(self.truth(self.t))
+    def wheel(self, t: Array) -> Array:
+        """Return J^-1 h (3, n), rad/s, of a rotor with a motor; 0 without one."""
+        body = self.scene.body
+        return 0 * t if body.motor is None else body.inverse @ np.array([body.motor.at(each) for each in t.tolist()]).T
 
-    @cached_property
-    def own_error(self) -> Array:
-        """The largest error (n,) of the exact motion up to each row: its change by a coarser tolerance. 0 in closed form."""
-        coarse = replace(self, data=self.truth(self.t), tolerance=COARSER * self.tolerance)
-        return np.maximum.accumulate(coarse.error.max(axis=0))
+    def solve(self, start: float, R: Array, w: Array, t: Array) -> tuple[Array, Array]:
+        """Return attitudes (B, n, 3, 3), rates (B, n, 3) at times (n,), s, of states (B, 3, 3), (B, 3) at `start`."""
+        return self.flow(start, R, w, float(t.max())).at(t)
 
-    def truth(self, t: Array) -> States:
-        """Return the exact motion at ascending times (n,), s, from `start` on."""
-        body, field, R0, w0 = self.scene.body, self.scene.potential, self.scene.R_WB0, self.scene.w_WB_B0
-        if not self.closed:
-            return self.move(t)
-        elapsed = t - self.start
-        return free_body(body, R0, w0, elapsed) if field is None else lagrange_top(body, field, R0, w0, elapsed)  # type: ignore[arg-type]
+    def flow(self, start: float, R: Array, w: Array, end: float) -> Flow:
+        """Return the motion from states (B, 3, 3), (B, 3) at `start` to `end`, s.
 
-    def move(self, t: Array, gyroscopic: bool = True, damping: float = 0.0) -> States:
-        """Return the motion by integration, without the gyroscopic torque or with rates that lose `damping`, 1/s."""
-        axes, wheel, states = principal_axes(self.scene), wheel_rates(self.scene), np.full((len(t), 7), np.nan)
-        rotor = hat(axes.rotor * (self.scene.body.motor is None))  # the state has the momentum of a rotor with a motor
+        Picard's iteration on Chebyshev points of one stretch after the other, each of which ends at the next break point
+        (Clenshaw & Norton 1963; Bai & Junkins 2011). A stretch is halved until its series ends in round-off. The motion ends at
+        a singularity, and where a load has no value.
+        """
+        y, smooth = self.pack(start, R, w), self.scene.smoothness()
+        made = Flow(self, [start], [], y)
+        breaks = [each for each in smooth.breaks.tolist() if start < each < end]
+        size = max(float(np.abs(y[4:]).max()), 1e-3 / max(end - start, 1e-300))
+        a, before = start, -math.inf
+        with np.errstate(all="ignore"):
+            size = max(size, float(np.sqrt(np.abs(self.at(np.array([start]))(y[:, :, None])[4:]).max())))
+            length = first = min(ANGLE / size, max(end - start, 1e-300), smooth.step)
+            while a < end:
+                after = breaks[0] if breaks else math.inf
+                b = min(a + length, after, end)
+                b = min(after, end) if min(after, end) - b < 0.01 * length else b
+                half = (b - a) / 2
+                try:
+                    Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half)
+                except (TorqueFailed, PotentialFailed):
+                    break
+                series = Y @ _COEFFICIENTS.T
+                tail = np.abs(series[..., -3:]).max(axis=(1, 2)) / np.maximum(np.abs(Y).max(axis=(1, 2)), [1] * 4 + [size] * 3)
+                if not np.isfinite(Y).all() or sweeps == SWEEPS or tail.max() > TAIL:
+                    if length > SMALLEST * first:
+                        length = half
+                        continue
+                    if not np.isfinite(Y).all():
+                        break
+                made.ends.append(b)
+                made.series.append(series)
+                y, a = Y[..., -1], b
+                y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
+                before = breaks.pop(0) if a == after else before
+                length *= 1.25 if sweeps < 22 else 0.8 if sweeps > 34 else 1.0
+        return made
 
-        def changed(exact: Derivative) -> Derivative:
-            def slope(t: float, y: Array) -> Array:
-                out, w = exact(t, y), y[4:] - wheel(t)
-                out[4:] -= damping * w
-                if not gyroscopic:
-                    out[4:] -= (hat(axes.J * y[4:]) @ w + rotor @ w) / axes.J
-                return out
+    def states(self, y: Array, t: Array) -> tuple[Array, Array]:
+        """Return attitudes (B, n, 3, 3) and rates (B, n, 3) of states (7, B, n) at times (n,), s."""
+        return _matrix(y), np.moveaxis(y[4:] - self.wheel(t).reshape(-1, 1, len(t)) if self.scene.body.motor else y[4:], 0, -1)
 
-            return exact if gyroscopic and not damping else slope
+    def pack(self, t: float, R: Array, w: Array) -> Array:
+        """Return the states (7, B) of attitudes (B, 3, 3) and rates (B, 3) at a time, s."""
+        return np.concatenate([to_quaternion(R).T, w.T + self.wheel(np.array([t])).reshape(-1, 1)])
 
-        pieces = [(a, b, changed(exact)) for a, b, exact in list_derivatives(self.scene, float(t[-1]), self.start)]
-        with np.errstate(all="ignore"):  # a motion that diverges ends in nan
-            atol = self.tolerance * np.repeat([1.0, self.scale], [4, 3])
-            found = solve_pieces(self.scene, pieces, t, SolveIvp("DOP853", self.tolerance, atol))[0]
-            states[: len(found)] = found
-            return self.motion(states)
 
-    def motion(self, y: Array) -> States:
-        """Return the motion of states (n, 7): quaternions, scalar first, and rates, rad/s, in principal axes."""
-        R_FB = principal_axes(self.scene).R_BF.T
-        return from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)) @ R_FB, y[:, 4:] @ R_FB
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A motion as Chebyshev series (7, B, NODES) between `ends`, s, from the states `first` (7, B) on."""
 
-    def differences(self, motion: States) -> Array:
-        """Return a motion minus the data (n, 12), in rad and relative to `scale`; 0 for what the file does not have."""
-        out = [np.zeros((len(self.t), n)) for n in (9, 3)]
-        for i, unit in enumerate((np.sqrt(2), self.scale)):
-            if (made := motion[i]) is not None and (data := self.data[i]) is not None:
-                out[i] = (made - data).reshape(out[i].shape) / unit
-        return np.clip(np.nan_to_num(np.concatenate(out, axis=1), nan=1e3), -1e3, 1e3)
+    equations: Equations
+    ends: list[float]
+    series: list[Array]
+    first: Array
 
-    def errors(self, motion: States) -> Array:
-        """Return the sizes (2, n) of `differences`: angles between attitudes, rad, and differences of rates."""
-        d = self.differences(motion)
-        return np.stack([2 * np.arcsin(np.minimum(np.linalg.norm(d[:, :9], axis=1) / 2, 1)), np.linalg.norm(d[:, 9:], axis=1)])
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Return attitudes (B, n, 3, 3) and rates (B, n, 3) at times (n,), s, in any order; nan outside of the motion."""
+        out = np.full((7, self.first.shape[1], len(t)), np.nan)
+        out[:, :, t == self.ends[0]] = self.first[:, :, None]
+        place = np.searchsorted(self.ends, t, side="left")
+        for k, (a, b, series) in enumerate(zip(self.ends[:-1], self.ends[1:], self.series, strict=True), 1):
+            if (some := place == k).any():
+                out[:, :, some] = chebyshev.chebval((t[some] - a) / ((b - a) / 2) - 1, np.moveaxis(series, -1, 0))
+        with np.errstate(all="ignore"):
+            return self.equations.states(out, t)
+
+    def shifted(self, t: Array) -> tuple[Array, Array]:
+        """Return the motion of each state, or of the only one, at its own times (B, n), s."""
+        own = np.arange(len(t)) % self.first.shape[1]
+        each = [Flow(self.equations, self.ends, [x[:, [b]] for x in self.series], self.first[:, [b]]) for b in own.tolist()]
+        made = [one.at(np.clip(times, self.ends[0], None)) for one, times in zip(each, t, strict=True)]
+        return np.concatenate([R for R, _ in made]), np.concatenate([w for _, w in made])
+
+
+def _sweep(slope: Callable[[Array], Array], y: Array, half: float) -> tuple[Array, int]:
+    """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations."""
+    Y, last, size = np.repeat(y[:, :, None], NODES, axis=2), math.inf, np.abs(y).max() or 1.0
+    for sweep in range(1, SWEEPS):
+        new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
+        change, Y = float(np.abs(new - Y).max()) / size, new
+        if change < 2 * _EPS or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
+            return Y, sweep
+        last = change
+    return Y, SWEEPS
+
+
+def _matrix(y: Array) -> Array:
+    """Return attitudes (..., 3, 3) of states (7, ...), whose quaternions have any norm."""
+    return from_quaternion(np.moveaxis(y[:4] / np.sqrt((y[:4] * y[:4]).sum(axis=0)), 0, -1))
+
+
+def _turn(R: Array, v: Array) -> Array:
+    """Return vectors (3, ...) turned by matrices (..., 3, 3)."""
+    return np.moveaxis((R @ np.moveaxis(v, 0, -1)[..., None])[..., 0], -1, 0)
+
+
+def _apply(matrix: Array, v: Array) -> Array:
+    return (matrix @ v.reshape(3, -1)).reshape(v.shape)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors (3, ...)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _each(value: Callable[..., Array], t: Array, R: Array, window: Window) -> Array:
+    """Return a load of time and attitude at each state."""
+    flat = [value(time, turned, window) for time, turned in zip(t.ravel().tolist(), R.reshape(-1, 3, 3), strict=True)]
+    return np.array(flat).reshape(*t.shape, *np.shape(flat[0]))
+
+
+def closed(scene: Scene) -> bool:
+    """Return whether the exact motion is known in closed form."""
+    return Exact().unsupported(scene) is None and not scene.loaded and scene.body.rotor_momentum is None and (
+        scene.potential is None or scene.symmetry_axis_B is not None
+    )  # fmt: skip
+
+
+def truth(scene: Scene, start: float, t: Array) -> tuple[Array, Array]:
+    """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is that at `start`."""
+    if not closed(scene):
+        R, w = Equations(scene).solve(start, scene.R_WB0[None], scene.w_WB_B0[None], t)
+        return R[0], w[0]
+    if scene.potential is None:
+        return free_body(scene.body, scene.R_WB0, scene.w_WB_B0, t - start)
+    return lagrange_top(scene.body, scene.potential, scene.R_WB0, scene.w_WB_B0, t - start)  # type: ignore[arg-type]

@@ -104,16 +104,21 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
     return apply_style(alt.hconcat(*panels))
 
 
-def judged(rows: pd.DataFrame, name: str) -> Any:
-    """Return errors and drifts of a recorded motion after its first row, from `diagnose.judge`, a panel for each quantity."""
+def judged(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
+    """Return errors and drifts of a recorded motion, from `diagnose.judge`, a panel for each quantity, beside its limit."""
     panels = []
     shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))[rows["t"] > rows["t"].min()]
     for kind, part in shown.groupby("quantity", sort=False):
         base = alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 130, title=f"{name}: {kind}").mark_line(strokeWidth=1.4)
         x = alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False))
-        panels.append(
-            base.encode(x=x, y=alt.Y(**log_channel("shown", "size", part["shown"])), color=alt.value(PALETTE["blue"]))
-        )
+        limit = limits.get(str(kind))
+        sizes = part["shown"] if limit is None else pd.concat([part["shown"], pd.Series([limit])])
+        y = alt.Y(**log_channel("shown", "size" if limit is None else "size; dashed: allowed", sizes))
+        chart = base.encode(x=x, y=y, color=alt.value(PALETTE["blue"]))
+        if limit is not None:
+            line = alt.Chart(pd.DataFrame({"shown": [limit]})).mark_rule(strokeDash=[6, 4]).encode(y=y)
+            chart = alt.layer(chart, line)
+        panels.append(chart)
     return apply_style(alt.vconcat(*panels))
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import click
-
-from conservative.errors import require_extra
 
 from ..document import SVG_MARK
 from . import completion
@@ -28,6 +27,9 @@ FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv":
 )
 @click.argument("run", type=FilePath())
 @click.option("--body", required=True, shell_complete=completion.scenes, help="Scene file or scene: body, field and start.")
+@click.option(
+    "--columns", metavar="MAP", help="Columns by name or number: time=1,w=2:3:4,q=5:6:7:8 (R, euler, rotvec, mrp, crp)."
+)
 @click.option("--quaternion", type=click.Choice(["wxyz", "xyzw"]), help="Order of numbered columns.  [default: what fits]")
 @click.option("--euler", metavar="ZYX", help="Sequence of Euler angles: zyx for yaw, pitch, roll.")
 @click.option("--rates", type=click.Choice(["body", "world"]), default="body", show_default=True, help="Axes of the rates.")
@@ -35,29 +37,51 @@ FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv":
 @click.option(
     "--start", type=click.Choice(["row", "scene"]), default="row", show_default=True, help="First row, or the scene's t = 0."
 )
-@click.option(
-    "--error", type=float, default=1e-6, show_default=True, help="Allowed error: rad, or relative to the largest rate."
-)
+@click.option("--error", type=float, help="Allowed error: rad, or relative to the largest rate.  [default: digits and noise]")
 @json_option
 @click.option("--out", type=Output(FILES), help=f"Write {', '.join(FILES)} into this folder.")
-def judge(run: Path, body: str, rates: str, start: str, error: float, as_json: bool, out: Path | None, **reading: Any) -> None:
+def judge(
+    run: Path,
+    body: str,
+    rates: str,
+    start: str,
+    error: float | None,
+    as_json: bool,
+    out: Path | None,
+    **reading: Any,
+) -> None:
     """Compare the motion in the file RUN with the exact motion of a body, and name what explains the difference.
 
-    RUN is a table (CSV, Parquet or JSON lines) of times with attitudes, rates or both. The exit code is 1 if its error is
-    larger than --error.
+    RUN is a table (CSV, STK attitudes, JSON lines or Parquet) of times with attitudes, rates or both. The exit code is 0 if it
+    is right, 1 if it is wrong, and 3 if its rows do not decide.
     """
-    require_extra("conservative judge", "report")
     from conservative import registry
     from conservative.benchmarks.judge import diagnose, table
 
-    from ..charts import figures, style
     from ..sections.judge import build
     from ..terminal.progress import show_waiting
 
-    with output_files(out, FILES) as write, show_waiting(run.name):
-        recording = table.read(run, world=rates == "world", **reading)
-        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row", error)
-        document = build(summary, run.name, error)
-        drawn = {"csv": lambda: rows.to_csv(index=False), "svg": lambda: style.svg_text(figures.judged(rows, run.name))}
-        write(document, **drawn)
+    drawn = find_spec("pandas") is not None and find_spec("altair") is not None
+    files = [name for name in FILES if drawn or not name.endswith("svg")]
+    with output_files(out, files) as write, show_waiting(f"judging {run.name}", line=True) as step:
+        recording = table.read(run, table.Options(world=rates == "world", **reading))
+        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what))
+        document = build(summary, run.name)
+        write(document, csv=lambda: table_text(rows), svg=lambda: picture(summary, rows, run.name))
     show(document, as_json, silent=True)
+    if summary["verdict"] == "undecided":
+        raise click.exceptions.Exit(3)
+
+
+def table_text(rows: list[dict[str, Any]]) -> str:
+    """Return rows of t, quantity and value as CSV."""
+    return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in rows)
+
+
+def picture(summary: dict[str, Any], rows: list[dict[str, Any]], name: str) -> str:
+    """Return errors and drifts over time beside what is allowed, as SVG."""
+    import pandas as pd
+
+    from ..charts import figures, style
+
+    return style.svg_text(figures.judged(pd.DataFrame(rows), name, summary["limits"]))

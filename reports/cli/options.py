@@ -20,6 +20,7 @@ EXIT_CODES = """Exit codes:
     0    done
     1    a run failed, the gate did not pass, a judged file is wrong, or an engine loads another body
     2    invalid command or input, or a missing engine or baseline
+    3    a judged file does not decide
     130  interrupted by Ctrl-C (143: SIGTERM, 129: SIGHUP); --resume continues report and sweep
 """
 

@@ -52,13 +52,23 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str) -> Iterator[Step]:
-    """Show a bar if a piece of work takes longer than `DELAY`. Yield what takes the place of a step, and does nothing."""
+def show_waiting(what: str, line: bool = False) -> Iterator[Step]:
+    """Show a bar if a piece of work takes longer than `DELAY`. Yield what takes the place of a step, and does nothing.
+
+    Without a terminal nothing is shown, or with `line` a line after the same time.
+    """
 
     def ignore(share: float, what: str) -> None: ...
 
     if not has_terminal() or find_spec("rich") is None:
-        yield ignore
+        timer = Timer(DELAY, announce, [f"{what} ..."])
+        timer.daemon = True
+        if line:
+            timer.start()
+        try:
+            yield ignore
+        finally:
+            timer.cancel()
         return
     from .bars import Bar
 

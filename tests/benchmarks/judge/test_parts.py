@@ -144,8 +144,8 @@ PARTS = {
 
 
 def judged(scene, t, R, w, from_row=True, allowed=1e-9):
-    summary, rows = judge(scene, Recording(t, (R, w), None, True, False, [], len(t)), from_row, allowed)
-    assert sorted(rows["quantity"].unique()) == sorted(each["quantity"] for each in summary["quantities"])
+    summary, rows = judge(scene, Recording(t, (R, w), rows=len(t)), from_row, allowed)
+    assert sorted({row["quantity"] for row in rows}) == sorted(each["quantity"] for each in summary["quantities"])
     return summary
 
 
@@ -221,7 +221,7 @@ def test_a_table_with_many_corners_is_judged_without_fits():
     R, w = exact(driven)
     assert np.max(judged(driven, T, R, w)["error"]) < 1e-13  # measured: 5e-15
     found = judged(driven, T, R, w + 0.01 * np.sin(T)[:, None])
-    assert not any(each.values for each in found["tried"] if "step" not in each.values)
+    assert not {each.name for each in found["tried"]} & {"damped", "another body", "body axes"}
     assert "120 jumps and corners" in found["notes"][-1]
     weaker = judged(driven, T, *exact(scene(torque=cv.Torque((T, 0.1 * values)))))
     shares = {each.name: each.share for each in weaker["tried"]}
