@@ -218,14 +218,14 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka", "lxml"),
         "environments": ("uv", "platformdirs", "psutil"),
-        "report": ("click", "rich", "jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
+        "report": ("jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
         "parquet": ("pyarrow",),
         "video": ("matplotlib", "imageio_ffmpeg"),
         "models": ("pxr", "trimesh", "lxml"),
         "cluster": ("distributed", "cloudpickle"),
         "docs": ("sphinx", "myst_nb", "furo", "sphinx_click"),
-        "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
+        "gate": ("pytest", "pytest_benchmark", "heyoka"),
     }
 )
 """Import names of the packages of each extra in pyproject.toml."""

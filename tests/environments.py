@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-LEAN = {"numpy", "scipy", "numba", "mpmath", "lazy-loader"}
+LEAN = {"numpy", "scipy", "numba", "mpmath", "lazy-loader", "click", "rich"}
 """Required packages without an extra."""
 PYTEST = "import sys\nfrom pytest import console_main\nsys.exit(console_main())\n"
 

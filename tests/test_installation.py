@@ -69,7 +69,7 @@ def requirements(wheel):
 
 
 @pytest.mark.slow
-def test_five_packages_are_required_and_no_more(requirements):
+def test_seven_packages_are_required_and_no_more(requirements):
     assert requirements[""] == LEAN
     assert set(requirements) == {"", "all", "dev", *EXTRAS}
 

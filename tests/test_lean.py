@@ -2,10 +2,15 @@
 
 from importlib.metadata import packages_distributions
 
+import numpy as np
 import pytest
+
+import conservative as cv
+from conservative.references.exact.method import free_body
 
 from .environments import LEAN, run_python
 
+BODY = cv.RigidBody([2e-3, 6e-3, 7e-3])
 REFUSE = """
 import sys
 
@@ -27,7 +32,7 @@ importlib.util.find_spec = lambda name, package=None: None if name in refused el
 
 def others():
     """Return the importable names of the packages that the package does not require."""
-    lean = {*LEAN, "llvmlite", "conservative-rotation"}
+    lean = {*LEAN, "llvmlite", "pygments", "markdown-it-py", "mdurl", "conservative-rotation"}
     return ",".join(
         name for name, packages in packages_distributions().items() if not lean & {each.lower() for each in packages}
     )
@@ -35,12 +40,14 @@ def others():
 
 LEAN_RUN = """
 import conservative as cv
+from conservative.references.exact.method import free_body
 assert cv.integrate(cv.scenes.brick_flip(), dt=0.01).outcome.ok
 from conservative import registry
 registry.method("exact"), registry.method("scipy")
 """
 SHOWN = """
 import conservative as cv
+from conservative.references.exact.method import free_body
 cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1).to_pandas()
 """
 COMMAND = """
@@ -70,9 +77,6 @@ def test_a_lean_environment_lacks_pandas_and_names_its_extra(program, messages):
 
 
 COMMANDS = [
-    ("", "click", "report"),
-    ("list", "rich", "report"),
-    ("run brick_flip", "rich", "report"),
     ("report --quick", "altair", "report"),
     ("recommend brick_flip", "vl_convert", "report"),
 ]
@@ -87,6 +91,29 @@ def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, ex
     what = " ".join(["conservative", *arguments.split()[:1]])
     assert f"{what} needs {without}" in error
     assert f"pip install 'conservative-rotation[{extra}]'" in error
+
+
+def test_a_file_is_judged_in_a_lean_environment_and_without_numba(tmp_path):
+    t = np.linspace(0, 2, 101)
+    for name, fault in (("right", 1.0), ("wrong", 1.001)):
+        R, w = free_body(BODY, np.eye(3), [0.2, 2.0, 0.3], fault * t)
+        columns = [t, R.reshape(-1, 9), w]
+        header = ",".join(["t", *(f"R_{i}{j}" for i in "123" for j in "123"), *(f"w_{i} (rad/s)" for i in "xyz")])
+        np.savetxt(tmp_path / f"{name}.csv", np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.17g")
+        arguments = [
+            "judge",
+            str(tmp_path / f"{name}.csv"),
+            "--body",
+            str(tmp_path / "body.toml"),
+            "--out",
+            str(tmp_path / name),
+        ]
+        (tmp_path / "body.toml").write_text(
+            "t_end = 2\n[body]\ninertia = [2e-3, 6e-3, 7e-3]\n[start]\nw_WB_B = [0.2, 2.0, 0.3]\n"
+        )
+        code, _, error = run_python(REFUSE + LOOK + COMMAND, others() + ",numba,llvmlite", *arguments)
+        assert code == (name == "wrong"), error
+        assert sorted(path.name for path in (tmp_path / name).iterdir()) == ["judge.csv", "judge.json", "judge.md"]
 
 
 @pytest.mark.slow

@@ -6,24 +6,18 @@ import io
 import os
 import sys
 
-from conservative.errors import MissingExtra, require_extra
-
 from ..terminal.interrupts import handle_signals, received
 
 
 def launch() -> None:
-    """Run the command line. The exit code is 2 if click is not installed."""
+    """Run the command line."""
     handle_signals()
     _open_streams()
     _separate_stdout()
     try:
-        require_extra("conservative", "report", "click")
         from .main import main
 
         main(prog_name="conservative")
-    except MissingExtra as missing:
-        print(f"Error: {missing}", file=sys.stderr)
-        sys.exit(2)
     except (KeyboardInterrupt, Exception):
         if not received:
             raise

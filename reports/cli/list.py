@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import click
 
-from conservative.errors import require_extra
-
 from .options import epilog, json_option, show
 
 
@@ -20,7 +18,6 @@ from .options import epilog, json_option, show
 @json_option
 def list_all(as_json: bool) -> None:
     """List the scenes, our methods and the installed engines, with the invariants that they conserve."""
-    require_extra("conservative list", "report", "rich")
     from ..sections.catalogue import build
 
     show(build(), as_json)

@@ -61,7 +61,6 @@ def run(
     Every step is stored. Longer runs store a million evenly spaced samples. If the run fails, the files contain the samples
     before the failure, and the exit code is 1.
     """
-    require_extra("conservative run", "report", "rich")
     if parquet is not None:
         require_extra("conservative run --parquet", "parquet", "pyarrow")
     from ..run.single_run import run_methods

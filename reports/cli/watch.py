@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from conservative.deferred_imports import DEFAULT_METHOD
-from conservative.errors import BadInput, require_extra
+from conservative.errors import BadInput
 
 from . import completion
 from .options import Output, OutputCommand, epilog, json_option, scene_argument, show, split_names, t_end_option
@@ -48,7 +48,6 @@ def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float |
 
     The body is its inertia box, the arrow its angular momentum. The numbers are the largest drifts and attitude error so far.
     """
-    require_extra("conservative watch", "report", "rich")
     from conservative import registry
     from conservative.files import text_file
     from conservative.integration.one import read_method
