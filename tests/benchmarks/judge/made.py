@@ -8,7 +8,7 @@ import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.references.engine import principal_axes
 from conservative.references.exact.method import free_body
-from conservative.references.solvers.scipy import list_derivatives, solve_pieces, state_derivative
+from conservative.references.solvers.scipy import SolveIvp, list_derivatives, solve_pieces, state_derivative
 
 BODY = cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.0, 0.3], [-0.2, 0.3, 4.0]])
 START = Rotation.from_rotvec([0.4, -0.7, 0.3]), [0.7, -1.1, 1.6]
@@ -29,7 +29,9 @@ def exact(scene, t=T):
     if scene.potential is None and not scene.loaded and scene.body.rotor_momentum is None:
         return free_body(scene.body, scene.R_WB0, scene.w_WB_B0, t)
     scene = scene.rename(scene.name, t_end=max(scene.t_end, t[-1]))
-    y = solve_pieces(scene, list_derivatives(scene, float(t[-1])), np.append(0.0, t[t > 0]))[0]
+    y = solve_pieces(
+        scene, list_derivatives(scene, float(t[-1])), np.append(0.0, t[t > 0]), SolveIvp("DOP853", 2.3e-14, 2.3e-14)
+    )[0]
     R_FB = principal_axes(scene).R_BF.T
     R, w = from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)) @ R_FB, y[:, 4:] @ R_FB
     return (R, w) if t[0] == 0 else (R[1:], w[1:])
