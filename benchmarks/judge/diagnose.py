@@ -546,8 +546,9 @@ def diagnose(
 ) -> tuple[list[Explanation], list[Explanation]]:
     """Return the mistakes that explain the error, or the best candidates if none does, and all that were tried, best first.
 
-    A mistake explains a file if it leaves its noise or digits. Of several, the one with fewest fitted numbers is named, and all
-    that leave as little. `quaternion` is True if the order of quaternions can be wrong.
+    Those that make attitudes or rates worse than they are have no place in either, and a candidate leaves less than half of the
+    error. A mistake explains a file if it leaves its noise or digits. Of several, the one with fewest fitted numbers is named,
+    and all that leave as little. `quaternion` is True if the order of quaternions can be wrong.
     """
     case = whole.first(LONGEST, FEWEST)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
@@ -564,10 +565,12 @@ def diagnose(
                 break
         if search in (_readings, _attitudes, _steps) and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
+    bounds = np.maximum(case.error.max(axis=1), case.allowed)
+    tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share))
     explaining = [each for each in tried if each.explains]
     if not explaining:
-        return [each for each in tried if each.share < 1][:3], tried
+        return [each for each in tried if each.share < 0.5][:3], tried
     least = min(each.size for each in explaining)
     good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
     fewest = min(each.numbers for each in good)

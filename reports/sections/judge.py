@@ -43,8 +43,8 @@ def build(summary: Mapping[str, Any], name: str) -> Document:
         else ""
     )
     unproven = (
-        "No known mistake explains the error: none of these candidates is proven."
-        if summary["verdict"] == "wrong" and not proven and summary["tried"]
+        ("No known mistake explains the error" + (": none of these candidates is proven." if candidates else "."))
+        if summary["verdict"] == "wrong" and not proven
         else ""
     )
     compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in summary["compared"].items())

@@ -217,6 +217,8 @@ def test_angles_called_phi_theta_psi_are_compared(tmp_path):
     (tmp_path / "run.csv").write_text(table(header, T, np.degrees(W), angles))
     found = judge(SCENE, read(tmp_path / "run.csv", Options(euler="zyx")))[0]
     assert (found["verdict"], found["error"][0]) == ("wrong", pytest.approx(1.0, rel=1e-3))
+    assert found["candidates"] == []  # turned body axes leave 0.7 rad, and make right rates wrong by 28 deg/s
+    assert all(each.left[1] < 1e-6 for each in found["tried"])
     (tmp_path / "rates.csv").write_text(table("t,w_x (rpm),w_y (rpm),w_z (rpm)", T, W))
     with pytest.raises(BadInput, match="euler: got"):
         read(tmp_path / "rates.csv", Options(euler="zyx"))
