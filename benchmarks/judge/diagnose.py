@@ -951,10 +951,10 @@ def _fits(case: Case, _: bool) -> Iterator[Explanation]:
         have = [*range(3)] * (case.data[0] is not None) + [*range(3, 6)] * (case.data[1] is not None)
         rest = replace(case.take(slice(1, None)), free=tuple(have))
         if len(rest.t) > 3:
-            initial, _, made = rest.fit(exact(rest), np.empty(0), np.empty(0))
+            initial, _extra, fitted = rest.fit(exact(rest), np.empty(0), np.empty(0))
             names = [f"start_{kind}_{i}" for kind in ("turn", "rate") for i in (1, 2, 3)]
             text = "The first row does not fit the others: the motion starts at another attitude or other rates"
-            found = _explain(rest, "first row", text, made, {names[i]: float(initial[i]) for i in have})
+            found = _explain(rest, "first row", text, fitted, {names[i]: float(initial[i]) for i in have})
             yield replace(found, numbers=len(have), explains=found.explains and found.size < 100)
     yield _turned_axes(case)
     yield _other_body(case)
