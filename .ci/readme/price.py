@@ -25,11 +25,12 @@ from typing import Any
 import numpy as np
 import price_program  # beside this file
 
+from conservative import registry
 from conservative.attitude import angle_between
 from conservative.grid import Grid
 from conservative.references.truth import reference
 from conservative.scene import Scene
-from conservative.scenes.random_body import FIELDS, random_body
+from conservative.scenes.random_body import FIELDS
 
 OURS, EMPTY, HEYOKA = "conservative", "conservative, empty cache", "heyoka"
 COLUMNS = {"once": "one run", "thousand": f"{price_program.RUNS:,} runs", "other": "first run of another body"}
@@ -41,7 +42,8 @@ COMMAND = "python .ci/readme --price"
 
 def pairs() -> list[tuple[Scene, Scene]]:
     """Return two random bodies in each field."""
-    return [(random_body(field, index=0), random_body(field, index=1)) for field in FIELDS]
+    names = [[f"random_body:field={field},index={index}" for index in (0, 1)] for field in FIELDS]
+    return [(registry.scene(first).rename(first), registry.scene(second).rename(second)) for first, second in names]
 
 
 def measure_pairs() -> dict[str, list[dict[str, float]]]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from conservative.attitude import angle_between
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
 from conservative.outcome import OK, Outcome, OutcomeKind
@@ -22,6 +23,7 @@ from ..measures.processes import Processes
 from ..measures.timing import Timing, time_interleaved
 from .case import Case, Success
 from .declaration import Declaration
+from .line import LinePoint
 from .study import Progress, Study
 from .time_limit import is_known_to_end
 
@@ -35,6 +37,8 @@ MEASURES = (
 )
 CALL = 1e-4
 """Shortest timed sample, s. A faster run is repeated within a sample, each time from the initial state over the same motion."""
+SAME = 1e-12
+"""Largest angle, rad, between two final attitudes that differ by round-off only."""
 TRIAL = 8
 """Number of steps of the run that determines the speed of a foreign method."""
 Runs = dict[tuple[Case, Measure], tuple[Case, Callable[[], Any]]]
@@ -109,12 +113,20 @@ def times(case: Case, done: Success, timing: Timing) -> Iterator[Measurement]:
         yield case.row(Value(measure, value), outcome, detail if outcome.ok else "")
 
 
-def time_cases(study: Study, cases: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
-    """Yield the times of cases, final state only; see `time_runs`."""
+def time_cases(study: Study, points: Iterable[LinePoint], processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of points, final state only; see `time_runs`.
+
+    A run whose final attitude differs by more than the error of the point is not timed: an integrator that starts again at
+    samples takes other steps without them.
+    """
     ready: Runs = {}
-    for case in cases:
-        timed = replace(case, grid=keep_end(case.grid))
+    for point in points:
+        case, timed = point.case, replace(point.case, grid=keep_end(point.case.grid))
         done = study.attempt_here(timed)
+        if isinstance(done, Success) and isinstance(point.done, Success):
+            apart = float(angle_between(point.done.trajectory.R_WB[-1], done.trajectory.R_WB[-1]))
+            if apart > max(point.errors[Measure.ATTITUDE_MAX], SAME):
+                done = Outcome(OutcomeKind.SKIPPED, f"without samples it ends {apart:.1g} rad from the run with known errors")
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.TIME, math.nan), done)
         else:

@@ -14,7 +14,7 @@ from ..measures.processes import Processes
 from . import step_ladder
 from .case import Case
 from .declaration import Declaration
-from .line import list_settings, measure_line
+from .line import LinePoint, list_settings, measure_line
 from .selection import tolerance_setting
 from .speed import time_cases
 from .study import Progress, Study
@@ -28,7 +28,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     tell = study.count(progress, len(study.lines) + 1)
     with Processes(study.processes) as processes:
         for scene in study.scenes:
-            good: list[Case] = []
+            good: list[LinePoint] = []
             for method, same in study.programs(scene):
                 tell(f"{scene.name}: errors of {method.name}")
                 if same:
@@ -39,7 +39,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 for point in measure_line(study, list_cases(study, scene, method, step_ladder.LENGTH), truth, ERRORS):
                     yield from point.rows()
                     if point.outcome.ok:
-                        good.append(point.case)
+                        good.append(point)
                     else:
                         yield point.case.row(TIME, point.outcome)
             tell(f"{scene.name}: timing {len(good)} points")

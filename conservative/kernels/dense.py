@@ -28,8 +28,8 @@ from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
 
 SHARE, SLOW = 0.5, 0.25
-"""Largest term, in tolerances, and unit of rates, in rates of the slowest axis at the same energy. With these, random bodies
-have errors of at most heyoka's size with the same tolerance, 1e-3 or less."""
+"""Largest term, in tolerances, and unit of rates, in rates of the slowest axis at the same energy. With these, the
+median error of random bodies is at most heyoka's with the same tolerance, 1e-3 or less."""
 SHORTEST, LONGER = 2.0**-30, 4.0
 """Shortest step, in distances of the grid's times, and log2 of the longest one, in guessed lengths: terms can underflow."""
 

@@ -84,7 +84,7 @@ class Lame(Method):
         exact=True,
         colour="olive",
         kernel="lame",
-        structure=lambda method: Structure(symmetric=True, symplectic=True),  # the exact flow
+        structure=lambda method: Structure(symmetric=True, symplectic=True, imposed=True),  # up to a correction of round-off
         takes=frozenset({Need.GRAVITY, Need.FLIGHT}),
     )
 

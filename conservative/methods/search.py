@@ -8,7 +8,7 @@ P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
-starts at a step that is likely to be short enough, and ends the search.
+starts at a step that is likely to be short enough, and ends the search if it is.
 """
 
 from __future__ import annotations

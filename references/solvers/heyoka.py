@@ -46,8 +46,8 @@ class Heyoka(Method):
     """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
 
     Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
-    vectorised within a step). `fast_math` is on for base vectors only, whose time it changes by -14 to 8 %. Samples are values
-    of the steps' Taylor polynomials and as accurate as the steps. Fields are those of
+    vectorised within a step). `fast_math` is on for base vectors only, which then take 14 % less to 8 % more time. Samples are
+    values of the steps' Taylor polynomials and as accurate as the steps. Fields are those of
     `conservative.references.heyoka_equations.accelerations`.
 
     Parameters
@@ -211,8 +211,7 @@ def _begin(integrator: Any, parameters: Array, start: Array) -> None:
 def _bind_loop(integrator: Any, start: Array, t: Array) -> Callable[[], Array]:
     """Return a loop over the times t (n,), s, as a user of heyoka writes it, which returns states.
 
-    It keeps views of the state and has no limit of steps. Parameters set again would take 2.5 us and the limit 0.1 us; a call
-    takes from 1 us on.
+    It keeps views of the state and has no limit of steps. Parameters set again would take 2.5 us and the limit 0.1 us.
     """
     state: Array = integrator.state
     until, grid, times = integrator.propagate_until, integrator.propagate_grid, t.tolist()
