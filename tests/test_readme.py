@@ -190,33 +190,55 @@ def test_random_bodies_have_ratios_intervals_and_counts_at_all_errors():
     assert counts == [55, 22, 11, 22]  # of the five bodies two are won, one is open, one is slower and one alone reached
 
 
+def study_of_times(study, scene, measures, factor=1):
+    """Return rows of a study in which heyoka takes 1.5 * factor times as long as ours, and ours varies between processes."""
+    rows = []
+    for name, role, error, time in (("taylor:order=12", "ours", 1e-7, 2e-6), ("heyoka", "engine", 1e-7, 3e-6 * factor)):
+        common = {"scene": scene, "role": role, "family": name.partition(":")[0]}
+        rows.append(row(study, name, "attitude error max", error, **common))
+        for process in range(5):
+            noise = 1 + 0.01 * process * (role == "ours")
+            times = {f"time per simulated second{each}": time * noise for each in measures}
+            if study == "each_step" and role == "engine":
+                times["time per simulated second, each step kept, engine's own loop"] = time / 2
+            rows += [row(study, name, each, spent, **common, process=process) for each, spent in times.items()]
+    return rows
+
+
 def test_the_tables_of_benchmarks_are_made_of_their_studies(copied, tmp_path, monkeypatch):
-    """The other rows stay; a side without a time has no column."""
-    measured, rows = load("measured"), []
-    for study, measures in (("work_precision", ("",)), ("each_step", (", each step kept", ""))):
-        for name, role, error, time in (("taylor:order=12", "ours", 1e-7, 2e-6), ("heyoka", "engine", 1e-7, 3e-6)):
-            common = {"scene": "brick_flip", "role": role, "family": name.partition(":")[0]}
-            rows.append(row(study, name, "attitude error max", error, **common))
-            for process in range(5):
-                noise = 1 + 0.01 * process * (role == "ours")
-                times = {f"time per simulated second{each}": time * noise for each in measures}
-                if study == "each_step" and role == "engine":
-                    times["time per simulated second, each step kept, engine's own loop"] = time / 2
-                rows += [row(study, name, each, spent, **common, process=process) for each, spent in times.items()]
-    measurement.frame(rows).to_csv(tmp_path / "study.csv", index=False)
+    """The other rows stay; a side without a time has no column; a row has the duration of its motion in its name.
+
+    README's ratio is the mean over durations, with the processes of two runs.
+    """
+    measured = load("measured")
+    rows = study_of_times("work_precision", "brick_flip", ("",)) + study_of_times(
+        "work_precision", "brick_flip:t_end=24", ("",), 4
+    )
+    for name, found in {
+        "times": rows,
+        "each": study_of_times("each_step", "brick_flip:t_end=24", (", each step kept", "")),
+    }.items():
+        (tmp_path / name).mkdir()
+        measurement.frame(found).to_csv(tmp_path / name / "study.csv", index=False)
     shutil.copyfile(measured.ROWS, tmp_path / "measured.csv")
     monkeypatch.setattr(measured, "ROWS", tmp_path / "measured.csv")
     page = copied / "benchmarks" / "README.md"
     before = parts(page)
-    monkeypatch.setattr(sys, "argv", ["readme", "--scenes", str(tmp_path), str(tmp_path)])
+    folders = [str(tmp_path / "times")] * 2
+    monkeypatch.setattr(sys, "argv", ["readme", "--times", *folders, "--each-step", str(tmp_path / "each")])
     load("__main__").main(copied)
     tables = parts(page)
     assert {name for name in tables if tables[name] != before[name]} == {"three scenes"}
-    header, _, at_1e_3, *_ = tables["three scenes"].splitlines()
+    header, _, *lines = tables["three scenes"].splitlines()
     assert header.startswith("| scene | error, rad | our general integrators | heyoka 7.13.2 | heyoka / general |")
-    assert re.match(r"\| brick_flip \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", at_1e_3)
-    (own,) = [line for line in tables["three scenes"].splitlines() if "without the conversion" in line]
+    assert re.match(r"\| brick_flip 6 s \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", lines[0])
+    (longer,) = [line for line in lines if line.startswith("| brick_flip 24 s | 1e-6 |")]
+    assert "| 5.88 (" in longer  # 4 * 1.47
+    (own,) = [line for line in lines if "without the conversion" in line]
     assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
+    mean, low, high = measured.interval(measured.read_values()[0], "brick_flip", "ours")
+    assert mean == pytest.approx(2 * 1.4708, rel=1e-3)
+    assert low < mean / 1.9 < mean * 1.9 < high  # two durations that differ by a factor of 4
 
 
 def test_a_closed_form_is_not_in_bold_however_fast(tmp_path, monkeypatch):

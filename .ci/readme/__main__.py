@@ -2,7 +2,8 @@
 
     python .ci/readme                    # write them
     python .ci/readme --check            # exit with 1 if one of them is not current
-    python .ci/readme --measured REPORT TIMES [RANDOM] --scenes TIMES EACH_STEP --many FOLDER --price --calls
+    python .ci/readme --report FOLDER --times FOLDER [FOLDER ...] --random FOLDER --each-step FOLDER --many FOLDER
+        --typed --price --calls
 
 The last form first replaces rows of measured.csv, from the folders of a report and of studies, and the picture. Options can be
 left out; the rows of others stay. CONTRIBUTING.md has the commands that make the folders.
@@ -37,12 +38,14 @@ def measure_again(options: argparse.Namespace) -> None:
     import calls
     import measure
     import price
+    import typed
 
-    report, times, *random = options.measured or (None, None)
     made = {
-        measured.REPORT: measure.scene_rows(report, times) if report else None,
-        measured.BODIES: measure.random_rows(*random) if random else None,
-        measured.SCENES: measure.three_scenes(*options.scenes) if options.scenes else None,
+        measured.REPORT: measure.scene_rows(options.report) if options.report else None,
+        measured.TIMES: measure.time_rows(options.times) if options.times else None,
+        measured.BODIES: measure.random_rows(options.random) if options.random else None,
+        measured.TYPED: typed.typed_rows(measure.SEED) if options.typed else None,
+        measured.EACH_STEP: measure.each_step_rows(options.each_step) if options.each_step else None,
         measured.MANY: measure.many_rows(options.many) if options.many else None,
         measured.PRICE: price.price_rows(price.measure_pairs()) if options.price else None,
         measured.CALLS: calls.call_rows(calls.measure_calls()) if options.calls else None,
@@ -53,8 +56,8 @@ def measure_again(options: argparse.Namespace) -> None:
         writer = csv.DictWriter(file, measure.COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    if report:
-        measure.draw(report, ROOT / PICTURE)
+    if options.report:
+        measure.draw(options.report, ROOT / PICTURE)
 
 
 def main(root: Path = ROOT) -> None:
@@ -63,15 +66,22 @@ def main(root: Path = ROOT) -> None:
         prog="python .ci/readme", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page is not current")
+    folders = {
+        "report": "drifts, errors and the picture of README",
+        "random": "random bodies",
+        "each-step": "the scene's steps, in the table of three scenes",
+        "many": "the table of many bodies",
+    }
+    for name, about in folders.items():
+        parser.add_argument(f"--{name}", type=Path, metavar="FOLDER", help=about)
     parser.add_argument(
-        "--measured", nargs="+", type=Path, metavar="FOLDER", help="REPORT TIMES [RANDOM]: folders of new measurements"
+        "--times", nargs="+", type=Path, metavar="FOLDER", help="times of README and of the table of three scenes"
     )
-    parser.add_argument("--scenes", nargs=2, type=Path, metavar="FOLDER", help="TIMES EACH_STEP: the table of three scenes")
-    parser.add_argument("--many", type=Path, metavar="FOLDER", help="the table of many bodies")
+    parser.add_argument("--typed", action="store_true", help="measure the table of typed tolerances")
     parser.add_argument("--price", action="store_true", help="measure the table of prices, in new processes")
     parser.add_argument("--calls", action="store_true", help="measure the table of calls")
     options = parser.parse_args()
-    if options.measured or options.scenes or options.many or options.price or options.calls:
+    if any(value for name, value in vars(options).items() if name != "check"):
         measure_again(options)
     pages = read_pages(root)
     new = {page: marks.fill(text, PARTS) for page, text in pages.items()} | {root / "README.md": measured.render_readme()}

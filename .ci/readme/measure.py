@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from conservative import registry
 from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.document.cells import tolerance
@@ -28,15 +29,19 @@ ENGINES = {"heyoka": "heyoka", "SciPy": "scipy:loop=compiled", "MuJoCo": "mujoco
 FAMILIES = {name: method.partition(":")[0] for name, method in ENGINES.items()}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
-TIMES = (
-    "conservative study work_precision --scenes brick_flip,lagrange_top"
-    " --methods taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
-)
-RANDOM = "conservative study random --bodies 20 --seed 1003 --methods gauss,projected,taylor,heyoka"
 METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
-SCENES = (
-    f"conservative study work_precision --scenes brick_flip:t_end=24,lagrange_top:t_end=2,asymmetric_top {METHODS}",
-    f"conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 {METHODS}",
+TIMES = (
+    f"conservative study work_precision --scenes brick_flip,lagrange_top,asymmetric_top {METHODS}",
+    "conservative study work_precision"
+    " --scenes brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8"
+    " --methods taylor,projected,moser_veselov,lame,heyoka",
+)
+"""All sides on three motions, and the fastest ones on longer motions of the same bodies."""
+SEED = 1004
+"""Of the random bodies; fixed before the run, and never used before."""
+RANDOM = f"conservative study random --bodies 20 --seed {SEED} --methods gauss,projected,taylor,heyoka"
+EACH_STEP = (
+    f"conservative study each_step --scenes brick_flip:t_end=24,lagrange_top:t_end=20,asymmetric_top:t_end=100 {METHODS}"
 )
 MANY = "conservative study throughput --methods taylor,heyoka,mujoco --sizes 1024"
 OURS = {"our general integrators": MethodClass.GENERAL, "our closed forms": MethodClass.SOLUTION}
@@ -46,14 +51,29 @@ EACH = ("the scene's steps, all stored", "without the conversion of an engine's 
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy:loop=compiled")
 
 
-def scene_rows(report: Path, times: Path) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the paper's two scenes, as dictionaries with the keys `COLUMNS`."""
-    table, timed = _read(report / "measurements.csv"), points(with_names(_read(times / "study.csv")))
+def scene_rows(report: Path) -> Iterator[dict[str, Any]]:
+    """Yield drifts and errors on the paper's two scenes, as dictionaries with the keys `COLUMNS`."""
+    table = _read(report / "measurements.csv")
     for scene in CLOSED_FORMS:
         for row in _run_rows(table[table["scene"] == scene], scene):
             yield row | {"command": "conservative report", "date": _date(report / "measurements.csv")}
-        for row in _time_rows(timed[timed["scene"] == scene], scene):
-            yield row | {"command": TIMES, "date": _date(times / "study.csv")}
+
+
+def time_rows(folders: list[Path]) -> Iterator[dict[str, Any]]:
+    """Yield the times of every side, and heyoka's over ours: those of README's scenes, then those of the table of three scenes.
+
+    Folders of the same command are runs at different times; intervals are over the processes of all of them.
+    """
+    timed = points(with_names(_read_runs(folders)))
+    when = {"date": max(_date(folder / "study.csv") for folder in folders)}
+    for scene in CLOSED_FORMS:
+        yield from (row | when | {"command": " and ".join(TIMES)} for row in _time_rows(timed, scene))
+    for scene in timed["scene"].unique():
+        longer = ":" in scene
+        reached = costs(timed[timed["scene"] == scene], [ERROR] if longer else [1e-3, ERROR, 1e-9])
+        for error, each in reached.groupby("error", sort=False):
+            place = f"{_with_duration(scene)}, {tolerance(error)}"
+            yield from (row | when | {"command": TIMES[longer]} for row in _side_rows(place, error, each))
 
 
 def random_rows(random: Path) -> Iterator[dict[str, Any]]:
@@ -63,20 +83,21 @@ def random_rows(random: Path) -> Iterator[dict[str, Any]]:
     yield from (common | row for row in _random(bodies))
 
 
-def three_scenes(times: Path, each: Path) -> Iterator[dict[str, Any]]:
-    """Yield the times of every side on three scenes, and heyoka's time over ours, at errors and with every step stored."""
-    timed, table = points(with_names(_read(times / "study.csv"))), with_names(_read(each / "study.csv"))
+def each_step_rows(each: Path) -> Iterator[dict[str, Any]]:
+    """Yield the times of every side on three scenes with every step stored, and heyoka's over ours."""
+    table = with_names(_read(each / "study.csv"))
     loops = table.loc[table["measure"] == Measure.TIME_OWN_LOOP.text, "family"].unique()
-    for scene in timed["scene"].unique():
-        common = {"command": SCENES[0], "date": _date(times / "study.csv")}
-        for error in (1e-3, 1e-6, 1e-9):
-            reached = costs(timed[timed["scene"] == scene], [error])
-            yield from (common | row for row in _side_rows(f"{scene}, {tolerance(error)}", error, reached))
-        common = {"command": SCENES[1], "date": _date(each / "study.csv")}
+    common = {"command": EACH_STEP, "date": _date(each / "study.csv")}
+    for scene in table["scene"].unique():
         for what, reached in zip(EACH, each_step(table, scene).runs.values(), strict=True):
             shown = loops if what == EACH[1] else None
-            place = f"{scene}, {tolerance(ERROR)}, {what}"
+            place = f"{_with_duration(scene)}, {tolerance(ERROR)}, {what}"
             yield from (common | row for row in _side_rows(place, ERROR, reached, shown))
+
+
+def _with_duration(scene: str) -> str:
+    """Return the name of a scene without its parameters and with its duration, such as `brick_flip 24 s`."""
+    return f"{scene.partition(':')[0]} {registry.scene(scene).t_end:.3g} s"
 
 
 def _side_rows(place: str, error: float, reached: pd.DataFrame, shown: Any = None) -> Iterator[dict[str, Any]]:
@@ -114,15 +135,24 @@ def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
 
 
 def _time_rows(timed: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
-    """Yield the time of the fastest setting of each family that reaches `ERROR`, and heyoka's time over ours."""
+    """Yield the time of the fastest setting of each family that reaches `ERROR`, and heyoka's time over ours.
+
+    The time is that of the scene's own duration; the ratio is the geometric mean over all durations.
+    """
     reached, common = costs(timed, [ERROR]), {"scene": scene, "version": ""}
     families = {"ours": GENERAL.partition(":")[0], "closed form": CLOSED_FORMS[scene], **FAMILIES}
-    fastest = {name: cheapest(reached[reached["family"] == family]) for name, family in families.items()}
-    for name, each in fastest.items():
+
+    def fastest(duration: str, family: str) -> Any:
+        return cheapest(reached[(reached["scene"] == duration) & (reached["family"] == family)])
+
+    for name, family in families.items():
+        each = fastest(scene, family)
         time, method = (1e6 * each.time, each.name) if each else (math.inf, "")
         yield common | {"name": name, "quantity": "time", "unit": "us per s", "value": time, "method": method}
+    durations = [each for each in reached["scene"].unique() if each.partition(":")[0] == scene]
     for name in ("ours", "closed form"):
-        yield from _ratio_rows(common | {"name": name}, Contest(scene, ERROR, fastest[name], fastest["heyoka"]))
+        contests = [Contest(each, ERROR, fastest(each, families[name]), fastest(each, "heyoka")) for each in durations]
+        yield from _ratio_rows(common | {"name": name}, Ratios(tuple(contests)))
 
 
 def _ratio_rows(place: dict[str, Any], each: Contest | Ratios) -> Iterator[dict[str, Any]]:
@@ -146,8 +176,19 @@ def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
         yield from _ratio_rows(common | {"scene": f"{each.field} {each.error:g} rad"}, each)
     every = Ratios(tuple(contest for each in found for contest in each.contests))
     counts = {"cases": len(every.contests), "cases won": every.won, "cases open": every.open, "cases lost": every.lost}
-    for quantity, count in ({"bodies in each field": len(found[0].contests)} | counts).items():
+    counts |= {"bodies in each field": len(found[0].contests)}
+    extremes = {"smallest ratio": min(each.worst for each in found), "largest ratio": max(each.best for each in found)}
+    for quantity, count in (counts | extremes).items():
         yield common | {"scene": "all fields", "quantity": quantity, "value": count}
+
+
+def _read_runs(folders: list[Path]) -> pd.DataFrame:
+    """Return the rows of several runs of studies: the errors of the first one, and the processes of all."""
+    tables = [_read(folder / "study.csv") for folder in folders]
+    tables = [each.assign(process=each["process"].fillna(0) + 100 * number) for number, each in enumerate(tables)]
+    every, timed = pd.concat(tables, ignore_index=True), Measure.TIME.text
+    again = every.duplicated(["scene", "method", "dt", "measure", "quantity"]) & (every["measure"] != timed)
+    return every[~again].reset_index(drop=True)
 
 
 def _read(path: Path) -> pd.DataFrame:

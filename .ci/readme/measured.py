@@ -11,9 +11,10 @@ from marks import table
 
 HERE = Path(__file__).resolve().parent
 ROWS = HERE / "measured.csv"
-REPORT, BODIES, SCENES, MANY = "report", "random bodies", "three scenes", "many bodies"
-PRICE, CALLS = "price", "call"
-"""Parts of measured.csv, in its order."""
+REPORT, TIMES, BODIES, TYPED, SCENES = "report", "times", "random bodies", "typed tolerance", "three scenes"
+EACH_STEP, MANY, PRICE, CALLS = "each step", "many bodies", "price", "call"
+"""Parts of measured.csv, in its order: times are those of README and of the table of three scenes without the scenes' steps."""
+STEPS = ", the scene's steps", ", without the conversion"
 RATIO, GENERAL, CLOSED = "heyoka's time over ours", "our general integrators", "our closed forms"
 VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4"}
 
@@ -26,15 +27,19 @@ def read_rows() -> list[dict[str, str]]:
 
 def part_of(row: dict[str, str]) -> str:
     """Return the part to which a row belongs."""
-    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, MANY, PRICE, CALLS)]
-    return known[0] if known else SCENES if "," in row["scene"] else REPORT
+    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, TYPED, MANY, PRICE, CALLS)]
+    if known:
+        return known[0]
+    if "," in row["scene"]:
+        return EACH_STEP if any(each in row["scene"] for each in STEPS) else TIMES
+    return REPORT if row["quantity"] in ("drift", "error") else TIMES
 
 
 def read_values() -> tuple[dict[tuple[str, str, str], float], dict[str, str], str]:
     """Return the values by scene, name and quantity, the versions by name, and the last date of README's rows."""
     rows = read_rows()
     values = {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows}
-    dates = [row["date"] for row in rows if part_of(row) in (REPORT, BODIES)]
+    dates = [row["date"] for row in rows if part_of(row) in (REPORT, TIMES, BODIES)]
     return values, {row["name"]: row["version"] for row in rows if row["version"]}, max(dates)
 
 
@@ -52,8 +57,16 @@ def render_readme() -> str:
         value=lambda *key: values[key],
         interval=lambda *place: interval(values, *place),
         ratios=sorted(interval(values, *key[:2]) for key in values if key[1:] == (BODIES, RATIO)),
+        typed=sorted(interval(values, *key[:2]) for key in values if key[1:] == (TYPED, RATIO) and "all" not in key[0]),
+        typed_single=[
+            pick(value for key, value in values.items() if key[1:] == (TYPED, f"{RATIO}, {end}"))
+            for pick, end in ((min, "smallest"), (max, "largest"))
+        ],
         count=lambda quantity: int(values["all fields", BODIES, quantity]),
         unreached=count_unreached(values),
+        bodies=lambda quantity: values["all fields", BODIES, quantity],
+        many=[value for key, value in values.items() if key[1:] == (MANY, RATIO) and key[0].startswith("one body, median")],
+        slower=[place for place, *key in values if key == [GENERAL, f"{RATIO}, high"] and values[place, *key] < 1],
         version=versions,
         date=date,
     )
@@ -82,6 +95,25 @@ def count_unreached(values: dict[tuple[str, str, str], float]) -> int:
     return cases - sum(others)
 
 
+def render_typed() -> str:
+    """Return heyoka's time over ours at the same typed tolerance, a row for each, and the errors of both sides."""
+    values, *_ = read_values()
+    places = [place.rsplit(" ", 1) for place, *key in values if key == [TYPED, RATIO]]
+    fields, tolerances = (list(dict.fromkeys(each)) for each in zip(*places, strict=True))
+    lines = []
+    for tolerance in tolerances:
+        ratios = [ratio_text(interval(values, f"{field} {tolerance}", TYPED)) for field in fields]
+        every = f"all fields {tolerance}", TYPED
+        single = [f"{values[*every, f'{RATIO}, {end}']:#.3g}" for end in ("smallest", "largest")]
+        errors = [
+            " to ".join(f"{values[*every, f'{side}, {name} error']:.0e}".replace("e-0", "e-") for name in ("median", "largest"))
+            for side in ("ours", "heyoka")
+        ]
+        lines.append([f"{float(tolerance):.0e}".replace("e-0", "e-"), *ratios, " to ".join(single), *errors])
+    head = ["tolerance", *(field.replace("_", " ") for field in fields), "single bodies"]
+    return table([*head, "our error, rad", "heyoka's error, rad"], lines) + f"\n{origin(TYPED)}\n"
+
+
 def render_scenes() -> str:
     """Return the times of all sides on three scenes, a row for each error and kind of run.
 
@@ -89,6 +121,8 @@ def render_scenes() -> str:
     """
     values, versions, _ = read_values()
     places = list(dict.fromkeys(place for place, name, _ in values if name == GENERAL))
+    order = list(dict.fromkeys(place.partition(" ")[0] for place in places))
+    places.sort(key=lambda place: order.index(place.partition(" ")[0]))
     timed = [key[1] for key, value in values.items() if key[0] in places and key[2] == "time" and math.isfinite(value)]
     sides = list(dict.fromkeys(timed))
     titles = [" ".join([each, *([versions[each]] if each in versions else [])]) for each in sides]
@@ -104,7 +138,7 @@ def render_scenes() -> str:
             cells[fastest] = f"**{cells[fastest]}**"
         lines.append([scene if scene != before else "", what, *cells, ratio_text(interval(values, place, GENERAL))])
         before = scene
-    return table(["scene", "error, rad", *titles, "heyoka / general"], lines) + f"\n{origin(SCENES)}\n"
+    return table(["scene", "error, rad", *titles, "heyoka / general"], lines) + f"\n{origin(TIMES, EACH_STEP)}\n"
 
 
 def render_many() -> str:
@@ -153,10 +187,11 @@ def render_calls() -> str:
     return table(header, list(lines.values())) + f"\n{origin(CALLS)}\n"
 
 
-def origin(part: str) -> str:
-    """Return the date and the commands of a part as a sentence."""
-    rows = [row for row in read_rows() if part_of(row) == part]
-    commands = " and ".join(dict.fromkeys(f"`{row['command']}`" for row in rows))
+def origin(*parts: str) -> str:
+    """Return the date and the commands of parts as a sentence."""
+    rows = [row for row in read_rows() if part_of(row) in parts]
+    each = dict.fromkeys(command for row in rows for command in row["command"].split(" and "))
+    commands = " and ".join(f"`{command}`" for command in each)
     return f"Measured on {max(row['date'] for row in rows)} by {commands}."
 
 
@@ -191,7 +226,7 @@ def render_range() -> str:
 
 
 TABLES = {
-    **{BODIES: render_bodies, SCENES: render_scenes, MANY: render_many, PRICE: render_price},
+    **{BODIES: render_bodies, TYPED: render_typed, SCENES: render_scenes, MANY: render_many, PRICE: render_price},
     **{"calls": render_calls, "range of ratios": render_range},
 }
 """Tables of times by the name of their mark."""
