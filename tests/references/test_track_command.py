@@ -53,7 +53,7 @@ def test_changes_between_versions_are_reported_and_written(track, tmp_path):
     assert code == 0
     assert words.splitlines() == [f"installing trial@{version}" for version in BEHAVIOUR]
     rose, gone = text.partition("Changes\n")[2].splitlines()[:2]
-    assert "as_packaged on brick_flip, 1.0 → 1.1: order of the attitude 2 → 4; order of the rates 2 → 4" in rose
+    assert "as_packaged on brick_flip:t_end=0.5, 1.0 → 1.1: order of the attitude 2 → 4; order of the rates 2 → 4" in rose
     assert "attitude error 2.1e-3 → 2.6e-7 rad" in rose
     assert "1.1 → 1.2: outcome ok → " in gone
     assert (tmp_path / "track.md").read_text() == (tmp_path / "page" / "track.md").read_text()
