@@ -10,14 +10,14 @@ are therefore as accurate as steps, and no step ends at one.
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arithmetic import choose, cosine, sine
 from . import entry, kernel
-from .compiler.lanes import REGISTER, gather_numbers, load, load_rows, save_columns
+from .compiler.lanes import REGISTER, cache_by_types, gather_numbers, load, load_rows, save_columns
 from .compiler.series import TWICE, Series, recall
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.traced import fast_exp2, fast_log2, trace
@@ -151,7 +151,7 @@ def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB,
     return Result(done, steps * order, corrections, computed * order, defect, False)
 
 
-@cache
+@cache_by_types
 def enter_like(like):
     """Return `march` as Python calls it (`taylor.enter_like`). The last `REGISTER` numbers are those of the lanes."""
 

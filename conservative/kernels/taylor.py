@@ -21,13 +21,13 @@ Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 from ..potentials.turning import Turned
 from . import entry, kernel, small
 from .axial import FLAT, TINY, significant
-from .compiler.lanes import REGISTER, gather_numbers, load_rows, save_rows
+from .compiler.lanes import REGISTER, cache_by_types, gather_numbers, load_rows, save_rows
 from .compiler.series import Series, Vectors, sum_orders, sum_to_order
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.traced import trace
@@ -354,7 +354,7 @@ def march(model, coefficients, workspace):
     return Result(done, done * order, corrections, taken * order, defect, False)
 
 
-@cache
+@cache_by_types
 def enter_like(like):
     """Return `march` as Python calls it, for a model and a step size arranged like `like`."""
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import operator
-from functools import partial
+from functools import partial, wraps
 
 import numpy as np
 
@@ -271,6 +271,26 @@ def gather_numbers(values):
 
     like = clear(values)
     return np.array(numbers, dtype=float), like
+
+
+def cache_by_types(build):
+    """Cache a function of the tuple that `gather_numbers` returns.
+
+    Named tuples of different types with equal numbers are equal, and fields of different types need code of their own.
+    """
+    known = {}
+
+    def kinds(value):
+        return (type(value), *map(kinds, value)) if isinstance(value, tuple) else type(value)
+
+    @wraps(build)
+    def recall(like):
+        key = kinds(like)
+        if key not in known:
+            known[key] = build(like)
+        return known[key]
+
+    return recall
 
 
 join = trace(traced.join)
