@@ -27,10 +27,10 @@ from ..contest import credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
-from .case import Case
+from .case import Case, Success
 from .declaration import Declaration, Extent
 from .line import LinePoint, list_settings, measure_line
-from .speed import Runs, keep_end, time_runs
+from .speed import Runs, check_end, keep_end, time_runs
 from .study import Progress, Study
 
 ERROR = 1e-6
@@ -46,7 +46,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     with Processes(study.processes) as processes:
         for scene in study.scenes:
             truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
-            chosen: list[Case] = []
+            chosen: list[LinePoint] = []
             for method, same in study.programs(scene):
                 tell(f"{scene.name}: errors of {method.name}")
                 if same:
@@ -57,7 +57,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield from time_chosen(study, chosen, processes)
 
 
-def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
+def choose_setting(
+    study: Study, scene: Scene, method: Method, truth: Trajectory
+) -> Generator[Measurement, None, list[LinePoint]]:
     """Yield the errors of a method's settings; return the coarsest that is credited with `ERROR`, or an empty list."""
     grid = grid_for(scene, scene.dt)
     grids, tolerances = [Grid(grid.dt / k, grid.n_steps * k, k) for k in STEPS], TOLERANCES[:: 2 if study.quick else 1]
@@ -68,16 +70,20 @@ def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory
         if point.outcome.ok:
             line.append(point)
     first = first_within(credit([point.errors[Measure.ATTITUDE_MAX] for point in line]), ERROR)
-    return [] if first is None else [line[first].case]
+    return [] if first is None else [line[first]]
 
 
-def time_chosen(study: Study, chosen: Iterable[Case], processes: Processes) -> Iterator[Measurement]:
-    """Yield the times of a scene's cases over the motion of their errors, s per simulated second, a row for each process."""
+def time_chosen(study: Study, chosen: Iterable[LinePoint], processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of a scene's points over the motion of their errors, s per simulated second, a row for each process."""
     ready: Runs = {}
-    for case in chosen:
+    for point in chosen:
+        case = point.case
         for measure, grid in ((Measure.TIME_SAMPLED, case.grid), (Measure.TIME, keep_end(case.grid))):
             timed = replace(case, grid=grid)
             done = study.attempt_here(timed)
+            if isinstance(done, Success) and isinstance(point.done, Success):
+                same = check_end(point.done.trajectory, done.trajectory, point.errors[Measure.ATTITUDE_MAX])
+                done = done if same.ok else same
             if isinstance(done, Outcome):
                 yield case.row(Value(measure, math.nan), done)
                 continue

@@ -19,7 +19,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from conservative.attitude import angle_between
@@ -42,7 +42,7 @@ from .case import NOT_DRAWN, Case, Drawn, outcome_of_error
 from .declaration import Declaration
 from .line import list_settings
 from .selection import Missing, tolerance_setting
-from .speed import Runs, keep_end, time_runs
+from .speed import Runs, check_end, keep_end, time_runs
 from .study import Progress, Study, remember_truths
 
 BODIES = 10
@@ -106,11 +106,12 @@ def select(methods: Iterable[Method]) -> tuple[Method, ...]:
 
 @dataclass(frozen=True)
 class TimedSetting:
-    """A setting whose run succeeded: its error, rad, and its estimated time, s per simulated second."""
+    """A setting whose run succeeded: its error, rad, its estimated time, s per simulated second, and its trajectory."""
 
     case: Case
     error: float
     spent: float
+    trajectory: Trajectory = field(compare=False)
 
 
 Line = list[TimedSetting]
@@ -167,7 +168,7 @@ def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Genera
         spent = min(wall_time(done.run) for _ in range(2))  # the first may compile
         if spent <= SLOW:
             spent = min(spent, *(wall_time(done.run) for _ in range(3)))
-        line.append(TimedSetting(case, error, spent / case.scene.t_end))
+        line.append(TimedSetting(case, error, spent / case.scene.t_end, done.trajectory))
         yield case.row(Value(Measure.ATTITUDE_MAX, error))
     return line
 
@@ -196,27 +197,29 @@ def time_rows(study: Study, points: list[TimedSetting], processes: Processes) ->
     """Yield the times of the points of a body, s per simulated second, final state only, a row for each process."""
     ready: Runs = {}
     with time_limit(study.hang_limit):
-        for case in (replace(point.case, grid=keep_end(point.case.grid)) for point in points):
-            run = prepare_unchecked(case)
-            if isinstance(run, Outcome):
-                yield case.row(TIME, run)
+        for point in points:
+            case = replace(point.case, grid=keep_end(point.case.grid))
+            done = prepare_unchecked(case)
+            outcome = done if isinstance(done, Outcome) else check_end(point.trajectory, done[1], point.error)
+            if isinstance(done, Outcome) or not outcome.ok:
+                yield case.row(TIME, outcome)
             else:
-                ready[case, Measure.TIME] = case, run
+                ready[case, Measure.TIME] = case, done[0]
         yield from time_runs(study, ready, processes)
 
 
-def prepare_unchecked(case: Case) -> Run | Outcome:
-    """Return the run, or the outcome of its failure.
+def prepare_unchecked(case: Case) -> tuple[Run, Trajectory] | Outcome:
+    """Return the run and its trajectory, or the outcome of its failure.
 
     Its drift is not checked, because its errors are measured. With a check of the drift, engines would lose loose tolerances
     that reach a large error.
     """
     try:
         run = case.method.prepare(case.scene, case.grid)
-        outcome = run().outcome
+        trajectory = run()
     except Exception as error:
         return outcome_of_error(case.method, error)
-    return run if outcome.ok else outcome
+    return (run, trajectory) if trajectory.outcome.ok else trajectory.outcome
 
 
 STUDY = Declaration(

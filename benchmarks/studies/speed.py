@@ -16,6 +16,7 @@ from conservative.attitude import angle_between
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
 from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
@@ -113,20 +114,26 @@ def times(case: Case, done: Success, timing: Timing) -> Iterator[Measurement]:
         yield case.row(Value(measure, value), outcome, detail if outcome.ok else "")
 
 
-def time_cases(study: Study, points: Iterable[LinePoint], processes: Processes) -> Iterator[Measurement]:
-    """Yield the times of points, final state only; see `time_runs`.
+def check_end(credited: Trajectory, timed: Trajectory, error: float) -> Outcome:
+    """Return `OK`, or the reason why a run is not timed: it ends further from the run with known errors than the error, rad.
 
-    A run whose final attitude differs by more than the error of the point is not timed: an integrator that starts again at
-    samples takes other steps without them.
+    An integrator that starts again at samples takes other steps without them.
     """
+    apart = float(angle_between(credited.R_WB[-1], timed.R_WB[-1]))
+    if apart <= max(error, SAME):
+        return OK
+    return Outcome(OutcomeKind.SKIPPED, f"without samples it ends {apart:.1g} rad from the run with known errors")
+
+
+def time_cases(study: Study, points: Iterable[LinePoint], processes: Processes) -> Iterator[Measurement]:
+    """Yield the times of points, final state only; see `time_runs` and `check_end`."""
     ready: Runs = {}
     for point in points:
         case, timed = point.case, replace(point.case, grid=keep_end(point.case.grid))
         done = study.attempt_here(timed)
         if isinstance(done, Success) and isinstance(point.done, Success):
-            apart = float(angle_between(point.done.trajectory.R_WB[-1], done.trajectory.R_WB[-1]))
-            if apart > max(point.errors[Measure.ATTITUDE_MAX], SAME):
-                done = Outcome(OutcomeKind.SKIPPED, f"without samples it ends {apart:.1g} rad from the run with known errors")
+            same = check_end(point.done.trajectory, done.trajectory, point.errors[Measure.ATTITUDE_MAX])
+            done = done if same.ok else same
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.TIME, math.nan), done)
         else:

@@ -61,7 +61,9 @@ def test_a_finer_setting_with_a_larger_error_disqualifies_a_coarser_one(errors, 
             yield LinePoint(case, Outcome(OutcomeKind.TIMEOUT) if math.isnan(error) else None, {Measure.ATTITUDE_MAX: error})
 
     monkeypatch.setattr(each_step, "measure_line", measure)
-    monkeypatch.setattr(each_step, "time_chosen", lambda study, chosen, _: iter([[round(GRID.dt / c.grid.dt) for c in chosen]]))
+    monkeypatch.setattr(
+        each_step, "time_chosen", lambda study, chosen, _: iter([[round(GRID.dt / c.case.grid.dt) for c in chosen]])
+    )
     *_, chosen = each_step.findings(Study("each_step", (SCENE,), (cv.Gauss(),), quick=True, truth=truth), lambda *_: None)
     assert chosen == ([] if expected is None else [STEPS[expected]])
 

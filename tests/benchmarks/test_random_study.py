@@ -41,7 +41,7 @@ def rows():
 
 def made_up(name, error, spent):
     """Return a point of a line without a run."""
-    return TimedSetting(Case("random", SCENE, method(name), Grid(0.1, 12)), error, spent)
+    return TimedSetting(Case("random", SCENE, method(name), Grid(0.1, 12)), error, spent, None)
 
 
 def line_of(value, quick=False):
@@ -161,7 +161,7 @@ def test_the_timed_motion_is_the_one_whose_errors_are_read(monkeypatch):
     monkeypatch.setattr(random, "prepare_unchecked", lambda case: prepared.append(case) or real(case))
     point = line_of(METHODS[0])[3]
     with Processes() as processes:
-        (row,) = random.time_rows(study, [TimedSetting(point, 1e-6, 1e-6)], processes)
+        (row,) = random.time_rows(study, [TimedSetting(point, 1e-6, 1e-6, METHODS[0].solve(BODY, point.grid))], processes)
     assert [case.grid for case in prepared] == [Grid(point.grid.dt, point.grid.n_steps, point.grid.n_steps)]
     assert prepared[0].grid.dt * prepared[0].grid.n_steps == pytest.approx(BODY.t_end)
     assert row.value > 0

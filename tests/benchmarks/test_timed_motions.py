@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import processes
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
 from conservative.benchmarks.studies import speed, studies
@@ -104,6 +106,36 @@ def test_a_study_times_the_motion_that_it_credits(name):
     assert {key[1].partition(":")[0] for key in timed} == {"gauss", "taylor"}
     if not declared.draw:
         assert_over(SCENE.t_end)
+
+
+class Elsewhere(cv.Gauss):
+    """A method that ends 0.1 rad elsewhere if samples are not asked for."""
+
+    conserves = frozenset()
+
+    def prepare(self, scene, grid):
+        run = super().prepare(scene, grid)
+
+        def elsewhere():
+            done = run()
+            turned = np.stack([done.R_WB[0], done.R_WB[-1] @ rotation_about([0, 0, 1], 0.1)])
+            return replace(done, R_WB=turned) if len(done.t) == 2 else done
+
+        return elsewhere
+
+
+@pytest.mark.parametrize("name", ["work_precision", "each_step", "random"])
+def test_a_run_that_ends_elsewhere_is_not_timed(name):
+    declared = studies.STUDIES[name]
+    study = (
+        declared.plan((Elsewhere(),), quick=True, bodies=1)
+        if declared.draw
+        else declared.plan((Elsewhere(),), (SCENE,), quick=True)
+    )
+    study = replace(study, scenes=study.scenes[:1], drawn=study.drawn[:1], truth=truth)
+    rows = [row for row in studies.findings(study) if row.measure in (Measure.TIME, Measure.TIME_SAMPLED)]
+    assert not timed
+    assert any("0.1 rad" in row.outcome.reason for row in rows), [row.outcome for row in rows]
 
 
 def test_versions_of_an_engine_are_timed_over_the_scene():
