@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -57,8 +58,13 @@ def render(document: Document, folder: Path, png: bool) -> None:
     """Write report.md with its pictures, and the page."""
     from .document import html, markdown
 
+    names = dict[str, str]()
+
     def draw(figure: Figure) -> str:
-        return save_picture(figure.picture, folder / figure.name, png)
+        name = re.sub(r"[^\w+=,-]", "_", figure.name)  # a scene's parameters have points, and a suffix starts at the last one
+        while names.setdefault(name, figure.name) != figure.name:
+            name += "_"
+        return save_picture(figure.picture, folder / name, png)
 
     files.write_text(folder / "report.md", markdown.render(document, draw), "out")
     files.write_text(folder / "index.html", html.render(document), "out")

@@ -9,6 +9,7 @@ import pytest
 import vl_convert
 
 from conservative.outcome import OK
+from conservative.reports import report
 from conservative.reports.charts import figures, vega_embed
 from conservative.reports.document import html, markdown, terminal, text
 from conservative.reports.document.model import (
@@ -223,3 +224,15 @@ def test_data_are_short_and_exact_to_their_digits():
     data = vega_embed.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
     assert data["values"].splitlines() == ["name,x", '"a, b",0.3333333', "c,1e-17"]
     assert data["format"]["parse"] == {"x": "number"}
+
+
+def test_pictures_of_scenes_with_parameters_have_files_of_their_own(tmp_path, monkeypatch):
+    """`brick_flip:t_end=0.5` and `t_end=0.7` had one file, because a suffix starts at the last point."""
+    saved = []
+    monkeypatch.setattr(
+        report, "save_picture", lambda chart, path, png: saved.append(path.with_suffix(".svg").name) or saved[-1]
+    )
+    names = ["a:t_end=0.5", "a:t_end=0.7", "a_t_end=0_7", "a:t_end=0.5"]
+    figures = [Figure(name, "title", "", picture=object()) for name in names]
+    report.render(Document("c", "t", [Section("s", figures, "s")]), tmp_path, png=False)
+    assert saved == ["a_t_end=0_5.svg", "a_t_end=0_7.svg", "a_t_end=0_7_.svg", "a_t_end=0_5.svg"]
