@@ -172,7 +172,7 @@ CALLS: dict[str, tuple[str, Grid, Script]] = {
 
 
 def prepare(method: str, grid: Grid) -> Callable[[], Any]:
-    """Return what studies time of a method."""
+    """Return the loop of a method that studies time."""
     run: Any = registry.method(method).prepare(SCENE, grid)
     assert run().ok
     own_loop: Callable[[], Any] = run.own_loop

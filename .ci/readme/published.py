@@ -35,7 +35,7 @@ def read_figures() -> list[dict[str, str]]:
 
 
 def compare(relation: str, printed: str, measured: str) -> Comparison:
-    """Return how measured numbers compare with printed ones, both as decimals with spaces between them.
+    """Compare measured numbers with printed ones, both decimals with spaces between them.
 
     A bound has to hold. Any other number may differ from the printed one by a unit of the last printed digit, because programs
     round digits or cut them off. That is the only tolerance.
@@ -51,7 +51,7 @@ def compare(relation: str, printed: str, measured: str) -> Comparison:
 
 
 def render_counts() -> str:
-    """Return how many figures there are, agree, differ and cannot be measured."""
+    """Return a sentence with the numbers of figures that agree, differ and cannot be measured."""
     figures = read_figures()
     found = [compare(row["relation"], row["printed"], row["measured"]) for row in figures if row["measured"]]
     agree = sum(each.agrees for each in found)

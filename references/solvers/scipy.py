@@ -106,7 +106,7 @@ class SciPy(Method):
         axes = principal_axes(scene)
         rate_scale = np.sqrt(2 * scene.energy_scale / axes.J.max())  # above 0 even for a scene that starts at rest
         if self.loop == "python":
-            solver: Solver = SolveIvp(self.integrator, self.rtol, self.rtol * np.repeat([1.0, rate_scale], [4, 3]))
+            solver: SolveIvp | Ode = SolveIvp(self.integrator, self.rtol, self.rtol * np.repeat([1.0, rate_scale], [4, 3]))
         else:
             solver = Ode(self.integrator, self.rtol, self.rtol * min(1.0, rate_scale), LONG / rate_scale)
         pieces = list_derivatives(scene, float(grid.t[-1]), last=grid.last)
@@ -141,7 +141,7 @@ def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0, last: flo
     return [(a, b, state_derivative(scene, window)) for (a, b), window in zip(pairwise(ends), windows, strict=False)]
 
 
-def solve_pieces(scene: Scene, pieces: Pieces, t: Array, solver: Solver) -> tuple[Array, Counters, str]:
+def solve_pieces(scene: Scene, pieces: Pieces, t: Array, solver: SolveIvp | Ode) -> tuple[Array, Counters, str]:
     """Return states (n, 7), a quaternion and rates in principal axes, at increasing times t (n,), s, from a solver.
 
     `pieces` are those of `list_derivatives`: the solver starts again in each. The integrated rates are J^-1 (J w + h): a motor
@@ -176,26 +176,20 @@ def initial_state(axes: EngineAxes) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Solver:
-    """One of SciPy's integrators with tolerances."""
+class Settings:
+    """One of SciPy's integrators with tolerances.
+
+    Its subclasses have two loops. `march` returns states (n, 7) at times t of a span, s, the numbers of steps and evaluations,
+    and the reason if they end early; `f` is smooth in the span, and steps are at most `longest`, s. `bind` returns the loop as
+    users write it, for a run that does not fail.
+    """
 
     integrator: str
     rtol: float = _SMALLEST_RTOL
     atol: Any = _SMALLEST_RTOL
 
-    def march(self, f: Derivative, span: tuple[float, float], y: Array, t: Array, longest: float) -> tuple[Array, Any, str]:
-        """Return states at times t of a span, s, the numbers of steps and evaluations, and the reason if they end early.
 
-        `f` is smooth in the span; steps are at most `longest`, s.
-        """
-        raise NotImplementedError
-
-    def bind(self, f: Derivative, y: Array, t: Array, longest: float) -> Callable[[], Any]:
-        """Return the same as a loop as users write it, for a run that does not fail."""
-        raise NotImplementedError
-
-
-class SolveIvp(Solver):
+class SolveIvp(Settings):
     """`scipy.integrate.solve_ivp`."""
 
     def march(self, f: Derivative, span: tuple[float, float], y: Array, t: Array, longest: float) -> tuple[Array, Any, str]:
@@ -215,7 +209,7 @@ class SolveIvp(Solver):
 
 
 @dataclass(frozen=True, eq=False)
-class Ode(Solver):
+class Ode(Settings):
     """`scipy.integrate.ode`, whose loops are compiled. The pace of the first steps is checked in spans from `slow` s on."""
 
     slow: float = math.inf
