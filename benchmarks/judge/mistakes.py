@@ -183,7 +183,10 @@ def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rat
     """Return the state after rates with so many corrections of their torque, then attitudes by old, new or mean rates."""
     new = y.copy()
     for _ in range(rates):
+        before = new[4:].copy()
         new[4:] = y[4:] + h * f(t, new)[4:]
+        if np.abs(new[4:] - before).max() <= 2e-16 * np.abs(y[4:]).max():
+            break
     with_rates = {"old": y[4:], "new": new[4:], "mean": (y[4:] + new[4:]) / 2}[use]
     if exact:
         new[:4] = _rotate(y[:4], h * with_rates)
@@ -215,7 +218,9 @@ def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: f
 def _trapezoid(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
     new, slope = y, f(t, y)
     for _ in range(60):
-        new = y + h / 2 * (slope + f(t + h, new))
+        before, new = new, y + h / 2 * (slope + f(t + h, new))
+        if np.abs(new - before).max() <= 2e-16 * np.abs(y).max():
+            break
     return new
 
 

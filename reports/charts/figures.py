@@ -105,7 +105,7 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
 
 
 def judged(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
-    """Return errors and drifts of a recorded motion, from `diagnose.judge`, a panel for each quantity, beside its limit."""
+    """Return errors and drifts of a recorded motion, from `verdict.judge`, a panel for each quantity, beside its limit."""
     panels = []
     shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))[rows["t"] > rows["t"].min()]
     for kind, part in shown.groupby("quantity", sort=False):

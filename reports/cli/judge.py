@@ -56,7 +56,7 @@ def judge(
     is right, 1 if it is wrong, and 3 if its rows do not decide.
     """
     from conservative import registry
-    from conservative.benchmarks.judge import diagnose, table
+    from conservative.benchmarks.judge import table, verdict
 
     from ..sections.judge import build
     from ..terminal.progress import show_waiting
@@ -65,7 +65,7 @@ def judge(
     files = [name for name in FILES if drawn or not name.endswith("svg")]
     with output_files(out, files) as write, show_waiting(f"judging {run.name}", line=True) as step:
         recording = table.read(run, table.Options(world=rates == "world", **reading))
-        summary, rows = diagnose.judge(registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what))
+        summary, rows = verdict.judge(registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what))
         document = build(summary, run.name)
         write(document, csv=lambda: table_text(rows), svg=lambda: picture(summary, rows, run.name))
     show(document, as_json, silent=True)

@@ -19,7 +19,7 @@ def render(data: Any, indent: int = 2) -> str:
 def plain(value: Any) -> Any:
     """Return data as JSON can hold it: dataclasses as dictionaries, enums as values, NaN and infinity as null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.repr}
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):

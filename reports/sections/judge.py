@@ -14,7 +14,7 @@ LISTED = 12
 
 
 def build(summary: Mapping[str, Any], name: str) -> Document:
-    """Return the document of `diagnose.judge` on the file `name`."""
+    """Return the document of `verdict.judge` on the file `name`."""
 
     def amount(errors: Sequence[float]) -> str:
         units = zip(errors, summary["units"], strict=True)
@@ -25,9 +25,12 @@ def build(summary: Mapping[str, Any], name: str) -> Document:
     verdict += {"error": " by --error.", "digits": " by its digits.", "noise": " by its noise."}[summary["by"]]
     sentences = [verdict, *([f"{summary['shape']}."] if summary["shape"] else [])]
     if summary["by"] == "noise" and max(summary["noise"]) > 0:
-        sentences.append(
-            f"The noise of an axis is {amount(summary['noise'])}; the first row alone is off by {amount(summary['first row'])}."
-        )
+        sentence = f"The noise of an axis is {amount(summary['noise'])}"
+        if max(summary["first row"]) > 0:
+            sentence += (
+                f"; from the first row alone the motion is off by {amount(summary['first row'])}, so its start is fitted"
+            )
+        sentences.append(f"{sentence}.")
     if summary["undecided"]:
         sentences.append(f"{summary['undecided']}.")
     proven = [summary["diagnosis"]] if summary["diagnosis"] else summary["equally good"]
@@ -37,11 +40,7 @@ def build(summary: Mapping[str, Any], name: str) -> Document:
     ]
     reasons = [f"{each.sentence}.{more}" for each, more in zip(proven, left, strict=True)]
     candidates = [f"{each.sentence}: leaves {amount(each.left)} of {amount(each.plain)}" for each in summary["candidates"]]
-    heading = (
-        "These explain the file equally well; more rows, or a column that the file lacks, would separate them:"
-        if len(proven) > 1
-        else ""
-    )
+    heading = "These explain the file equally well:" if len(proven) > 1 else ""
     unproven = (
         ("No known mistake explains the error" + (": none of these candidates is proven." if candidates else "."))
         if summary["verdict"] == "wrong" and not proven

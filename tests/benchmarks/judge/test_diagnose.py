@@ -5,8 +5,8 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge.diagnose import judge
 from conservative.benchmarks.judge.table import Recording
+from conservative.benchmarks.judge.verdict import judge
 
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
 

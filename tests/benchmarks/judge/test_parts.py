@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge.diagnose import judge
 from conservative.benchmarks.judge.table import Recording
+from conservative.benchmarks.judge.verdict import judge
 from conservative.errors import BadInput
 from conservative.flight import rotation_only
 from conservative.grid import Grid

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge.diagnose import judge
 from conservative.benchmarks.judge.table import CHUNK, Options, Recording, read
+from conservative.benchmarks.judge.verdict import judge
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
 

@@ -1,0 +1,227 @@
+"""Rows of a recorded motion beside the motion of a scene: errors, noise, and fits of initial states and other numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array, to_quaternion
+from conservative.scene import Scene
+
+from .motion import Equations, States, closed, truth
+
+SIGMAS = 7.0  # of noise, that the largest error may have
+LONGEST = 100.0  # rad that are explained
+LINEAR = 0.3  # rad, differences of motions that are taken as small
+PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
+Solution = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""From initial attitudes (B, 3, 3), rates (B, 3) and other numbers (B, k) to motions (B, n, 3, 3), (B, n, 3)."""
+
+
+def take_rows(data: States, rows: Any) -> States:
+    """Return some rows of a motion."""
+    return None if data[0] is None else data[0][rows], None if data[1] is None else data[1][rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Rows of a file and the scene whose motion they should be, from its initial state at `start`, s.
+
+    `allowed` and `noise` (2,) are errors of attitudes, rad, and rates, relative to `scale`, rad/s. `free` says which of six
+    numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
+    the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. A search ends at the
+    time `limit`, s, of the monotonic clock.
+    """
+
+    scene: Scene
+    t: Array
+    data: States
+    start: float
+    scale: float
+    allowed: Array
+    noise: Array
+    free: tuple[int, ...] = ()
+    growth: float = 1e6
+    stride: int = 1
+    limit: float = math.inf
+
+    def take(self, rows: Any) -> Compared:
+        """Return some of the rows."""
+        return replace(self, t=self.t[rows], data=take_rows(self.data, rows))
+
+    def first(self, angle: float, least: int) -> Compared:
+        """Return the rows in which the body turns by an angle, rad, or at least so many."""
+        return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
+
+    def read(self, R: Array | None, w: Array | None) -> Compared:
+        """Return the case of other attitudes and rates, from the first row on."""
+        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None and self.start == self.t[0]}
+        return replace(self, scene=self.scene.rename(self.scene.name, **changes), data=(R, w))
+
+    @cached_property
+    def exact(self) -> tuple[Array, Array]:
+        """The exact motion at the times of the rows."""
+        return truth(self.scene, self.start, self.t)
+
+    @cached_property
+    def error(self) -> Array:
+        """The errors (2, n) of the rows against the exact motion."""
+        return self.errors(*self.exact)
+
+    @cached_property
+    def plain(self) -> Array:
+        """The largest errors (2,) without a mistake: from the first row, or from a start that is fitted if it has noise."""
+        if not self.free or self.passes(self.error):
+            return self.error.max(axis=1)
+        fitted = self.fit(exact(self), np.zeros(0), np.zeros(0))[2]
+        return np.minimum(self.error.max(axis=1), self.errors(*fitted).max(axis=1))
+
+    def differences(self, R: Array, w: Array) -> Array:
+        """Return motions (..., n, 3, 3), (..., n, 3) minus the data, (..., n, 12), rad and relative; 0 where there are none."""
+        out = np.zeros((*w.shape[:-1], 12))
+        if self.data[0] is not None:
+            out[..., :9] = (R - self.data[0]).reshape(*w.shape[:-1], 9) / np.sqrt(2)
+        if self.data[1] is not None:
+            out[..., 9:] = (w - self.data[1]) / self.scale
+        return np.clip(np.nan_to_num(out, nan=1e3), -1e3, 1e3)
+
+    def errors(self, R: Array, w: Array) -> Array:
+        """Return the sizes (2, n) of differences: angles between attitudes, rad, and differences of rates."""
+        d = self.differences(R, w)
+        return np.stack(
+            [2 * np.arcsin(np.minimum(np.linalg.norm(d[..., :9], axis=-1) / 2, 1)), np.linalg.norm(d[..., 9:], axis=-1)]
+        )
+
+    def passes(self, error: Array) -> bool:
+        """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
+        n = error.shape[1]
+        mean = np.sqrt((error**2).mean(axis=1))
+        noisy = self.noise * SIGMAS > 0.5 * self.allowed
+        most = np.where(noisy, 1.3 * np.sqrt(3) * (1 + 3 / np.sqrt(n)) * self.noise, self.allowed)
+        return bool((error.max(axis=1) <= self.allowed).all() and (mean <= most).all())
+
+    def size(self, error: Array) -> float:
+        """Return the root of the mean square of errors, in units of the noise."""
+        return float(np.sqrt((error**2).mean(axis=1) / self.noise**2).max())
+
+    def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
+        """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
+        turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
+        return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:])
+
+    def deviations(self, motion: Solution, found: Array, small: float) -> Array:
+        """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""
+        moved = [*self.free, *range(6, len(found))]
+        R, w = self.evaluate(motion, found + small * np.vstack([0 * found, np.eye(len(found))[moved]]))
+        d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
+        slopes, out = (d[1:] - d[0]) / small, np.zeros(len(found))
+        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        return out
+
+    def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:
+        """Return initial numbers (6,), other numbers (k,), and the motion that fit the rows best (Levenberg and Marquardt).
+
+        The fit starts at `extra` and at the initial state of the scene, and takes more and more of the rows. `changed` are the
+        small changes of the other numbers, for slopes.
+        """
+        free = list(self.free)
+        p, weights = np.concatenate([np.zeros(6), extra]), 1 / np.repeat(self.noise, [9, 3])
+        moved = [*free, *range(6, 6 + len(extra))]
+        small = np.concatenate([np.full(6, 1e-6), changed])
+        n = len(self.t)
+
+        evaluate = partial(self.evaluate, motion)
+        rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
+        found = evaluate(p[None])
+        for k in rows if moved else ():
+            damping, (R, w) = 1e-6, found
+            now = (self.differences(R, w)[0] * weights)[:k].ravel()
+            for _ in range(most):
+                if monotonic() > self.limit:
+                    break
+                R, w = evaluate(p + np.concatenate([small * np.eye(6 + len(extra))[i][None] for i in moved]))
+                slopes = ((self.differences(R, w) * weights)[:, :k].reshape(len(moved), -1) - now) / small[moved][:, None]
+                better = False
+                while damping < 1e3 and not better:
+                    normal = slopes @ slopes.T
+                    step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-300), -slopes @ now, rcond=1e-15)[0]
+                    q = p.copy()
+                    q[moved] += step
+                    R, w = evaluate(q[None])
+                    new = (self.differences(R, w)[0] * weights)[:k].ravel()
+                    better = bool(new @ new < now @ now)
+                    damping = damping / 30 if better else max(damping, 1e-6) * 30
+                if not better:
+                    break
+                gain = 1 - (new @ new) / (now @ now)
+                p, now, found = q, new, (R, w)
+                if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
+                    break
+        return p[:6], p[6:], (found[0][0], found[1][0])
+
+    def at(self, initial: Array) -> Compared:
+        """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
+        R0, w0 = self.scene.R_WB0 @ Rotation.from_rotvec(initial[:3]).as_matrix(), self.scene.w_WB_B0 + initial[3:] * self.scale
+        return replace(self, scene=self.scene.rename(self.scene.name, R_WB0=R0, w_WB_B0=w0))
+
+
+def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
+    """Return motions (..., n) minus another one (n), (..., n, 6): turns in body axes, rad, and relative rates."""
+    turn = np.nan_to_num(np.swapaxes(R0, -1, -2) @ R) + 0.0
+    turn[np.abs(np.linalg.det(turn)) < 0.5] = np.eye(3)
+    vector = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
+    return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
+
+
+def linearise(case: Compared) -> tuple[Array, Array, Array]:
+    """Return the exact motion (n, 3, 3), (n, 3), and the matrices (n, 6, 6) that carry small changes of its start along."""
+    turns, shifts = np.split(np.vstack([np.zeros(6), PERTURBED * np.eye(6)]), 2, axis=1)
+    R0 = case.scene.R_WB0 @ Rotation.from_rotvec(turns).as_matrix()
+    R, w = exact(case)(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)))
+    return R[0], w[0], np.moveaxis(differ(R[0], w[0], R[1:], w[1:], case.scale), 0, -1) / PERTURBED
+
+
+def exact(case: Compared) -> Solution:
+    """Return the exact motion as a function of initial states."""
+
+    def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
+        if closed(case.scene) and (case.t[-1] - case.start) * case.scale > 3 * LONGEST:
+            each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, case.t) for a, b in zip(R, w, strict=True)]
+            return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
+        return Equations(case.scene).solve(case.start, R, w, case.t)
+
+    return motion
+
+
+def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
+    """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
+
+    It is the smallest robust estimate from differences of order 3 to 9. Of a smooth motion they fall with each order, and those
+    of noise do not.
+    """
+    noise, resolved = np.zeros(2), np.zeros(2, bool)
+    for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
+        if values is None or len(t) < 14:
+            continue
+        x = values
+        if i == 0:
+            x = to_quaternion(values)
+            x = x * np.cumprod(np.append(1.0, np.sign(np.sum(x[1:] * x[:-1], axis=1)) + 0.0))[:, None]
+        found = []
+        for order in range(3, 10):
+            near = np.stack([t[k : len(t) - order + k] for k in range(order + 1)])
+            gaps = near[:, None] - near[None] + np.eye(order + 1)[:, :, None] * np.ptp(near, axis=0)
+            weights = 1 / np.prod(gaps / np.ptp(near, axis=0), axis=1)
+            weights = weights / np.sqrt((weights**2).sum(axis=0))
+            d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
+            found.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
+        noise[i] = min(found)
+        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < 1e-11
+    return noise, resolved

@@ -1,0 +1,193 @@
+"""The search for the integrator and the step that made a recorded motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, to_quaternion
+
+from .compared import LINEAR, Compared, Solution, differ, linearise
+from .explanation import HOPELESS, Explanation, attempt
+from .mistakes import STEPS, Step
+from .motion import Equations, truth
+
+STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows
+
+
+@dataclass(frozen=True, eq=False)
+class Slope:
+    """The derivative of states (7, n), at one time or at a time for each of them, s."""
+
+    equations: Equations
+    known: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def body(self) -> Any:
+        return self.equations.scene.body
+
+    def __call__(self, t: Any, y: Array) -> Array:
+        if self.equations.steady:
+            if "slope" not in self.known:
+                self.known["slope"] = self.equations.at(np.zeros(1))
+            return self.known["slope"](y[:, :, None])[:, :, 0]
+        if np.ndim(t) == 0:
+            return self.equations.at(np.array([t]))(y[:, :, None])[:, :, 0]
+        return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+
+
+def march(case: Compared, method: Step, parts: int) -> Solution:
+    """Return the motion by a method with so many steps between two rows, which are equally far apart."""
+    equations = Equations(case.scene)
+    f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
+
+    def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
+        y, past, kept = equations.pack(case.start, R, w), list[Array](), list[Array]()
+        last, wanted = int(count_gaps(case)[-1]) * parts, set((count_gaps(case) * parts).tolist())
+        with np.errstate(all="ignore"):
+            for number in range(last + 1):
+                if number % 256 == 0 and monotonic() > case.limit:
+                    kept += [y * np.nan] * (len(case.t) - len(kept))
+                    break
+                if number in wanted:
+                    kept.append(y)
+                if number < last:
+                    new = method.next(f, case.start + number * h, y, h, past)
+                    past = [y, *past][: method.past]
+                    y = new
+                    if method.normalised:
+                        y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
+            return equations.states(np.stack(kept, axis=2), case.t)
+
+    return motion
+
+
+def count_gaps(case: Compared) -> Any:
+    """Return the numbers of the rows, counted in the least distance of two."""
+    return np.rint((case.t - case.start) / np.diff(case.t).min()).astype(int)
+
+
+def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
+    """Yield motions by methods with a step that divides the distance of the rows.
+
+    The steps are found from errors to first order: those that a method makes between two rows, from the exact state, are
+    carried along by the exact motion. The best methods then run from the first row.
+    """
+    numbers, gaps = count_gaps(case), np.diff(case.t)
+    if case.data[0] is not None and case.data[1] is not None and case.error[1].max() <= case.allowed[1]:
+        return  # no method has exact rates
+    if np.abs(case.t - case.start - numbers * (case.t[-1] - case.start) / numbers[-1]).max() > 1e-3 * gaps.min():
+        return
+    if numbers[-1] > 2 * STEPS_AT_MOST or numbers[0] > 0 or len(case.t) < 3:
+        return
+    case = case.take(slice(0, int(np.searchsorted(numbers, STEPS_AT_MOST))))
+    if np.ptp(np.diff(count_gaps(case))) > 0:  # rows of which only some were written
+        return
+    linear = Linearised(case)
+    ranked = sorted(((*linear.best(method), name) for name, method in STEPS.items()), key=lambda each: each[0])
+    proven = False
+    for left, parts, name in ranked[:5]:
+        if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
+            continue
+        if monotonic() > case.limit:
+            return
+        for count in sorted({parts, *linear.others(STEPS[name], parts)}, key=lambda n: abs(n - parts)):
+            for most in (2000, STEPS_AT_MOST):  # steps
+                some = case.take(slice(0, max(4, most // count)))
+                if len(some.t) < len(case.t) and (some.plain <= some.allowed).all():
+                    continue  # these rows do not differ from the exact motion
+                step = float(gaps.mean()) / count
+                text = f"The rows follow {name} with a step of {step:.4g} s"
+                found = replace(attempt(some, name, text, march(some, STEPS[name], count)), values={"step": step}, numbers=1)
+                if found.share > 0.5 or len(some.t) == len(case.t):
+                    break
+            yield found
+            if found.explains:
+                proven = True
+                break
+
+
+class Linearised:
+    """The rows' differences from the exact motion, and those that a method makes, to first order."""
+
+    def __init__(self, case: Compared) -> None:
+        self.case, equations = case, Equations(case.scene)
+        self.R, self.w, self.flow = linearise(case)
+        data = self.R if case.data[0] is None else case.data[0], self.w if case.data[1] is None else case.data[1]
+        self.wanted = differ(self.R, self.w, *data, case.scale)
+        size = np.linalg.norm(self.wanted, axis=1)
+        self.used = int(np.argmax(size > LINEAR)) if (size > LINEAR).any() else len(size)
+        self.used = max(self.used, min(len(size), 8))
+        have = [x is not None for x in case.data]
+        self.weights = np.repeat(np.array(have) / case.noise, 3)
+        self.f, self.equations = Slope(equations), equations
+        self.inverse = np.linalg.pinv(self.flow[: self.used])
+        self.made: dict[tuple[int, int], Array] = {}
+        free = list(case.free) if (case.error.max(axis=1) <= HOPELESS * case.noise * case.growth).any() else []
+        self.starts = np.stack([(self.flow[: self.used, :, k] * self.weights).ravel() for k in free], axis=1) if free else None
+        self.wanted = self.beside_start(self.wanted)
+
+    def errors(self, method: Step, parts: int) -> Array:
+        """Return the errors (n, 6) of a method in the rows that are used."""
+        if (id(method), parts) in self.made:
+            return self.made[id(method), parts]
+        case, n = self.case, self.used
+        t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
+        y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
+        past: list[Array] = []
+        for back in range(1, method.past + 1):
+            a, b = truth(case.scene, case.start, np.maximum(t - back * h, case.start))
+            past.append(np.concatenate([to_quaternion(a).T, b.T + self.equations.wheel(t)]))
+            past[-1][:4] *= np.sign((past[-1][:4] * y[:4]).sum(axis=0))
+        first, before = y[:, :1], list[Array]()  # a method begins without a past
+        with np.errstate(all="ignore"):
+            for number in range(parts):
+                new = method.next(self.f, t + number * h, y, h, past)
+                past, y = [y, *past][: method.past], new
+                if method.past:
+                    new = method.next(self.f, t[:1] + number * h, first, h, before)
+                    first, before = new, [first, *before][: method.past]
+            y[:, :1] = first if method.past else y[:, :1]
+            a, b = self.equations.states(y[:, None], case.t[1:n])
+        defect = differ(self.R[1:n], self.w[1:n], a[0], b[0], case.scale)
+        carried = np.cumsum((self.inverse[1:n] @ defect[..., None])[..., 0], axis=0)
+        found = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
+        self.made[id(method), parts] = found
+        return found
+
+    def beside_start(self, differences: Array) -> Array:
+        """Return weighted differences without the part that a fitted start explains."""
+        x = (differences[: self.used] * self.weights).ravel()
+        return x if self.starts is None else x - self.starts @ np.linalg.lstsq(self.starts, x, rcond=None)[0]
+
+    def share(self, method: Step, parts: int) -> tuple[float, float]:
+        """Return the share of the differences that a method leaves, and the factor by which its errors fit best."""
+        made = self.beside_start(self.errors(method, parts))
+        left, size = np.linalg.norm(self.wanted - made), np.linalg.norm(self.wanted)
+        return float(left / (size or 1.0)), float(made @ self.wanted / (made @ made or 1.0))
+
+    def best(self, method: Step) -> tuple[float, int]:
+        """Return the smallest share that a method leaves, and its number of steps between two rows."""
+        found, parts = dict[int, float](), self.case.stride
+        while parts not in found and len(found) < 8:
+            found[parts], factor = self.share(method, parts)
+            if factor <= 0:
+                break
+            parts = int(
+                np.clip(
+                    np.rint(parts * max(factor, 1e-12) ** (-1 / method.order)),
+                    1,
+                    max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used)),
+                )
+            )
+        return min((left, n) for n, left in found.items())
+
+    def others(self, method: Step, parts: int) -> list[int]:
+        """Return the numbers of steps next to the best one that leave almost as little."""
+        near = [n for n in (parts - 1, parts + 1) if n >= 1]
+        best = self.share(method, parts)[0]
+        return [n for n in near if self.share(method, n)[0] < max(1.5 * best, best + 0.1)]
