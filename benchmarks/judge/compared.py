@@ -18,7 +18,7 @@ from conservative.scene import Scene
 from .motion import Equations, States, closed, truth
 
 SIGMAS = 7.0  # of noise, that the largest error may have
-LONGEST = 100.0  # rad that are explained
+LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 LINEAR = 0.3  # rad, differences of motions that are taken as small
 PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
 Solution = Callable[[Array, Array, Array], tuple[Array, Array]]
@@ -75,10 +75,15 @@ class Compared:
         """The errors (2, n) of the rows against the exact motion."""
         return self.errors(*self.exact)
 
+    @property
+    def turned(self) -> float:
+        """The angle, rad, by which the body may have turned."""
+        return float(self.t[-1] - self.start) * self.scale
+
     @cached_property
     def plain(self) -> Array:
         """The largest errors (2,) without a mistake: from the first row, or from a start that is fitted if it has noise."""
-        if not self.free or self.passes(self.error):
+        if not self.free or self.passes(self.error) or self.turned > NUMERICAL:
             return self.error.max(axis=1)
         fitted = self.fit(exact(self), np.zeros(0), np.zeros(0))[2]
         return np.minimum(self.error.max(axis=1), self.errors(*fitted).max(axis=1))
@@ -192,7 +197,7 @@ def exact(case: Compared) -> Solution:
     """Return the exact motion as a function of initial states."""
 
     def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
-        if closed(case.scene) and (case.t[-1] - case.start) * case.scale > 3 * LONGEST:
+        if closed(case.scene) and case.turned > 3 * LONGEST:
             each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, case.t) for a, b in zip(R, w, strict=True)]
             return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
         return Equations(case.scene).solve(case.start, R, w, case.t)

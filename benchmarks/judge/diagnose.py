@@ -16,7 +16,7 @@ from conservative.attitude import Array
 from conservative.needs import Need
 
 from . import mistakes
-from .compared import LINEAR, LONGEST, Compared, Solution, exact
+from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
 from .explanation import Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
 from .motion import Equations, closed, truth
@@ -45,13 +45,14 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     that leave as little. A candidate leaves less than half of the error. Mistakes that make attitudes or rates worse than they
     are have no place in either. `quaternion` is True if the order of quaternions can be wrong.
     """
-    case = whole.first(LONGEST, FEWEST)
+    units = [*_units(whole.first(LONGEST, FEWEST))] if closed(whole.scene) else []
+    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
     case = replace(case.take(slice(None, None, stride)), stride=stride, limit=monotonic() + LIMIT)
-    tried: list[Explanation] = []
-    for name, search in SEARCHES.items():
+    tried = units
+    for name, search in SEARCHES.items() if len(case.t) > 3 and not any(each.explains for each in units) else ():
         tell(name)
         for each in search(case, quaternion):
             tried.append(each)
@@ -121,6 +122,14 @@ def _by(case: Compared, equations: Equations) -> Solution:
     return motion
 
 
+def _units(case: Compared) -> Iterator[Explanation]:
+    """Yield times in other units than seconds."""
+    for size in (1e-3, 1e-6, 1e-9, 60.0):
+        if case.turned * size < 2 * LONGEST and not case.scene.loads:
+            read = replace(case, t=case.start + (case.t - case.start) * size)
+            yield attempt(case, f"time in {size:g} s", f"The times are in units of {size:g} s", exact(read), read=read)
+
+
 def _times(case: Compared, _: bool) -> Iterator[Explanation]:
     """Yield the right states at other times: shifted, in proportion, with rows missing, jittered, or rates apart."""
     later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
@@ -156,10 +165,6 @@ def _times(case: Compared, _: bool) -> Iterator[Explanation]:
             rest, "rates at other times", "The rates are {late:+.4g} s late against the attitudes (leapfrog: half a step)",
             moved(False), [0.0], lambda p: {"late": -float(p[0]) * unit},
         )  # fmt: skip
-    for size in (1e-3, 1e-6, 1e-9, 60.0):
-        if (case.t[-1] - case.start) * size * case.scale < 2 * LONGEST and not case.scene.loads:
-            read = replace(case, t=case.start + (case.t - case.start) * size)
-            yield attempt(case, f"time in {size:g} s", f"The times are in units of {size:g} s", exact(read), read=read)
     yield from _own_times(case, gap, end)
 
 

@@ -8,7 +8,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice, product
 from pathlib import Path
 from typing import IO, Any
@@ -24,27 +24,32 @@ from .motion import States
 ROWS, CHUNK = 2000, 50_000  # rows that are kept for fits, evenly chosen: this to twice as many; rows that are read at a time
 LOOKED = 200  # lines among which the header and the first row of numbers are
 UNITS = {
-    **dict.fromkeys(("deg/s", "deg_s", "deg", "dps", "degrees", "degree", "°", "°/s", "deg s^-1", "deg s-1"), math.pi / 180),
-    **dict.fromkeys(("rad/s", "rad_s", "rad", "radians", "rad s^-1", "rad s-1", "rad.s-1", "rad*s^-1", "1/s", "-", ""), 1.0),
+    **dict.fromkeys(
+        ("deg/s", "deg_s", "deg_sec", "deg", "dps", "degrees", "degree", "°", "°/s", "deg s^-1", "deg s-1"), math.pi / 180
+    ),
+    **dict.fromkeys(
+        ("rad/s", "rad_s", "rad_sec", "rad", "radians", "rad s^-1", "rad s-1", "rad.s-1", "rad*s^-1", "1/s", "-", ""), 1.0
+    ),
     **dict.fromkeys(("rpm", "rev/min", "r/min"), math.pi / 30) | dict.fromkeys(("s", "sec", "secs", "seconds"), 1.0),
     **dict.fromkeys(("mdps",), math.pi / 180e3) | dict.fromkeys(("mrad/s", "mrad"), 1e-3) | {"min": 60.0, "rev/s": 2 * math.pi},
     **dict.fromkeys(("ms", "msec"), 1e-3)
     | dict.fromkeys(("us", "usec", "µs", "μs"), 1e-6)
     | dict.fromkeys(("ns", "nsec"), 1e-9),
 }
-_SUFFIX = r"_(deg_s|rad_s|dps|rpm|degrees|deg|radians|rad|seconds|msec|usec|nsec|ms|us|ns|s)(?=_|$)"
+_SUFFIX = r"[_-](deg_s|rad_s|deg_sec|rad_sec|dps|rpm|degrees|deg|radians|rad|seconds|msec|usec|nsec|ms|us|ns|s)(?=_|$)"
 _AXES: tuple[Sequence[str], ...] = ("xyz", "123", "012", ("roll", "pitch", "yaw"))
 _MATRIX = tuple([row + column for row in digits for column in digits] for digits in ("123", "012"))
-_LONG = r"(.*(?:gyro(?:scope)?(?:adc)?|angular(?:velocity|rates?)|ang(?:vel|rate)|bodyrates?|omega)[a-z]*?|"
-_RATES = _LONG + r"w|wwbb|wrss|wbn|wb|wbi|gyr|rates?|rotationrate|(?=[pqr]$))"
-_QUATERNION = r"(.*(?:quat(?:ernion)?|orientation|rotation|attitude)|q|qwb|qib|qbi|qbn|qnb|qbl|qrs|epbn|rot|att)"
+_LONG = r"(.*(?:gyro(?:scope)?(?:adc)?|angular(?:velocity|rates?)|ang(?:vel|rate)|bodyrates?|rotationrates?|omega)[a-z]*?|"
+_RATES = _LONG + r"w|wwbb|wrss|wbn|wb|wbi|gyr|rates?|(?=[pqr]$))"
+_QUATERNION = r"(.*(?:quat(?:ernion)?q?|orientation|rotation|attitude)|q|qwb|qib|qbi|qbn|qnb|qbl|qrs|epbn|rot|att)"
 COLUMNS: dict[str, tuple[str, Sequence[Sequence[str]]]] = {
-    "time": (r"(.*?)(time(?:stamps?)?|secondselapsed|elapsed|seconds|secs?|t|headerstamp|stamp)", ()),
+    "time": (r"(.*?)(times?(?:stamps?)?|secondselapsed|elapsed(?:secs)?|seconds|secs?|t|headerstamp|stamp)", ()),
     "rates": (rf"{_RATES}([xyz0123pqr]|roll|pitch|yaw)", (*_AXES, "pqr")),
     "quaternion": (rf"{_QUATERNION}([wxyz0-4])", ("wxyz", "0123", "1234")),
     "matrix": (r"(r|m|c|rwb|dcm|rotation|matrix|rotmat|cbn|rotationmatrix)([0-3]{2})", _MATRIX),
     "angles": (r"(.*euler(?:angles?)?(?:deg|rad)?|angles?|(?=roll|pitch|yaw))([xyz123]|roll|pitch|yaw)", _AXES),
     "aircraft angles": (r"(.*?attitude|.*?)(phi|theta|psi)", (("phi", "theta", "psi"),)),
+    "axis and angle": (r"(axisangle|axis)([xyz123]|angle)", (("x", "y", "z", "angle"), ("1", "2", "3", "angle"))),
     "rotation vector": (r"(r|rv|rotvec|rotationvector|rvec|so3)([xyz123])", ("xyz", "123")),
     "modified Rodrigues": (r"(sigma|sigmabn|mrp|sigmabr)([123012])", ("123", "012")),
     "Rodrigues": (r"(rodrigues|crp|gibbs)([123xyz])", ("123", "xyz")),
@@ -55,6 +60,7 @@ ATTITUDES: Mapping[str, int] = {
     "matrix": 9,
     "angles": 3,
     "aircraft angles": 3,
+    "axis and angle": 4,
     "rotation vector": 3,
     "modified Rodrigues": 3,
     "Rodrigues": 3,
@@ -71,8 +77,11 @@ _STK = {
     "AttitudeTimeQuaternions": "time q_x q_y q_z q_w",
     "AttitudeTimeQuatScalarFirst": "time q_w q_x q_y q_z",
     "AttitudeTimeQuatAngVels": "time q_x q_y q_z q_w w_x_deg_s w_y_deg_s w_z_deg_s",
+    "AttitudeTimeDCM": "time R_11 R_21 R_31 R_12 R_22 R_32 R_13 R_23 R_33",
 }
-"""Column names of the tables of an STK attitude file (.a), whose rows follow the keyword."""
+"""Column names of the tables of an STK attitude file (.a), whose rows follow the keyword. Its matrices map to body axes."""
+_AEM = {"FIRST": "time q_w q_x q_y q_z", "LAST": "time q_x q_y q_z q_w"}
+"""Column names of quaternions in a CCSDS Attitude Ephemeris Message (504.0-B), by QUATERNION_TYPE."""
 
 
 @dataclass(frozen=True)
@@ -168,10 +177,6 @@ def read(path: Path, options: Options) -> Recording:
     kept: list[Array] = []
     every, rows, last = 1, 0, -math.inf
     for values in _values(path, layout, origin):
-        if not rows and len(values):
-            _guess_time(values, layout)
-            if np.isnan(layout.sizes).any():
-                _find_units(path, values, layout, options)
         rest = values[:, 1 + len(layout.used["rates"]) :]
         square = layout.attitude == "matrix"
         wrong = {
@@ -188,6 +193,9 @@ def read(path: Path, options: Options) -> Recording:
                 raise BadInput(
                     "run", f"{path}, row {rows + 1 + at}{where}: {what}", "a file in which that row is repaired or removed"
                 )
+        if not rows and len(values):
+            _guess_time(values, layout)
+            _find_units(path, values, layout, options)
         kept.append(values[-rows % every :: every])
         rows, last = rows + len(values), values[-1, 0] if len(values) else last
         while sum(map(len, kept)) > 2 * ROWS:
@@ -232,6 +240,9 @@ def _read_values(values: Array, layout: Layout, options: Options) -> tuple[Array
         R = Rotation.from_euler(sequence.upper(), rest).as_matrix()
     elif kind == "rotation vector":
         R = Rotation.from_rotvec(rest).as_matrix()
+    elif kind == "axis and angle":
+        size = np.linalg.norm(rest[:, :3], axis=1, keepdims=True)  # an angle of 0 may have an axis of 0
+        R = Rotation.from_rotvec(rest[:, 3:] * rest[:, :3] / np.where(size == 0, 1, size)).as_matrix()
     elif kind == "modified Rodrigues":
         R = Rotation.from_mrp(rest).as_matrix()
     elif kind == "Rodrigues":
@@ -306,6 +317,9 @@ def _look(path: Path) -> Layout:
             return Layout(list(_flat(json.loads(lines[0]))))
         except (ValueError, IndexError, AttributeError, TypeError):
             raise _fail(path, "its first line is not a JSON object") from None
+    keys = {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)}
+    if "CCSDS_AEM_VERS" in keys:
+        return _look_at_aem(path, keys, [line.strip() for line in lines])
     for number, line in enumerate(lines):
         if (word := line.strip()) in _STK:
             names = _STK[word].split()
@@ -330,6 +344,14 @@ def _look(path: Path) -> Layout:
             names = [word + unit for word, unit in zip(words, names or [""] * len(words), strict=True)]
             break
     return Layout(names or [str(i + 1) for i in range(len(fields))], first, separator, comma)
+
+
+def _look_at_aem(path: Path, keys: Mapping[str, str], lines: list[str]) -> Layout:
+    """Return the layout of a CCSDS Attitude Ephemeris Message with quaternions from an inertial frame to body axes."""
+    kind = keys.get("ATTITUDE_TYPE"), keys.get("QUATERNION_TYPE", "LAST"), keys.get("ATTITUDE_DIR", "A2B")
+    if kind[0] != "QUATERNION" or kind[1] not in _AEM or kind[2] != "A2B" or "DATA_START" not in lines:
+        raise _fail(path, f"a CCSDS message of {', '.join(map(str, kind))}; QUATERNION, FIRST or LAST, A2B are read")
+    return Layout(_AEM[kind[1]].split(), lines.index("DATA_START") + 1, None, end="DATA_STOP")
 
 
 def _words(line: str, separator: str | None) -> list[str]:
@@ -454,7 +476,7 @@ def _choose(path: Path, layout: Layout, options: Options) -> Layout:
     if "time" not in chosen or not (chosen.get("rates") or kinds):
         missing = "attitudes or rates" if "time" in chosen else "the time"
         raise BadInput(
-            "run", f"{path} without columns of {missing}: {_understood(names, chosen, layout)}", _hint(names, chosen)
+            "run", f"{path} without columns of {missing}: {_understood(names, chosen, layout)}", _hint(names, chosen, layout)
         )
     if kinds[:1] in (["angles"], ["aircraft angles"]):
         _sort_angles(layout, chosen, kinds[0], options)
@@ -465,10 +487,11 @@ def _choose(path: Path, layout: Layout, options: Options) -> Layout:
             continue
         usual: str | None = "s" if kind == "time" else "rad"
         texts = [_split(name)[1] for name in chosen[kind]]
-        if None in texts and kind in ("rates", "angles"):
-            usual = options.units or _usual(chosen[kind]) or None
+        if None in texts and kind in ("rates", "angles", "rotation vector"):
+            usual = options.units
             layout.notes += ["unit"] * (options.units is not None)
-        sizes = [math.nan if (unit := text or usual) is None else UNITS.get(unit, 0.0) for text in texts]
+        plain = kind not in ("time", "rates", "angles", "rotation vector")  # a unit behind a quaternion is no unit
+        sizes = [math.nan if (unit := text or usual) is None else 1.0 if plain else UNITS.get(unit, 0.0) for text in texts]
         if 0.0 in sizes:
             raise _no_unit(path, chosen[kind])
         layout.used[kind] = dict(zip(chosen[kind], sizes, strict=True))
@@ -487,7 +510,7 @@ def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options
     horizon = any(_HORIZON.search(_split(name)[0]) for name in layout.names)
     for kind in ATTITUDES.keys() & chosen.keys():
         members, reason = chosen[kind], ""
-        if not options.columns and _MOVING.search("".join(_split(name)[0] for name in members)):
+        if not options.columns and any(_MOVING.search(_split(name)[0][:-1]) for name in members):
             reason = "attitudes relative to a frame that moves are not judged"
         elif horizon and "angles" in kind and options.euler is None:
             reason = "angles to the local horizon, which moves; --euler zyx if they turn body to inertial axes"
@@ -503,31 +526,52 @@ def _no_unit(path: Path, names: Sequence[str]) -> BadInput:
 
 
 def _find_units(path: Path, values: Array, layout: Layout, options: Options) -> None:
-    """Find units that no column names from the numbers: attitudes and rates agree in one choice of units only."""
-    open_ = {kind: part for kind, part in layout.used.items() if any(map(math.isnan, part.values()))}
-    found, some = [], values[:400]
-    for sizes in product((1.0, math.pi / 180), repeat=len(open_)) if layout.attitude and layout.used["rates"] else ():
-        for part, size in zip(open_.values(), sizes, strict=True):
-            part.update(dict.fromkeys(part, size))
-        t, (R, w), _ = _read_values(some * layout.sizes, layout, options)
-        if R is None or w is None or len(t) < 2:
-            continue
-        turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
-        expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
-        found.append((float(np.linalg.norm(turned - expected) / (np.linalg.norm(turned) or 1.0)), sizes))
+    """Find units that no column names: attitudes and rates agree in one choice of units only, or their format defines them."""
+    parts, some, (time, *_) = layout.used, values[:400], layout.used["time"]
+    open_ = [kind for kind, part in parts.items() if any(map(math.isnan, part.values()))]
+    turns = some[:, 1 + len(parts["rates"]) :]
+    short = layout.attitude == "rotation vector" and np.linalg.norm(turns, axis=1).max() < 2.1 * math.pi
+    usual = [1.0 if short and kind == layout.attitude else _usual(parts[kind]) for kind in open_]
+    known = (parts["time"][time], *usual)
+    whole = _split(time)[1] is None and known[0] == 1.0 and bool((some[:, 0] == np.rint(some[:, 0])).all())
+    choices = [(1.0, 1e-3, 1e-6, 1e-9) if whole else known[:1], *[(1.0, math.pi / 180)] * len(open_)]
+    found: list[tuple[float, Any]] = []
+
+    def choose(sizes: Sequence[Any]) -> None:
+        for kind, size in zip(("time", *open_), sizes, strict=True):
+            parts[kind] = dict.fromkeys(parts[kind], size)
+
+    for sizes in product(*choices) if layout.attitude and parts["rates"] and len(some) > 2 else ():
+        choose(sizes)
+        orders = (options.quaternion,) if options.quaternion or not layout.numbered else ("wxyz", "xyzw")
+        off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
+        found.append((min(off), sizes))
     found.sort()
-    if not found or found[0][0] > 0.1 or found[1][0] < 0.5:
-        raise _no_unit(path, [*next(iter(open_.values()))])
-    for part, size in zip(open_.values(), found[0][1], strict=True):
-        part.update(dict.fromkeys(part, size))
-        unit = "rad" if size == 1.0 else "deg"
-        layout.notes.append(f"{', '.join(part)} are read in {unit}: only so do attitudes and rates agree.")
+    if len(found) > 1 and found[0][0] < 0.1 and found[1][0] > 0.5:
+        for kind, size, expected in zip(("time", *open_), found[0][1], known, strict=True):
+            if size != expected:
+                unit = f"{size:g} s" if kind == "time" else "rad" if size == 1.0 else "deg"
+                layout.notes.append(f"{', '.join(parts[kind])}: read in {unit}, because only so do attitudes and rates agree.")
+        known = found[0][1]
+    if None in known:
+        raise _no_unit(path, [*parts[open_[0]]])
+    choose(known)
 
 
-def _usual(names: Sequence[str]) -> str | None:
+def _disagreement(values: Array, layout: Layout, options: Options) -> float:
+    """Return the difference between turns from row to row and the mean rates there, relative to the smaller of them."""
+    t, (R, w), _ = _read_values(values, layout, options)
+    assert R is not None
+    assert w is not None
+    turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
+    expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
+    return float(np.linalg.norm(turned - expected) / (min(np.linalg.norm(turned), np.linalg.norm(expected)) or 1.0))
+
+
+def _usual(names: Iterable[str]) -> float | None:
     """Return the unit of columns that name none, where their format defines it: ROS, MuJoCo, Basilisk, and this package."""
-    key = _split(names[0])[0]
-    return "rad" if re.search(r"wwbb|angularvelocity[xyz]|qvel|omegabnb|sigma", key) else None
+    key = _split(next(iter(names)))[0]
+    return 1.0 if re.search(r"wwbb|angularvelocity[xyz]|qvel|omegabnb|sigma", key) else None
 
 
 def _sort_angles(layout: Layout, chosen: dict[str, list[str]], kind: str, options: Options) -> None:
@@ -557,8 +601,15 @@ def _by_name(path: Path, names: list[str], options: Options) -> dict[str, list[s
     """Return the columns of each quantity by their names."""
     chosen: dict[str, list[str]] = {}
     split = {name: _split(name)[0] for name in names}
+    if {"axisx", "axis1"} & {*split.values()}:
+        split = {name: "axisangle" if key == "angle" else key for name, key in split.items()}
     for kind, (pattern, complete) in COLUMNS.items():
         matches = {name: match for name, key in split.items() if (match := re.fullmatch(pattern, key))}
+        if not matches:  # Sat.Q1 and /fdm/velocities/p: the last part of a path
+            last = {name: re.split(r"[./:]", name)[-1] for name in names}
+            ends = {name: _split(end)[0] for name, end in last.items() if end != name}
+            matches = {name: match for name, key in ends.items() if (match := re.fullmatch(pattern, key))}
+            split |= {name: ends[name] for name in matches}
         if kind == "time":
             order = {"secondselapsed": 0, "t": 1, "time": 2}
             times = sorted(matches, key=lambda name: (len(split[name]), order.get(split[name], 3)))
@@ -618,23 +669,35 @@ def _understood(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layou
     return "; ".join(f"{name}: {kinds.get(name) or layout.unused.get(name) or 'not known'}" for name in names)[:600]
 
 
-def _hint(names: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> str:
-    """Return the option that names the columns of this file."""
-    keys = {_split(name)[0]: name for name in names}
-    time = next(iter(chosen.get("time", ())), names[0])
-    rest = [name for name in names if name != time and name not in chain(*chosen.values())]
-    bare = [keys[axis] for axis in "xyz"] if keys.keys() >= set("xyz") else [*rest, "X", "Y", "Z"][:3]
-    return (
-        f"the columns by name or number, if {', '.join(bare)} are rates: --columns time={time},w={':'.join(bare)} --units rad"
-    )
+def _hint(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layout: Layout) -> str:
+    """Return the option that names the columns of this file, with three columns that differ by their axes if there are such."""
+    taken = {*chain(*chosen.values()), *layout.unused}
+    times = [
+        *chosen.get("time", ()),
+        *(name for name in names if re.search("time|date|stamp|frame|sec", name.lower())),
+        names[0],
+    ]
+    rest = [name for name in names if name != times[0] and name not in taken]
+    groups: dict[str, list[str]] = {}
+    for name in rest:
+        groups.setdefault(re.sub(r"[xyz0-9]", "*", _split(name)[0]), []).append(name)
+    likely = sorted((group for group in groups.values() if len(group) == 3), key=lambda group: "g" not in group[0].lower())
+    if all(name.isdigit() for name in names):
+        return "the columns by number, such as --columns time=1,w=2:3:4 --units rad, or time=1,q=2:3:4:5"
+    w = [name for name in names if name in chosen.get("rates", ())] or [*(likely or [rest])[0], "X", "Y", "Z"][:3]
+    known = next((f",{SHORT[kind]}={':'.join(chosen[kind])}" for kind in ATTITUDES if kind in chosen and kind in SHORT), "")
+    rates = f",w={':'.join(w)}" if likely or not known or "X" not in w else ""
+    return f"the columns by name or number, such as --columns time={times[0]}{rates}{known} --units rad"
 
 
 def _split(name: str) -> tuple[str, str | None]:
     """Return the letters and digits of a column's name without its unit, and the unit."""
     text = name.strip().lower()
     match = re.search(r"[(\[]([^)\]]*[a-z°^/][^)\]]*)[)\]]$", text) or re.search(_SUFFIX, text)
+    match = match or re.search(r"(?<=^time)([mun]s)$", text)  # TimeUS of ArduPilot
     if match is None and (comma := re.search(r",\s*([^,]+)$", text)) and comma[1].strip() in UNITS:
         match = comma
     rest = text[: match.start()] + text[match.end() :] if match else text
     rest = re.sub(r"^(field|data)\.", "", rest.lstrip("#%_ "))
-    return re.sub(r"[^a-z0-9]", "", rest), match[1].strip() if match else None
+    key = re.sub(r"^(roll|pitch|yaw)(?:speed|rate)$", r"rate\1", re.sub(r"[^a-z0-9]", "", rest))
+    return key, match[1].strip() if match else None

@@ -18,9 +18,9 @@ from conservative.needs import IN_TIME
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .compared import SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
+from .compared import NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
 from .diagnose import Diagnosis, diagnose, fit_moments
-from .explanation import Explanation
+from .explanation import HOPELESS, Explanation
 from .motion import closed, truth
 from .table import Recording
 
@@ -28,7 +28,6 @@ FLOOR, ACCURATE = 1e-9, 1e-6  # errors that round-off makes in double precision,
 UNITS_OF_DIGITS = 6.0  # of the last digit, that the largest error may have
 MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
 ROUND_OFF = 2e-15  # of an exact motion
-NUMERICAL = 5000.0  # rad that are compared without a closed form
 FAR = 0.05  # rad, or of the largest rate: of another motion
 ROWS_OF_NOISE = 4000  # rows that noise is estimated from
 
@@ -143,13 +142,18 @@ class _Comparison:
 def _compare(case: Compared, recording: Recording, from_row: bool) -> _Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
+    gap = float(np.median(np.diff(case.t))) * case.scale
+    if not closed(case.scene) and gap > NUMERICAL / 10:
+        got = f"rows between which the body turns by {gap:.2g} rad"
+        raise BadInput("run", got, "closer rows, or the unit of the time in the header, such as time (ms)")
     if not closed(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
         undecided = f"Rows after {case.t[-1] + shift:g} s are not compared: no closed form is known. A shorter file decides"
     parts, missing, alone = _stretches(case, from_row)
     errors = np.concatenate([part.error for part in parts], axis=1)
     passed = all(part.passes(part.error) for part in parts)
-    if not passed and (len(parts) > 1 or (parts[0].error[:, 0] > case.allowed).any()):  # stretches and starts of right motions
+    whole = len(parts) == 1 and len(errors[0]) == len(case.t)
+    if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
     worst, compared, outliers = errors, len(case.t), _outliers(errors, case)
     shape = _largest(recording.t, recording.shape)
@@ -269,13 +273,13 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
             end = max(2, int(some[over[0]])) if len(over) else end
             rest = replace(rest, growth=float(growth[some < end].max()))
         part = rest.take(slice(0, end))
-        if part.free and not part.passes(part.error):
+        if part.free and not part.passes(part.error) and _near(part):
             alone = np.maximum(alone, part.error.max(axis=1))
             initial, _, _ = part.fit(exact(part), np.zeros(0), np.zeros(0))
             fitted = part.at(initial)
             part = min(part, fitted, key=lambda each: each.size(each.error))
         parts.append(part)
-        if end >= len(rest.t) or len(parts) > 200:
+        if end >= len(rest.t) or len(parts) > 200 or not part.passes(part.error):
             break
         rest = rest.take(slice(end, None))
         changes = {name: x[0] for name, x in zip(("R_WB0", "w_WB_B0"), rest.data, strict=True) if x is not None}
@@ -290,6 +294,13 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
             missing = f"It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
             parts = [guessed]
     return parts, missing, alone
+
+
+def _near(part: Compared) -> bool:
+    """Return whether the second row is as near as noise and digits of the first one let it be, so that a fit can help."""
+    two = part.take(slice(0, 2))
+    growth = max(1.0, float(np.linalg.norm(linearise(two)[2][-1])))
+    return bool((two.error[:, -1] <= HOPELESS * two.noise * growth).all())
 
 
 def _compare_all(

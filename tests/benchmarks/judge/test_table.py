@@ -94,6 +94,82 @@ def test_the_columns_of_nesc(tmp_path):
     assert "horizon" in recording.layout.unused["eulerAngle_deg_Yaw"]
 
 
+TIMES = 0.5 * np.arange(len(T)) / len(T)  # turns of at most 1 rad, so that Euler angles and Rodrigues parameters exist
+NEAR, RATE = exact(FREE, TIMES)
+TURN = Rotation.from_matrix(NEAR)
+QUATERNION, VECTOR, MRP = TURN.as_quat(), TURN.as_rotvec(), TURN.as_mrp()
+ANGLE = np.linalg.norm(VECTOR, axis=1)
+LOGS = {
+    "PX4: microseconds and an order that the rates decide": (
+        ["timestamp", "rollspeed", "pitchspeed", "yawspeed", "q[0]", "q[1]", "q[2]", "q[3]"],
+        [np.round(1e6 * TIMES), RATE, np.roll(QUATERNION, 1, axis=1)],
+    ),
+    "GMAT: names behind a point": (
+        ["Sat.ElapsedSecs", *(f"Sat.Q{i}" for i in (1, 2, 3, 4)), *(f"Sat.AngularVelocity{axis}" for axis in "XYZ")],
+        [TIMES, QUATERNION, np.degrees(RATE)],
+    ),
+    "Basilisk": (
+        ["times [ns]", *(f"sigma_BN[{i}]" for i in range(3)), *(f"omega_BN_B[{i}]" for i in range(3))],
+        [1e9 * TIMES, MRP, RATE],
+    ),
+    "JSBSim: units behind a hyphen": (
+        ["Time", *(f"/fdm/attitude/{x}-deg" for x in ("phi", "theta", "psi")), *(f"/fdm/v/{x}-rad_sec" for x in "pqr")],
+        [TIMES, TURN.as_euler("ZYX", degrees=True)[:, ::-1], RATE],
+    ),
+    "EuRoC ground truth": (
+        ["#timestamp", "p_x [m]", *(f"q_RS_{x} []" for x in "wxyz"), *(f"b_w_RS_S_{x} [rad s^-1]" for x in "xyz")],
+        [1e9 * TIMES + 1.4e18, 0 * TIMES, np.roll(QUATERNION, 1, axis=1), 0 * RATE],
+    ),
+    "axis and angle": (["t", "axis_x", "axis_y", "axis_z", "angle"], [TIMES, VECTOR / ANGLE[:, None], ANGLE]),
+    "Apple: a unit that is none": (
+        ["t (s)", *(f"motionRotationRate{x}(rad/s)" for x in "XYZ"), *(f"motionQuaternion{x}(R)" for x in "XYZW")],
+        [TIMES, RATE, QUATERNION],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_logs_are_read_without_options(name, tmp_path):
+    header, columns = LOGS[name]
+    np.savetxt(tmp_path / "log.csv", np.column_stack(columns), "%.17g", ",", header=",".join(header), comments="")
+    recording = load(tmp_path / "log.csv")
+    R_WB, w = recording.data
+    if name.startswith("GMAT"):  # the verdict chooses the order that fits
+        R_WB = load(tmp_path / "log.csv", quaternion="xyzw").data[0]
+    off = 500e-9 if "timestamp" in header[0] else 1e-13  # s: times since 1970 have 256 ns as their last bit
+    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=1.1e-6 if name.startswith("PX4") else off)
+    np.testing.assert_allclose(R_WB, NEAR, atol=1e-12)  # measured: 3e-15
+    assert w is None if name in ("EuRoC ground truth", "axis and angle") else np.allclose(w, RATE, rtol=0, atol=1e-12)
+
+
+MESSAGES = {
+    "TUM": "# timestamp tx ty tz qx qy qz qw\n{t:.9f} 0 0 0 {q[0]:.15f} {q[1]:.15f} {q[2]:.15f} {q[3]:.15f}\n",
+    "CCSDS": "CCSDS_AEM_VERS = 1.0\nMETA_START\nATTITUDE_DIR = A2B\nATTITUDE_TYPE = QUATERNION\nQUATERNION_TYPE = LAST\n"
+    "META_STOP\nDATA_START\n2020-01-01T00:00:{t:012.9f} {q[0]:.15f} {q[1]:.15f} {q[2]:.15f} {q[3]:.15f}\nDATA_STOP\n",
+    "STK, matrices to body axes": "stk.v.11.0\nBEGIN Attitude\nCoordinateAxes J2000\nAttitudeTimeDCM\n{t:.9f} "
+    "{C[0]:.15f} {C[1]:.15f} {C[2]:.15f} {C[3]:.15f} {C[4]:.15f} {C[5]:.15f} {C[6]:.15f} {C[7]:.15f} {C[8]:.15f}\n"
+    "END Attitude\n",
+}
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_formats_with_a_header_of_their_own(name, tmp_path):
+    lines = MESSAGES[name].splitlines(keepends=True)
+    row = next(line for line in lines if "{" in line)
+    rows = [row.format(t=t, q=q, C=R.T.ravel()) for t, q, R in zip(TIMES, QUATERNION, NEAR, strict=True)]
+    (tmp_path / "log.a").write_text("".join(each if each != row else "".join(rows) for each in lines))
+    recording = load(tmp_path / "log.a")
+    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=5e-7)  # dates have 2e-7 s as their last bit
+    np.testing.assert_allclose(recording.data[0], NEAR, atol=1e-14)
+
+
+def test_the_message_offers_the_columns_that_differ_by_their_axes(tmp_path):
+    names = ["stamp_ms", "ax", "ay", "az", "gx", "gy", "gz"]
+    np.savetxt(tmp_path / "log.csv", np.column_stack([T, W, W]), "%.17g", ",", header=",".join(names), comments="")
+    with pytest.raises(BadInput, match="--columns time=stamp_ms,w=gx:gy:gz"):
+        load(tmp_path / "log.csv")
+
+
 WRONG = {
     "no time": (lambda c: c.pop("time"), "without columns of the time"),
     "one rate": (lambda c: [c.pop(name) for name in list(c)[2:]], "without columns of attitudes or rates"),
