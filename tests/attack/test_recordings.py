@@ -12,8 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from conservative.benchmarks.judge.diagnose import judge
 from conservative.benchmarks.judge.table import read
+from conservative.benchmarks.judge.verdict import judge
 
 from .recordings import plant
 

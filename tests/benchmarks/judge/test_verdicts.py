@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
+from conservative.benchmarks.judge import verdict as verdicts
+from conservative.benchmarks.judge.diagnose import Diagnosis
 from conservative.benchmarks.judge.table import CHUNK, Options, Recording, read
 from conservative.benchmarks.judge.verdict import judge
 from conservative.errors import BadInput
@@ -208,6 +210,25 @@ def test_fewer_numbers_do_not_win_over_a_much_smaller_rest():
     """A scaled time leaves nothing, a constant shift 20 times as much as is allowed: the shift must not be named."""
     later, w = free_body(SCENE.body, np.eye(3), W0, T * (1 + 1e-6))
     assert verdict(T, later, w)["diagnosis"].name == "phase drift"
+    at = np.append(0.0, 0.02 + T[1:] * (1 + 3.5e-5))
+    later, w = free_body(SCENE.body, np.eye(3), W0, at)
+    found = verdict(T, later, w, error=1e-3, digits=(0.0, 1e-5, 1e-5))
+    shift = next(each for each in found["tried"] if each.name == "time shift")
+    assert shift.explains
+    assert 10 < shift.size < 40  # measured: 22 times the digits, and the scaled time leaves none of them
+    assert found["diagnosis"].name == "phase drift"
+
+
+def test_an_allowed_error_decides_alone(monkeypatch):
+    monkeypatch.setattr(verdicts, "diagnose", lambda *_: Diagnosis())  # names are searched for a minute
+    t, off = T[::10], 1e-3 * np.sin(T[::10])[:, None]
+    noise = np.random.default_rng(2).normal(0, 0.01, (len(T), 3))
+    assert [verdict(t, None, W[::10] + off, error=error)["verdict"] for error in (None, 1e-2, 1e-4)] == [
+        "wrong",
+        "right",
+        "wrong",
+    ]
+    assert [verdict(T, None, W + noise, error=error)["verdict"] for error in (None, 0.1, 1e-3)] == ["right", "right", "wrong"]
 
 
 def test_angles_called_phi_theta_psi_are_compared(tmp_path):
