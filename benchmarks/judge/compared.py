@@ -19,10 +19,11 @@ from .motion import Equations, States, closed, truth
 
 SIGMAS = 7.0  # of noise, that the largest error may have
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
+HOPELESS = 30.0  # of noise, that no other first row explains
 LINEAR = 0.3  # rad, differences of motions that are taken as small
 PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
-Solution = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""From initial attitudes (B, 3, 3), rates (B, 3) and other numbers (B, k) to motions (B, n, 3, 3), (B, n, 3)."""
+Solution = Callable[[Array, Array, Array, int], tuple[Array, Array]]
+"""From initial attitudes (B, 3, 3), rates (B, 3), other numbers (B, k) and n to the first rows (B, n, 3, 3), (B, n, 3)."""
 
 
 def take_rows(data: States, rows: Any) -> States:
@@ -82,11 +83,10 @@ class Compared:
 
     @cached_property
     def plain(self) -> Array:
-        """The largest errors (2,) without a mistake: from the first row, or from a start that is fitted if it has noise."""
+        """The errors (2, n) without a mistake: from the first row, or from a start that is fitted if it has noise."""
         if not self.free or self.passes(self.error) or self.turned > NUMERICAL:
-            return self.error.max(axis=1)
-        fitted = self.fit(exact(self), np.zeros(0), np.zeros(0))[2]
-        return np.minimum(self.error.max(axis=1), self.errors(*fitted).max(axis=1))
+            return self.error
+        return min(self.error, self.errors(*self.fit(exact(self), np.zeros(0), np.zeros(0))[2]), key=self.size)
 
     def differences(self, R: Array, w: Array) -> Array:
         """Return motions (..., n, 3, 3), (..., n, 3) minus the data, (..., n, 12), rad and relative; 0 where there are none."""
@@ -119,7 +119,11 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:])
+        return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
+
+    def equations(self, *of: Any, **changes: Any) -> Equations:
+        """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
+        return Equations(*(of or (self.scene,)), tolerance=float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8)), **changes)
 
     def deviations(self, motion: Solution, found: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""
@@ -142,17 +146,17 @@ class Compared:
         small = np.concatenate([np.full(6, 1e-6), changed])
         n = len(self.t)
 
-        evaluate = partial(self.evaluate, motion)
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
-        found = evaluate(p[None])
         for k in rows if moved else ():
-            damping, (R, w) = 1e-6, found
-            now = (self.differences(R, w)[0] * weights)[:k].ravel()
+            part, damping = self.take(slice(0, k)), 1e-6
+            evaluate = partial(part.evaluate, motion)
+            R, w = evaluate(p[None])
+            now = (part.differences(R, w)[0] * weights).ravel()
             for _ in range(most):
                 if monotonic() > self.limit:
                     break
                 R, w = evaluate(p + np.concatenate([small * np.eye(6 + len(extra))[i][None] for i in moved]))
-                slopes = ((self.differences(R, w) * weights)[:, :k].reshape(len(moved), -1) - now) / small[moved][:, None]
+                slopes = ((part.differences(R, w) * weights).reshape(len(moved), -1) - now) / small[moved][:, None]
                 better = False
                 while damping < 1e3 and not better:
                     normal = slopes @ slopes.T
@@ -160,16 +164,19 @@ class Compared:
                     q = p.copy()
                     q[moved] += step
                     R, w = evaluate(q[None])
-                    new = (self.differences(R, w)[0] * weights)[:k].ravel()
+                    new = (part.differences(R, w)[0] * weights).ravel()
                     better = bool(new @ new < now @ now)
                     damping = damping / 30 if better else max(damping, 1e-6) * 30
                 if not better:
                     break
                 gain = 1 - (new @ new) / (now @ now)
-                p, now, found = q, new, (R, w)
+                p, now = q, new
                 if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
                     break
-        return p[:6], p[6:], (found[0][0], found[1][0])
+            if free and now @ now > k * HOPELESS**2:
+                break  # no start explains these rows, so none explains more
+        R, w = self.evaluate(motion, p[None])
+        return p[:6], p[6:], (R[0], w[0])
 
     def at(self, initial: Array) -> Compared:
         """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
@@ -189,18 +196,19 @@ def linearise(case: Compared) -> tuple[Array, Array, Array]:
     """Return the exact motion (n, 3, 3), (n, 3), and the matrices (n, 6, 6) that carry small changes of its start along."""
     turns, shifts = np.split(np.vstack([np.zeros(6), PERTURBED * np.eye(6)]), 2, axis=1)
     R0 = case.scene.R_WB0 @ Rotation.from_rotvec(turns).as_matrix()
-    R, w = exact(case)(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)))
+    R, w = exact(case)(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)), len(case.t))
     return R[0], w[0], np.moveaxis(differ(R[0], w[0], R[1:], w[1:], case.scale), 0, -1) / PERTURBED
 
 
 def exact(case: Compared) -> Solution:
     """Return the exact motion as a function of initial states."""
 
-    def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
-        if closed(case.scene) and case.turned > 3 * LONGEST:
-            each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, case.t) for a, b in zip(R, w, strict=True)]
+    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
+        t = case.t[:n]
+        if closed(case.scene) and (t[-1] - case.start) * case.scale > 3 * LONGEST:
+            each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
             return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
-        return Equations(case.scene).solve(case.start, R, w, case.t)
+        return case.equations().solve(case.start, R, w, t)
 
     return motion
 

@@ -19,7 +19,7 @@ from . import mistakes
 from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
 from .explanation import Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
-from .motion import Equations, closed, truth
+from .motion import Equations, truth
 from .steps import PARTS, STEPS_AT_MOST, find_steps
 
 FEWEST, MOST = 100, 2500  # rows that are explained
@@ -60,7 +60,7 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
                 break
         if search in (_readings, _attitudes, find_steps) and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
-    bounds = np.maximum(case.plain, case.allowed)
+    bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share))
     explaining = [each for each in tried if each.explains]
@@ -102,7 +102,7 @@ def _readings(case: Compared, quaternion: bool) -> Iterator[Explanation]:
         if data[1] is not None and other:
             read = replace(read, scale=float(np.linalg.norm(data[1], axis=1).max()) or 1.0)
         near = read.take(slice(0, 10))
-        R, w = exact(near)(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)))
+        R, w = exact(near)(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), 10)
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
             yield attempt(case, ", ".join(filter(None, (name, other))), text, exact(read), read=read)
 
@@ -114,10 +114,10 @@ def _changes(case: Compared, _: bool) -> Iterator[Explanation]:
 
 
 def _by(case: Compared, equations: Equations) -> Solution:
-    def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
-        if closed(equations.scene) and equations == Equations(equations.scene):
-            return exact(replace(case, scene=equations.scene))(R, w, _)
-        return equations.solve(case.start, R, w, case.t)
+    equations = replace(equations, tolerance=case.equations().tolerance)
+
+    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
+        return equations.solve(case.start, R, w, case.t[:n])
 
     return motion
 
@@ -139,16 +139,18 @@ def _times(case: Compared, _: bool) -> Iterator[Explanation]:
     def moved(both: bool) -> Solution:
         known: list[Any] = []
 
-        def motion(R: Array, w: Array, p: Array) -> tuple[Array, Array]:
+        def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
             if case.free or not known:
-                known[:] = [Equations(case.scene).flow(case.start, R, w, end)]
+                known[:] = [case.equations().flow(case.start, R, w, end)]
             flow = known[0]
             times = (
-                case.start + (rest.t - case.start) * (1 + np.clip(p[:, 1:].sum(axis=1), -0.5, 0.1))[:, None] + p[:, :1] * unit
+                case.start
+                + (rest.t[:n] - case.start) * (1 + np.clip(p[:, 1:].sum(axis=1), -0.5, 0.1))[:, None]
+                + p[:, :1] * unit
             )
             times[:, 0] = rest.t[0]
             a, b = flow.shifted(np.clip(times, case.start, end))
-            return (a if both else np.broadcast_to(flow.at(rest.t)[0], a.shape)), b
+            return (a if both else np.broadcast_to(flow.at(rest.t[:n])[0], a.shape)), b
 
         return motion
 
@@ -200,8 +202,13 @@ def _own_times(case: Compared, gap: float, end: float) -> Iterator[Explanation]:
 def _attitudes(case: Compared, _: bool) -> Iterator[Explanation]:
     """Yield attitudes by usual rules from the exact rates, if the rates of the file are exact."""
     R, w = case.data
+    if R is None or w is None:
+        return
+    rates = replace(case, data=(None, w), free=case.free[3:])
+    if rates.free:  # the integral collects what the first row is off
+        case = replace(case, scene=rates.at(rates.fit(exact(rates), np.zeros(0), np.zeros(0))[0]).scene)
     made = case.exact
-    if R is None or w is None or case.errors(*made)[1].max() > case.allowed[1]:
+    if case.errors(*made)[1].max() > case.allowed[1]:
         return
     for name, rule in ATTITUDES.items():
         wanted, seen, found = [case.stride, 1], set[int](), list[Explanation]()
@@ -216,6 +223,8 @@ def _attitudes(case: Compared, _: bool) -> Iterator[Explanation]:
             error, gone = turned - made[0], R - made[0]
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
+            if case.free:  # the first attitude has noise too
+                turned = mistakes.align(turned, R, name.endswith(mistakes.IN_WORLD))
             found.append(explain(
                 case, f"attitudes by {name}", f"{NOT_INTEGRAL} {name}, with a step of {{step:.4g}} s",
                 (turned, made[1]), {"step": float(np.median(np.diff(case.t))) / parts},
@@ -236,8 +245,8 @@ def _fits(case: Compared, _: bool) -> Iterator[Explanation]:
     for name, text, term in (("damped", "", 1.0), ("no gyroscopic term, damped", f"{mistakes.NO_TERM}. ", 0.0)):
         text += "The rates are damped by {damping:.4g} per second" + more
 
-        def motion(R: Array, w: Array, p: Array, term: float = term) -> tuple[Array, Array]:
-            return Equations(scene, term, damping=p[:, 0] * case.scale).solve(case.start, R, w, case.t)
+        def motion(R: Array, w: Array, p: Array, n: int, term: float = term) -> tuple[Array, Array]:
+            return case.equations(scene, term, damping=p[:, 0] * case.scale).solve(case.start, R, w, case.t[:n])
 
         yield attempt(case, name, text, motion, [0.0], lambda p: {"damping": float(p[0]) * case.scale})
     if not case.free and case.start == case.t[0]:
@@ -261,16 +270,16 @@ def _turned_axes(case: Compared) -> Explanation:
     """Return the explanation by body axes that are turned, fitted from the best of 24 directions."""
 
     def motion(of: Compared) -> Solution:
-        def turned(R: Array, w: Array, p: Array) -> tuple[Array, Array]:
+        def turned(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
             C = Rotation.from_rotvec(p).as_matrix()
-            a, b = exact(of)(R @ np.swapaxes(C, 1, 2), (C @ w[..., None])[..., 0], p)
+            a, b = exact(of)(R @ np.swapaxes(C, 1, 2), (C @ w[..., None])[..., 0], p, n)
             return a @ C[:, None], (np.swapaxes(C, 1, 2)[:, None] @ b[..., None])[..., 0]
 
         return turned
 
     near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
-    left = np.linalg.norm(near.differences(*motion(near)(*many, turns)), axis=(1, 2))
+    left = np.linalg.norm(near.differences(*motion(near)(*many, turns, len(near.t))), axis=(1, 2))
     text = "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad"
 
     def values(p: Array) -> dict[str, float]:
@@ -316,9 +325,9 @@ def _possible(found: Explanation) -> Explanation:
 def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution:
     """Return the motion as a function of initial states and the numbers of an inertia."""
 
-    def motion(R: Array, w: Array, p: Array) -> tuple[Array, Array]:
+    def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         scenes = [mistakes.with_inertia(case.scene, inertia(numbers)) or case.scene for numbers in p]
-        made = [Equations(scene).solve(case.start, R[[i]], w[[i]], case.t) for i, scene in enumerate(scenes)]
+        made = [case.equations(scene).solve(case.start, R[[i]], w[[i]], case.t[:n]) for i, scene in enumerate(scenes)]
         return np.concatenate([a for a, _ in made]), np.concatenate([b for _, b in made])
 
     return motion

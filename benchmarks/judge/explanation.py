@@ -11,9 +11,9 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .compared import Compared, Solution
+from .compared import HOPELESS, Compared, Solution
 
-HOPELESS = 30.0  # of noise, that no other first row explains
+PROVEN = 0.2  # of the error, that an explanation may leave: an error that noise hides says little about its cause
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def explain(
 
     `text` is a format of `values`; `numbers` counts those that were fitted, by default all.
     """
-    of, plain = read or case, case.plain
+    of, plain = read or case, case.plain.max(axis=1)
     error = of.errors(*made)
     share = float(error.max() / max(plain.max(), 1e-15))
     return Explanation(
@@ -62,7 +62,7 @@ def explain(
         plain.tolist(),
         share,
         of.size(error),
-        of.passes(error) and share < 0.5,
+        of.passes(error) and of.size(error) < PROVEN * case.size(case.plain),
         len(values) if numbers is None else numbers,
         made if read is None else None,
     )

@@ -35,7 +35,7 @@ from .motion import Equations, States, cross
 
 Reading = Callable[[Array | None, Array | None], States]
 Slope = Any
-"""The derivative of states (7, ...) at a time or times, s, with an attribute `body`."""
+"""The derivative of states (7, ...) at a time or times, s, with an attribute `body`, and `rates` of times and states."""
 
 
 def _attitude(change: Callable[[Array], Array]) -> Reading:
@@ -187,7 +187,8 @@ def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rat
         new[4:] = y[4:] + h * f(t, new)[4:]
         if np.abs(new[4:] - before).max() <= 2e-16 * np.abs(y[4:]).max():
             break
-    with_rates = {"old": y[4:], "new": new[4:], "mean": (y[4:] + new[4:]) / 2}[use]
+    old, later = f.rates(t, y), f.rates(t + h, new)
+    with_rates = {"old": old, "new": later, "mean": (old + later) / 2}[use]
     if exact:
         new[:4] = _rotate(y[:4], h * with_rates)
     else:
@@ -235,7 +236,7 @@ def _leapfrog(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Ar
     """Return the state after half a kick, a drift and half a kick (velocity Verlet)."""
     half = y.copy()
     half[4:] += h / 2 * f(t, y)[4:]
-    half[:4] = _rotate(y[:4], h * half[4:])
+    half[:4] = _rotate(y[:4], h * f.rates(t + h / 2, half))
     new = half.copy()
     new[4:] += h / 2 * f(t + h, half)[4:]
     return new
@@ -253,12 +254,13 @@ def _stormer(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Arr
 
 def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: int) -> Array:
     """Return the state of Buss's augmented method of order 2 or 3: one rotation; the momentum stays in world axes."""
-    k, w, e, J = f(t, y), y[4:], 1e-5, f.body.inertia
-    turn = h * w + h * h / 2 * k[4:] + h**3 / 12 * cross(w, k[4:])
-    if order == 3:
-        turn = turn + h**3 / 6 * (f(t + e * h, y + e * h * k) - f(t - e * h, y - e * h * k))[4:] / (2 * e * h)
+    k, w, e, J = f(t, y), f.rates(t, y), 1e-5 * h, f.body.inertia
+    slope = (f.rates(t + e, y + e * k) - f.rates(t - e, y - e * k)) / (2 * e)
+    turn = h * w + h * h / 2 * slope + h**3 / 12 * cross(slope, w)  # w' x w has the same components in world and body axes
+    if order == 3:  # and w'' is w'' + w x w' in body axes
+        turn = turn + h**3 / 6 * ((f(t + e, y + e * k) - f(t - e, y - e * k))[4:] / (2 * e) + cross(w, slope))
     rotor = np.zeros(3) if f.body.rotor_momentum is None or f.body.motor else f.body.rotor_momentum
-    L = (J @ w.reshape(3, -1) + rotor[:, None]).reshape(w.shape)
+    L = (J @ y[4:].reshape(3, -1) + rotor[:, None]).reshape(w.shape)
     L = L + h * ((J @ k[4:].reshape(3, -1)).reshape(w.shape) - cross(L, w))
     back = _rotate(np.concatenate([np.ones_like(w[:1]), 0 * w]), -turn)
     carried = _product(
@@ -280,12 +282,16 @@ BARE = " without normalisation"
 
 @dataclass(frozen=True)
 class Step:
-    """A method: its order, the number of earlier states, and the function to the next state, whose quaternion is normalised."""
+    """A method: its order, the number of earlier states, and the function to the next state, whose quaternion is normalised.
+
+    The errors of a `recurrent` method do not add up step by step, because its new state contains differences of earlier ones.
+    """
 
     order: int
     past: int
     next: Callable[..., Array]
     normalised: bool = True
+    recurrent: bool = False
 
 
 STEPS: dict[str, Step] = {
@@ -309,12 +315,14 @@ STEPS: dict[str, Step] = {
     "the implicit midpoint rule": Step(2, 0, partial(_implicit, at=0.5)),
     "the trapezoidal rule": Step(2, 0, _trapezoid),
     "leapfrog (velocity Verlet)": Step(2, 0, _leapfrog),
-    "Störmer's method on the quaternion": Step(2, 1, _stormer, normalised=False),
+    "Störmer's method on the quaternion": Step(2, 1, _stormer, recurrent=True),
+    f"Störmer's method on the quaternion{BARE}": Step(2, 1, _stormer, normalised=False, recurrent=True),
     "Adams-Bashforth 2 (first step Euler)": Step(2, 1, partial(_adams, weights=(1.5, -0.5))),
     f"Adams-Bashforth 2 (first step Euler){BARE}": Step(2, 1, partial(_adams, weights=(1.5, -0.5)), normalised=False),
     "Buss 2 (augmented)": Step(2, 0, partial(_buss, order=2)),
     "Buss 3 (augmented)": Step(3, 0, partial(_buss, order=3)),
     "Adams-Bashforth 3": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12))),
+    f"Adams-Bashforth 3{BARE}": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12)), normalised=False),
     "RK3 (Kutta)": Step(3, 0, partial(_tableau, A=KUTTA[0], b=KUTTA[1])),
     "RK3 (Heun)": Step(3, 0, partial(_tableau, A=((1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))),
     "RK3 (SSP)": Step(3, 0, partial(_tableau, A=((1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))),
@@ -383,8 +391,9 @@ def _rule(update: Callable[[Array, Array], Array], rates: Callable[[Array, Array
     return rule
 
 
+IN_WORLD = ", which are in body axes, as if they were in world axes"
 ATTITUDES: dict[str, Rule] = {
-    f"{name} {which}{', which are in body axes, as if they were in world axes' * world}": _rule(update, rates, world)
+    f"{name} {which}{IN_WORLD * world}": _rule(update, rates, world)
     for name, update in UPDATES.items()
     for which, rates in RATES.items()
     for world in (False, True)[: 1 + (update in (_linear, _map))]
@@ -407,6 +416,12 @@ def integrate(rule: Callable[[Array, Array, Array], Array], R0: Array, w: Array,
         q = matrix @ q
         q = q / np.sqrt(q @ q)
     return from_quaternion(np.array([*kept, q]))
+
+
+def align(R: Array, to: Array, right: bool) -> Array:
+    """Return attitudes (n, 3, 3) with the constant rotation in the world, or in the body (`right`), that fits others best."""
+    U, _, V = np.linalg.svd((np.swapaxes(R, 1, 2) @ to if right else to @ np.swapaxes(R, 1, 2)).sum(axis=0))
+    return R @ (U @ V) if right else (U @ V) @ R
 
 
 def changes(scene: Scene) -> Iterator[tuple[str, str, Equations]]:

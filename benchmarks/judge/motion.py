@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -12,8 +13,10 @@ from numpy.polynomial import chebyshev
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.errors import PotentialFailed, TorqueFailed
 from conservative.needs import IN_TIME
+from conservative.potentials.field import FieldPotential
 from conservative.potentials.load import Window
 from conservative.potentials.potential import torque_W
+from conservative.potentials.turning import static_part
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.scene import Scene
 
@@ -35,6 +38,7 @@ class Equations:
     A state (7, ...) is a quaternion, scalar first, body to world, and u = w, rad/s, body axes; with a motor u = w + J^-1 h.
     `gyroscopic` scales the first term, `field` the torque of the potential, `damping` (B,) is an additional one, 1/s, and
     `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn with the body.
+    `tolerance` is the error of solutions in a stretch.
     """
 
     scene: Scene
@@ -42,6 +46,7 @@ class Equations:
     field: float = 1.0
     damping: float | Array = 0.0
     fixed: Array | None = None
+    tolerance: float = 2 * _EPS
 
     def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Callable[[Array], Array]:
         """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
@@ -90,6 +95,7 @@ class Equations:
             M = np.array([torque.at(each, None, window) for each in t.tolist()])
         if damping is not None and not (of_time and of_time.of_attitude):
             D = np.array([damping.at(each, None, window) for each in t.tolist()])
+        field = None if scene.potential is None else _field(scene.potential, t)
         turned = scene.potential is not None or (torque is not None and (torque.frame != "body" or torque.of_attitude))
         turned = turned or bool(of_time and of_time.of_attitude)
 
@@ -97,8 +103,8 @@ class Equations:
             rates, out = np.moveaxis(w, 0, -1), np.zeros((*w.shape[1:], 3))
             R = _matrix(y) if turned else np.eye(3)
             times = np.broadcast_to(t, rates.shape[:-1])
-            if scene.potential is not None:
-                out += self.field * (torque_W(scene.potential, R, times)[..., None, :] @ R)[..., 0, :]
+            if field is not None:
+                out += self.field * field(R)
             if torque is not None:
                 value = M if M is not None else _each(torque.at, times, R, window)
                 out += value if torque.frame == "body" else (np.broadcast_to(value, rates.shape)[..., None, :] @ R)[..., 0, :]
@@ -144,12 +150,12 @@ class Equations:
                 b = min(after, end) if min(after, end) - b < 0.01 * length else b
                 half = (b - a) / 2
                 try:
-                    Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half)
+                    Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half, self.tolerance)
                 except (TorqueFailed, PotentialFailed):
                     break
                 series = Y @ _COEFFICIENTS.T
                 tail = np.abs(series[..., -3:]).max(axis=(1, 2)) / np.maximum(np.abs(Y).max(axis=(1, 2)), [1] * 4 + [size] * 3)
-                if not np.isfinite(Y).all() or sweeps == SWEEPS or tail.max() > TAIL:
+                if not np.isfinite(Y).all() or sweeps == SWEEPS or tail.max() > max(TAIL, self.tolerance):
                     if length > SMALLEST * first:
                         length = half
                         continue
@@ -200,16 +206,35 @@ class Flow:
         return np.concatenate([R for R, _ in made]), np.concatenate([w for _, w in made])
 
 
-def _sweep(slope: Callable[[Array], Array], y: Array, half: float) -> tuple[Array, int]:
+def _sweep(slope: Callable[[Array], Array], y: Array, half: float, tolerance: float) -> tuple[Array, int]:
     """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations."""
     Y, last, size = np.repeat(y[:, :, None], NODES, axis=2), math.inf, np.abs(y).max() or 1.0
     for sweep in range(1, SWEEPS):
         new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
         change, Y = float(np.abs(new - Y).max()) / size, new
-        if change < 2 * _EPS or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
+        if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
             return Y, sweep
         last = change
     return Y, SWEEPS
+
+
+def _field(potential: Any, t: Array) -> Callable[[Array], Array]:
+    """Return the torque (..., n, 3) of a field, N m, body axes, as a function of attitudes (..., n, 3, 3) at times (n,), s.
+
+    The derivative of a compiled field is c d', and its torque (R' c) x d in axes in which the field is fixed.
+    """
+    fixed = static_part(potential)
+    if not isinstance(fixed, FieldPotential):
+        return lambda R: (torque_W(potential, R, np.broadcast_to(t, R.shape[:-2]))[..., None, :] @ R)[..., 0, :]
+    law, axes = fixed.kernel_field(np.eye(3)), None if fixed is potential else np.swapaxes(potential.orbit.R_WO(t), 1, 2)
+
+    def torque(R: Array) -> Array:
+        R = R if axes is None else axes @ R
+        columns = [[R[..., i, j] for i in range(3)] for j in range(3)]
+        c, d = law.finite_derivative(columns, columns)
+        return np.moveaxis(cross([sum(r * x for r, x in zip(each, c, strict=True)) for each in columns], d), 0, -1)
+
+    return torque
 
 
 def _matrix(y: Array) -> Array:
@@ -226,7 +251,7 @@ def _apply(matrix: Array, v: Array) -> Array:
     return (matrix @ v.reshape(3, -1)).reshape(v.shape)
 
 
-def cross(a: Array, b: Array) -> Array:
+def cross(a: Any, b: Any) -> Array:
     """Return the cross product of vectors (3, ...)."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 

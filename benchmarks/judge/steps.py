@@ -11,8 +11,8 @@ import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 
-from .compared import LINEAR, Compared, Solution, differ, linearise
-from .explanation import HOPELESS, Explanation, attempt
+from .compared import HOPELESS, LINEAR, Compared, Solution, differ, linearise
+from .explanation import Explanation, attempt
 from .mistakes import STEPS, Step
 from .motion import Equations, truth
 
@@ -30,6 +30,10 @@ class Slope:
     def body(self) -> Any:
         return self.equations.scene.body
 
+    def rates(self, t: Any, y: Array) -> Array:
+        """Return the angular velocities (3, n) of states."""
+        return y[4:] if self.body.motor is None else y[4:] - self.equations.wheel(np.atleast_1d(t))
+
     def __call__(self, t: Any, y: Array) -> Array:
         if self.equations.steady:
             if "slope" not in self.known:
@@ -45,13 +49,13 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
     equations = Equations(case.scene)
     f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
 
-    def motion(R: Array, w: Array, _: Array) -> tuple[Array, Array]:
-        y, past, kept = equations.pack(case.start, R, w), list[Array](), list[Array]()
-        last, wanted = int(count_gaps(case)[-1]) * parts, set((count_gaps(case) * parts).tolist())
+    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
+        y, past, kept, numbers = equations.pack(case.start, R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
+        last, wanted = int(numbers[-1]), set(numbers.tolist())
         with np.errstate(all="ignore"):
             for number in range(last + 1):
                 if number % 256 == 0 and monotonic() > case.limit:
-                    kept += [y * np.nan] * (len(case.t) - len(kept))
+                    kept += [y * np.nan] * (n - len(kept))
                     break
                 if number in wanted:
                     kept.append(y)
@@ -61,7 +65,7 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
                     y = new
                     if method.normalised:
                         y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
-            return equations.states(np.stack(kept, axis=2), case.t)
+            return equations.states(np.stack(kept, axis=2), case.t[:n])
 
     return motion
 
@@ -98,7 +102,7 @@ def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
         for count in sorted({parts, *linear.others(STEPS[name], parts)}, key=lambda n: abs(n - parts)):
             for most in (2000, STEPS_AT_MOST):  # steps
                 some = case.take(slice(0, max(4, most // count)))
-                if len(some.t) < len(case.t) and (some.plain <= some.allowed).all():
+                if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
                 step = float(gaps.mean()) / count
                 text = f"The rows follow {name} with a step of {step:.4g} s"
@@ -136,6 +140,10 @@ class Linearised:
         if (id(method), parts) in self.made:
             return self.made[id(method), parts]
         case, n = self.case, self.used
+        if method.recurrent:
+            R, w = march(case.take(slice(0, n)), method, parts)(self.R[:1], self.w[:1], np.zeros((1, 0)), n)
+            self.made[id(method), parts] = found = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
+            return found
         t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
         y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
         past: list[Array] = []
@@ -173,13 +181,15 @@ class Linearised:
     def best(self, method: Step) -> tuple[float, int]:
         """Return the smallest share that a method leaves, and its number of steps between two rows."""
         found, parts = dict[int, float](), self.case.stride
+        sizes = [np.linalg.norm(self.beside_start(self.errors(method, n))) for n in (parts, 2 * parts)]
+        order = float(np.clip(np.log2(sizes[0] / (sizes[1] or 1.0) or 1.0), 1, method.order))  # a torque can lower it
         while parts not in found and len(found) < 8:
             found[parts], factor = self.share(method, parts)
             if factor <= 0:
                 break
             parts = int(
                 np.clip(
-                    np.rint(parts * max(factor, 1e-12) ** (-1 / method.order)),
+                    np.rint(parts * max(factor, 1e-12) ** (-1 / order)),
                     1,
                     max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used)),
                 )

@@ -274,15 +274,18 @@ def _quantum(values: Array) -> float:
     x = x[x != 0]
     if len(x) < 5:  # of a constant nothing can be learned
         return largest * 2.0**-53
-    near, smallest = 4 * np.spacing(np.abs(x)), largest * 2.0**-53
-    if (x.astype(np.float32) == x).all():
-        return largest * 2.0**-24
+    near, half, unit = 4 * np.spacing(np.abs(x)), 0.0, np.zeros_like(x)
     exponent, whole = np.floor(np.log10(np.abs(x))), math.floor(math.log10(largest))
     for digits in range(3, 16):
         unit = 10.0 ** (exponent - digits + 1)
         if (np.abs(np.rint(x / unit) * unit - x) <= near).all():
-            return max(0.5 * 10.0 ** (whole - digits + 1), smallest)
-    return smallest
+            half = 0.5 * 10.0 ** (whole - digits + 1)
+            break
+    else:
+        unit[:] = 0.0
+    if (np.abs(x.astype(np.float32) - x) <= unit / 2 + near).all():  # single precision, also if printed with nine digits
+        half = max(half, largest * 2.0**-24)
+    return max(half, largest * 2.0**-53)
 
 
 def _open(path: Path) -> IO[str]:

@@ -18,9 +18,9 @@ from conservative.needs import IN_TIME
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .compared import NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
+from .compared import HOPELESS, NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
 from .diagnose import Diagnosis, diagnose, fit_moments
-from .explanation import HOPELESS, Explanation
+from .explanation import Explanation
 from .motion import closed, truth
 from .table import Recording
 

@@ -439,7 +439,7 @@ LAYOUTS = {
     ),
     "Basilisk": Layout(
         "t,sigma_1,sigma_2,sigma_3,omega_1,omega_2,omega_3",
-        lambda q, w: [(q * np.where(q[:, :1] < 0, -1, 1))[:, 1:] / (1 + abs(q[:, :1])), w], "R w", 4.0,
+        lambda q, w: [(q * np.where(q[:, :1] < 0, -1, 1))[:, 1:] / (1 + abs(q[:, :1])), w], "R w", 4.0, {"units": "rad"},
     ),
     "rotation vectors": Layout(
         "t,rx,ry,rz,w_x (rpm),w_y (rpm),w_z (rpm)", lambda q, w: [rotation(q).as_rotvec(), w * 30 / np.pi], "R w",
