@@ -121,9 +121,10 @@ class Compared:
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
-    def equations(self, *of: Any, **changes: Any) -> Equations:
+    def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
         """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
-        return Equations(*(of or (self.scene,)), tolerance=float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8)), **changes)
+        tolerance = float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8))
+        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, **changes)
 
     def deviations(self, motion: Solution, found: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""

@@ -19,7 +19,7 @@ from . import mistakes
 from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
 from .explanation import Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
-from .motion import Equations, truth
+from .motion import Equations, closed, truth
 from .steps import PARTS, STEPS_AT_MOST, find_steps
 
 FEWEST, MOST = 100, 2500  # rows that are explained
@@ -204,9 +204,9 @@ def _attitudes(case: Compared, _: bool) -> Iterator[Explanation]:
     R, w = case.data
     if R is None or w is None:
         return
-    rates = replace(case, data=(None, w), free=case.free[3:])
-    if rates.free:  # the integral collects what the first row is off
-        case = replace(case, scene=rates.at(rates.fit(exact(rates), np.zeros(0), np.zeros(0))[0]).scene)
+    alone = replace(case, data=(None, w), free=case.free[3:])
+    if alone.free:  # the integral collects what the first row is off
+        case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1]:
         return

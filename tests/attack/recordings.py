@@ -7,8 +7,8 @@ Nothing here comes from the judge or an integrator of the package: right-hand si
 
 The generator decides before the judge runs. `grain` is the root mean square of noise, digits or single precision in a row, at
 least 1e-9. A file is wrong if it differs from the exact motion by more than 3 grains (root mean square over the rows,
-against the initial state that fits best unless the first row is exact). A planted mistake that differs by less proves nothing. A
-mistake is identifiable if it differs by more than 10, also from its rivals: other mistakes of its kind with as few fitted
+against the initial state that fits best unless the first row is exact). A planted mistake that differs by less proves nothing.
+A mistake is identifiable if it differs by more than 10, also from its rivals: other mistakes of its kind with as few fitted
 numbers, whose differences may be scaled, so that a method has its best step.
 """
 
