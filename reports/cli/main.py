@@ -19,6 +19,7 @@ from .gate import gate
 from .importers import importers
 from .judge import judge
 from .list import list_all
+from .motions import motions
 from .new import new
 from .options import epilog
 from .recommend import recommend
@@ -104,5 +105,5 @@ def main(context: click.Context) -> None:
         click.echo(FIRST)
 
 
-for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge, importers):
+for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge, importers, motions):
     main.add_command(command)

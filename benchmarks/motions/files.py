@@ -1,0 +1,101 @@
+"""The files of motions, JSON and CSV."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from conservative.files import write_text
+
+from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
+from .programs import FACTOR, ORDERS, PARTS, QUANTITIES, Measured, measure
+
+
+def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
+    """Return a motion as the keys and values of its JSON file; README.md of references/motions explains them."""
+    exact = motion.exact
+    parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
+    return {
+        "name": motion.name,
+        "about": motion.about,
+        "needs": motion.needs,
+        "inertia_B": motion.inertia_B,
+        "R_WB0": exact["R_WB"][0].tolist(),
+        "quaternion_wxyz0": exact["quaternion_wxyz"][0].tolist(),
+        "w_WB_B0": [float(x) for x in motion.rates],
+        **parts,
+        **({"gravity_W": [0.0, 0.0, -GRAVITY]} if motion.weight else {}),
+        "t": motion.t,
+        **{name: exact[name][1:].tolist() for name in SAMPLE},
+        "scale": dict(zip(QUANTITIES[1:], (float(f"{x:.6g}") for x in measured.scale), strict=True)),
+        "tolerance": [
+            {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
+            for at, ((order, angle), values) in enumerate(measured.tolerances.items())
+        ],
+        "single": _short(2e-6 + 6e-8 * motion.steps * motion.samples * PARTS[-1]),
+        "catches": [
+            {"mistake": name, "factor": dict(zip(map(str, ORDERS), map(_short, factors), strict=True)), **_named(error)}
+            for name, (factors, error) in sorted(measured.catches.items(), key=lambda item: -item[1][0][1])
+            if factors[1] >= FACTOR
+        ],
+    }
+
+
+def _short(x: float) -> float:
+    return float(f"{x:.2g}")
+
+
+def _named(values: Any) -> dict[str, float]:
+    return dict(zip(QUANTITIES, map(_short, values), strict=True))
+
+
+def as_csv(keys: dict[str, Any]) -> str:
+    """Return a motion as lines of a key and its values, matrices by rows; a line for each sample, tolerance and mistake."""
+    lines = ["key,values"]
+    for key, value in keys.items():
+        if key == "t":
+            lines += [_line("sample", t, [keys[name][i] for name in SAMPLE]) for i, t in enumerate(value)]
+        elif key in ("tolerance", "catches"):
+            lines += [_line(key, each) for each in value]
+        elif key not in SAMPLE:
+            lines.append(_line(key, value))
+    return "\n".join([*lines, ""])
+
+
+def _line(*values: Any) -> str:
+    return ",".join(str(x).replace(",", ";") for x in _flat(values))
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    for x in value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ():
+        yield from _flat(x) if isinstance(x, dict | list | tuple) else [x]
+
+
+def as_json(keys: dict[str, Any]) -> str:
+    """Return a motion as JSON, a line for each key, sample, tolerance and mistake."""
+    texts = []
+    for key, value in keys.items():
+        rows = isinstance(value, list) and value and isinstance(value[0], list | dict)
+        text = "[\n" + ",\n".join(map(json.dumps, value)) + "\n]" if rows else json.dumps(value)
+        texts.append(f'"{key}": {text}')
+    return "{\n" + ",\n".join(texts) + "\n}\n"
+
+
+def contents() -> Iterator[tuple[str, str]]:
+    """Yield the names and texts of the files of all motions."""
+    motions = load()
+    for motion, measured in zip(motions, measure(motions), strict=True):
+        keys = describe(motion, measured)
+        yield f"{motion.name}.json", as_json(keys)
+        yield f"{motion.name}.csv", as_csv(keys)
+
+
+def write(folder: Path) -> int:
+    """Write the files into a folder and return their number."""
+    folder.mkdir(parents=True, exist_ok=True)
+    count = 0
+    for count, (name, text) in enumerate(contents(), 1):  # noqa: B007
+        write_text(folder / name, text, "out")
+    return count

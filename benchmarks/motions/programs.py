@@ -1,0 +1,290 @@
+"""Correct methods and mistaken programs on many motions at once: tolerances, and the factors by which mistakes exceed them.
+
+Mistakes and methods are those of `judge` (`benchmarks.judge.mistakes`), with others here that only a program can have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, angle_between, from_quaternion
+from conservative.potentials.turning import static_part
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.scene import Scene
+
+from ..judge.mistakes import EQUATIONS, READINGS, SCENES, STEPS, Reading, Step, with_inertia
+from ..judge.motion import Equations
+from .motion import Motion
+
+ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)  # declared orders; |w| h, and steps in 0.1 rad
+LEAST, FACTOR = 1e-12, 10.0  # an error that round-off may make; factor of a mistake that is listed
+MARGIN = 5.0
+"""Tolerances over the largest error of the methods: order 2 on rotation matrices errs four times as much as on quaternions."""
+QUANTITIES = ("attitude", "rates", "energy", "momentum")
+CLAMP, SLEEP, SMALLEST = 100.0, 0.05, 1e-6  # rad/s, rad/s and kg m^2, as engines have them
+
+
+class Slope:
+    """The derivative of states (7, n) of n equations at times (n,), s.
+
+    `tensor` returns the inertia in body axes from that of the body and the attitudes (n, 3, 3), `spinning` the one that the
+    gyroscopic term has.
+    """
+
+    def __init__(self, equations: Sequence[Equations], tensor: Any = None, spinning: Any = None) -> None:
+        self.tensor, self.spinning = tensor, spinning
+
+        def gather(read: Callable[[Any], Any]) -> Array:
+            return np.array([read(each.scene) for each in equations], dtype=float)
+
+        self.J = gather(lambda s: s.body.inertia)
+        self.inverse = np.linalg.inv(self.J)
+        self.rotor = gather(lambda s: np.zeros(3) if s.body.rotor_momentum is None else s.body.rotor_momentum)
+        self.body = gather(lambda s: s.torque.at(0.0) if s.torque and s.torque.frame == "body" else np.zeros(3))
+        self.world = gather(lambda s: s.torque.at(0.0) if s.torque and s.torque.frame == "world" else np.zeros(3))
+        self.damping = gather(lambda s: s.damping.at(0.0) if s.damping else np.zeros((3, 3)))
+        self.arm = gather(lambda s: s.potential.moment_B if isinstance(s.potential, UniformGravity) else np.zeros(3))
+        self.pull = gather(lambda s: getattr(static_part(s.potential), "factor", 0.0))
+        self.orbit = gather(lambda s: s.potential.orbit.rate if hasattr(s.potential, "orbit") else 0.0)
+        of_all = np.array([[each.gyroscopic, each.field, each.damping] for each in equations], dtype=float)
+        self.gyroscopic, self.field, self.more = of_all.T[:, :, None]
+        self.fixed = None if equations[0].fixed is None else np.array([each.fixed for each in equations], dtype=float)
+
+    def __call__(self, t: Any, y: Array) -> Array:
+        q, w = y[:4], y[4:].T
+        R = from_quaternion((q / np.sqrt((q * q).sum(axis=0))).T)
+        J, inverse = self.J, self.inverse
+        if self.fixed is not None:
+            J = np.swapaxes(R, 1, 2) @ self.fixed @ R
+        elif self.tensor:
+            J = self.tensor(J, R)
+        if J is not self.J:
+            inverse = np.linalg.inv(J)
+        G = self.spinning(J) if self.spinning else J
+        torque = self.gyroscopic * np.cross(_times(G, w) + self.rotor, w) + self.body - _times(self.damping, w)
+        torque = torque + self.field * np.cross(R[:, 2], self.arm) + _times(np.swapaxes(R, 1, 2), self.world)
+        if self.pull.any():
+            angle = self.orbit * t
+            u = np.cos(angle)[:, None] * R[:, 0] + np.sin(angle)[:, None] * R[:, 1]
+            torque = torque + (self.field * self.pull[:, None]) * np.cross(u, _times(self.J, u))
+        v, s, out = q[1:].T, q[0], np.empty_like(y)
+        out[0], out[1:4] = -0.5 * (v * w).sum(axis=1), 0.5 * (s * w.T + np.cross(v, w).T)
+        out[4:] = (_times(inverse, torque) - self.more * w).T
+        return out
+
+
+def _times(M: Any, v: Any) -> Array:
+    return (M @ v[..., None])[..., 0]
+
+
+def march(
+    f: Slope, step: Step, y: Array, h: Array, count: int, first: float = 1.0, after: Callable[[Array], Array] | None = None
+) -> Array:
+    """Return the states (count + 1, 7, n) of steps of lengths h (n,), the first one scaled, each followed by a change."""
+    t, past, states = 0 * h, list[Array](), [y]
+    with np.errstate(all="ignore"):
+        for i in range(count):
+            size = h * (first if i == 0 else 1.0)
+            new = step.next(f, t, y, size, past)
+            if step.normalised:
+                new[:4] /= np.sqrt((new[:4] * new[:4]).sum(axis=0))
+            past, y, t = [y, *past][: step.past], new if after is None else after(new), t + size
+            states.append(y)
+    return np.array(states)
+
+
+def _compose(f: Any, t: Any, y: Array, h: Any, past: Any, name: str) -> Array:
+    """Return the state of a symmetric method of order 2, composed to order 4 (Yoshida 1990)."""
+    for share in (OUTER := 1 / (2 - 2 ** (1 / 3)), 1 - 2 * OUTER, OUTER):
+        y, t = STEPS[name].next(f, t, y, share * h, ()), t + share * h
+    return y
+
+
+def _extrapolate(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
+    """Return the state of the implicit midpoint rule, extrapolated to order 4 from one and two steps."""
+    rule = STEPS["the implicit midpoint rule"].next
+    return (4 * rule(f, t + h / 2, rule(f, t, y, h / 2, ()), h / 2, ()) - rule(f, t, y, h, ())) / 3
+
+
+def _orthonormal(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
+    """Return the state of semi-implicit Euler, whose attitude is turned by the arc tangent of the angle."""
+    new = y + h * f(t, y)
+    angle = h * np.sqrt((new[4:] * new[4:]).sum(axis=0))
+    turn = f(t, np.concatenate([y[:4], new[4:]]))[:4]
+    new[:4] = y[:4] + h * turn * np.tan(np.arctan(angle) / 2) / np.where(angle == 0, 0.5, angle / 2)
+    return new
+
+
+def _gauss(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
+    """Return the state of Gauss's collocation of order 4."""
+    a, b = f(t, y), f(t + h, y)
+    root = 3**0.5 / 6
+    for _ in range(30):
+        a, b = (f(t + (0.5 - root) * h, y + h * (a / 4 + (0.25 - root) * b)),
+                f(t + (0.5 + root) * h, y + h * ((0.25 + root) * a + b / 4)))  # fmt: skip
+    return y + h / 2 * (a + b)
+
+
+OTHERS = ("Buss 2 (augmented)", "leapfrog (velocity Verlet)")  # for one body at a time; of order 1 with a gyroscopic term
+OF_ORDER: dict[int, dict[str, Step]] = {
+    order: {name: step for name, step in STEPS.items() if step.order == order and step.normalised and name not in OTHERS}
+    for order in ORDERS
+}
+OF_ORDER[1]["R + h R [w], made orthonormal"] = Step(1, 0, _orthonormal)
+OF_ORDER[4] |= {
+    "three implicit midpoint steps": Step(4, 0, partial(_compose, name="the implicit midpoint rule")),
+    "three trapezoidal steps": Step(4, 0, partial(_compose, name="the trapezoidal rule")),
+    "the extrapolated midpoint rule": Step(4, 0, _extrapolate),
+    "Gauss 4": Step(4, 0, _gauss),
+}
+RK2, RK4 = STEPS["the explicit midpoint rule (RK2)"], STEPS["RK4"]
+
+
+def _stale(f: Any, t: Any, y: Array, h: Any, past: Any, update: str) -> Array:
+    """Return the rates of RK4, and the attitude by rates of the start or of the end of the step alone."""
+    new, old = RK4.next(f, t, y, h, past), STEPS["explicit Euler with the exponential map"].next
+    if update == "old":
+        new[:4] = old(f, t, y, h, past)[:4]
+    else:
+        new[:4] = y[:4] + h * f(t, np.concatenate([y[:4], new[4:]]))[:4]
+    return new
+
+
+def _limit(y: Array, low: float, high: float) -> Array:
+    speed = np.sqrt((y[4:] * y[4:]).sum(axis=0))
+    scale = np.where(speed < low, 0.0, np.minimum(1.0, high / np.maximum(speed, 1e-300)))
+    return np.concatenate([y[:4], y[4:] * scale])
+
+
+def _coarse(scene: Scene) -> Scene | None:
+    """Return the scene with principal moments of at least `SMALLEST`; None if they are."""
+    J, R = np.maximum(scene.body.moments, SMALLEST), scene.body.R_BP
+    return None if (scene.body.moments >= SMALLEST).all() else with_inertia(scene, R @ np.diag(J) @ R.T)
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistaken program: equations of a scene, or None where it makes no difference, and how they are solved and read."""
+
+    sentence: str
+    equations: Callable[[Scene], Equations | None] = Equations
+    options: tuple[tuple[str, Any], ...] = ()
+    step: Step = RK2
+    first: float = 1.0
+    after: Callable[[Array], Array] | None = None
+    read: Reading = lambda R, w: (R, w)
+
+
+def _of_scene(change: Callable[[Scene], Scene | None], scene: Scene) -> Equations | None:
+    other = change(scene)
+    return None if other is None else Equations(other)
+
+
+_PLANTED = {"order xyzw": "order wxyz"}  # a program that writes xyzw is read right as xyzw
+MISTAKES: dict[str, Mistake] = {
+    **{name: Mistake(sentence, partial(_of_scene, do)) for name, (sentence, do) in SCENES.items() if " and " not in name},
+    **{name: Mistake(sentence, build) for name, (sentence, build) in EQUATIONS.items()},
+    **{name: Mistake(READINGS[name][0], read=READINGS[_PLANTED.get(name, name)][1])
+       for name in ("transposed", "order xyzw", "reversed rates")},
+    "world rates": Mistake("The rates are in world axes", read=lambda R, w: (R, _times(R, w))),
+    "diagonal gyroscopic term": Mistake(
+        "The gyroscopic term has the diagonal of the inertia only",
+        options=(("spinning", lambda J: J * np.eye(3, dtype=J.dtype)),),
+    ),
+    "R I for R I R'": Mistake("The inertia in world axes is R I instead of R I R'", options=(("tensor", lambda J, R: J @ R),)),
+    "half a step late": Mistake("The state is that of half a step earlier", first=0.5),
+    "damping 0.01": Mistake("Damping of 0.01 per second is on", lambda scene: Equations(scene, damping=0.01)),
+    "damping 0.05": Mistake("Damping of 0.05 per second is on", lambda scene: Equations(scene, damping=0.05)),
+    "clamp": Mistake(f"Rates are limited to {CLAMP:g} rad/s", after=partial(_limit, low=0.0, high=CLAMP)),
+    "sleep": Mistake(f"Bodies slower than {SLEEP:g} rad/s are put to sleep", after=partial(_limit, low=SLEEP, high=np.inf)),
+    "attitude by normalisation": Mistake(
+        "The attitude is q + h/2 q w with rates of one end, normalised", step=Step(1, 0, partial(_stale, update="new"))
+    ),
+    "stale rates": Mistake(
+        "The attitude is turned by the rates of the start of the step", step=Step(1, 0, partial(_stale, update="old"))
+    ),
+    "smallest moments": Mistake(f"Moments below {SMALLEST:g} kg m^2 are replaced", partial(_of_scene, _coarse)),
+}  # fmt: skip
+"""What a failing program may have done, by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured of a motion.
+
+    `scale` has the sizes of rates, energy and momentum, SI units. `tolerances` are by order and angle |w| h, `catches` by
+    mistake: its factors by order at the smallest step, and its own errors there. All errors are those of `QUANTITIES`.
+    """
+
+    scale: Array
+    tolerances: dict[tuple[int, float], Array]
+    catches: dict[str, tuple[Array, Array]]
+
+
+def measure(motions: Sequence[Motion], among: Sequence[str] = tuple(MISTAKES)) -> list[Measured]:
+    """Return tolerances and factors of motions, all motions at once."""
+    right = [Equations(each.scene) for each in motions]
+    scale, plain, everyone = _scales(motions), Slope(right), range(len(motions))
+    runs = partial(_errors, motions, scale, mistake=Mistake(""))
+    largest = {
+        (order, angle): np.max([runs(plain, step, parts) for step in OF_ORDER[order].values()], axis=0)
+        for order in ORDERS
+        for angle, parts in zip(ANGLES, PARTS, strict=True)
+    }
+    tolerances = {key: _round_up(MARGIN * found + LEAST) for key, found in largest.items()}
+    catches: list[dict[str, tuple[Array, Array]]] = [{} for _ in motions]
+    for name in among:
+        mistake = MISTAKES[name]
+        given = [mistake.equations(each.scene) for each in motions]
+        mine = [i for i in everyone if given[i] is not None]
+        if mine:
+            f = Slope([given[i] for i in mine], **dict(mistake.options))  # type: ignore[misc]  # those of `mine` are not None
+            found = _errors([motions[i] for i in mine], scale[mine], f, mistake.step, PARTS[-1], mistake)
+            for i, error in zip(mine, found, strict=True):
+                error = np.where(error < 10 * LEAST, 0.0, error)  # round-off depends on the machine
+                factors = np.array([(error / tolerances[order, ANGLES[-1]][i]).max() for order in ORDERS])
+                catches[i][name] = factors, error
+    return [Measured(scale[i], {key: each[i] for key, each in tolerances.items()}, catches[i]) for i in everyone]
+
+
+def _round_up(x: Array) -> Array:
+    """Return numbers rounded up to two digits."""
+    size = 10.0 ** (np.floor(np.log10(x)) - 1)
+    return np.array([float(f"{each:.1e}") for each in (np.ceil(x / size) * size).ravel()]).reshape(x.shape)
+
+
+def _scales(motions: Sequence[Motion]) -> Array:
+    """Return the sizes (n, 3) of rates, kinetic energy and momentum, which errors are relative to."""
+    return np.array([
+        [np.linalg.norm(w, axis=1).max(), (w @ m.inertia_B * w).sum(axis=1).max() / 2, np.linalg.norm(L, axis=1).max()]
+        for m in motions for w, L in [(m.exact["w_WB_B"], m.exact["momentum_W"])]
+    ])  # fmt: skip
+
+
+def _errors(motions: Sequence[Motion], scale: Array, f: Slope, step: Step, parts: int, mistake: Mistake) -> Array:
+    """Return the largest errors (n, 4) of the samples."""
+    h = np.array([each.step / parts for each in motions])
+    ends = [[n * each.steps * parts for n in range(1, each.samples + 1)] for each in motions]
+    start = np.array([[*m.exact["quaternion_wxyz"][0], *m.rates] for m in motions]).T
+    y = march(f, step, start, h, max(map(max, ends)), mistake.first, mistake.after)
+    right, out = Slope([Equations(each.scene) for each in motions]), np.empty((len(motions), 4))
+    for i, (motion, rows) in enumerate(zip(motions, ends, strict=True)):
+        with np.errstate(all="ignore"):
+            R, w, E, L = _read(right, i, y[rows][:, :, i], mistake.read)
+            R0, w0, E0, L0 = (motion.exact[name][1:] for name in ("R_WB", "w_WB_B", "energy", "momentum_W"))
+            parts_of = np.linalg.norm(w - w0, axis=1), np.abs(E - E0), np.linalg.norm(L - L0, axis=1)
+            out[i] = angle_between(R, R0).max(), *(x.max() / size for x, size in zip(parts_of, scale[i], strict=True))
+    return np.nan_to_num(out, nan=1e6, posinf=1e6)
+
+
+def _read(f: Slope, i: int, y: Array, read: Reading) -> tuple[Any, Any, Array, Array]:
+    """Return attitudes (n, 3, 3), rates (n, 3), energy (n,), momentum (n, 3) of states (n, 7) as a program gives them."""
+    R, w = read(from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)), y[:, 4:])
+    assert R is not None
+    L = np.asarray(w) @ f.J[i]
+    return R, w, (w * L).sum(axis=1) / 2 + R[:, 2] @ f.arm[i], _times(R, L + f.rotor[i])
