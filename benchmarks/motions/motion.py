@@ -57,7 +57,7 @@ class Motion:
     @property
     def inertia_B(self) -> list[list[float]]:
         """The inertia (3, 3), kg m^2, about the centre of mass or the fixed point."""
-        xx, yy, zz, xy, xz, yz = self.inertia
+        xx, yy, zz, xy, xz, yz = map(float, self.inertia)
         return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 
     @property
@@ -138,12 +138,8 @@ def _advance(motion: Motion, inverse: Any, t: Any, state: list[Any], h: Any) -> 
             series.append(function(n * t + k * mp.pi / 2) * n**k / mp.factorial(k))
         _append(u, [_convolve(R[0][i], orbit[0]) + _convolve(R[1][i], orbit[1]) for i in range(3)])
         _append(Ju, _apply(J, [series[k] for series in u]))
-        g, world, resistance = (
-            [series[k] for series in R[2]],
-            motion.torque_W or none,
-            _apply(motion.damping or [none] * 3, now),
-        )
-        body = motion.torque_B if motion.torque_B and k == 0 else none
+        g, world = [series[k] for series in R[2]], [[row[i][k] for row in R] for i in range(3)]
+        loads = _apply(world, motion.torque_W or none), _apply(motion.damping or [none] * 3, now)
         torque = [
             a + 3 * n * n * b + c - d + g[i - 2] * moment[i - 1] - g[i - 1] * moment[i - 2]
             for i, (a, b, c, d) in enumerate(zip(_cross(L, w), _cross(u, Ju), *loads, strict=True))

@@ -51,8 +51,7 @@ class Slope:
         self.arm = gather(lambda s: s.potential.moment_B if isinstance(s.potential, UniformGravity) else np.zeros(3))
         self.pull = gather(lambda s: getattr(static_part(s.potential), "factor", 0.0))
         self.orbit = gather(lambda s: s.potential.orbit.rate if hasattr(s.potential, "orbit") else 0.0)
-        of_all = np.array([[each.gyroscopic, each.field, each.damping] for each in equations], dtype=float)
-        self.gyroscopic, self.field, self.more = of_all.T[:, :, None]
+        self.gyroscopic, self.field = np.array([[each.gyroscopic, each.field] for each in equations]).T[:, :, None]
         self.fixed = None if equations[0].fixed is None else np.array([each.fixed for each in equations], dtype=float)
 
     def __call__(self, t: Any, y: Array) -> Array:
@@ -74,7 +73,7 @@ class Slope:
             torque = torque + (self.field * self.pull[:, None]) * np.cross(u, _times(self.J, u))
         v, s, out = q[1:].T, q[0], np.empty_like(y)
         out[0], out[1:4] = -0.5 * (v * w).sum(axis=1), 0.5 * (s * w.T + np.cross(v, w).T)
-        out[4:] = (_times(inverse, torque) - self.more * w).T
+        out[4:] = _times(inverse, torque).T
         return out
 
 
@@ -155,6 +154,13 @@ def _stale(f: Any, t: Any, y: Array, h: Any, past: Any, update: str) -> Array:
     return new
 
 
+def _damped(f: Any, t: Any, y: Array, h: Any, past: Any, rate: float) -> Array:
+    """Return the state of RK2 with rates that are damped, 1/s."""
+    new = RK2.next(f, t, y, h, past)
+    new[4:] *= np.exp(-rate * h)
+    return new
+
+
 def _limit(y: Array, low: float, high: float) -> Array:
     speed = np.sqrt((y[4:] * y[4:]).sum(axis=0))
     scale = np.where(speed < low, 0.0, np.minimum(1.0, high / np.maximum(speed, 1e-300)))
@@ -198,8 +204,8 @@ MISTAKES: dict[str, Mistake] = {
     ),
     "R I for R I R'": Mistake("The inertia in world axes is R I instead of R I R'", options=(("tensor", lambda J, R: J @ R),)),
     "half a step late": Mistake("The state is that of half a step earlier", first=0.5),
-    "damping 0.01": Mistake("Damping of 0.01 per second is on", lambda scene: Equations(scene, damping=0.01)),
-    "damping 0.05": Mistake("Damping of 0.05 per second is on", lambda scene: Equations(scene, damping=0.05)),
+    **{f"damping {rate}": Mistake(f"Damping of {rate} per second is on", step=Step(2, 0, partial(_damped, rate=rate)))
+       for rate in (0.01, 0.05)},
     "clamp": Mistake(f"Rates are limited to {CLAMP:g} rad/s", after=partial(_limit, low=0.0, high=CLAMP)),
     "sleep": Mistake(f"Bodies slower than {SLEEP:g} rad/s are put to sleep", after=partial(_limit, low=SLEEP, high=np.inf)),
     "attitude by normalisation": Mistake(

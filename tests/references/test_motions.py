@@ -1,0 +1,242 @@
+"""Motions as files: every digit by a second solution, tolerances, and the tests of references/motions in each language."""
+
+import csv
+import json
+import math
+import re
+
+import mpmath
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from conservative.attitude import angle_between, from_quaternion
+from conservative.benchmarks.judge.motion import Equations
+from conservative.benchmarks.motions import files, programs
+from conservative.benchmarks.motions.motion import SAMPLE, load
+from conservative.grid import Grid
+from conservative.potentials.turning import Turning
+from conservative.references import precise
+from conservative.references.collocation import collocate
+from conservative.reports.cli.main import main
+
+from .motions_engines.methods import METHODS
+from .motions_engines.run import COMPILERS, LANGUAGES, MOTIONS, missing, run
+
+CATALOGUE = {motion.name: motion for motion in load()}
+FILES = {name: json.loads((MOTIONS / f"{name}.json").read_text()) for name in CATALOGUE}
+slow = pytest.mark.slow
+
+
+def test_files_and_their_sizes():
+    sizes = {path.name: path.stat().st_size for path in MOTIONS.iterdir() if path.suffix in (".json", ".csv")}
+    assert sizes.keys() == {f"{name}.{kind}" for name in CATALOGUE for kind in ("json", "csv")}
+    assert len(CATALOGUE) == 48
+    assert sum(sizes.values()) < 600_000
+    assert max(sizes.values()) <= 20_000
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_files_are_the_solution_to_the_last_digit(name):
+    """CSV and JSON have the same numbers, and these are what the solution gives now."""
+    motion, kept = CATALOGUE[name], FILES[name]
+    for key in SAMPLE:
+        np.testing.assert_array_equal(np.array(kept[key]), motion.exact[key][1:])
+    assert (MOTIONS / f"{name}.csv").read_text() == files.as_csv(kept)
+    rows = list(csv.reader((MOTIONS / f"{name}.csv").read_text().splitlines()))
+    numbers = [[float(x) for x in row[1:]] for row in rows if row[0] == "sample"]
+    np.testing.assert_array_equal(np.array(numbers)[:, 10:14], kept["quaternion_wxyz"])
+    np.testing.assert_array_equal(np.array(numbers)[:, 21:], kept["momentum_W"])
+
+
+@pytest.mark.parametrize("name", [name for name, motion in CATALOGUE.items() if not motion.scene.loaded])
+def test_digits_by_heyoka_in_256_bits(name):
+    """heyoka's Taylor integrator shares no code with the solution. Measured: no digit differs."""
+    pytest.importorskip("heyoka")
+    motion = CATALOGUE[name]
+    scene, kept = motion.scene, FILES[name]
+    with mpmath.workprec(300):
+        exact = mpmath.mpf  # products of parameters are not rounded to double
+        values = [exact(x) for x in motion.rotor_momentum_B or (0, 0, 0)]
+        if motion.weight:
+            values += [exact(motion.weight) * exact(x) for x in motion.com_B]
+        if motion.orbit:
+            field = scene.potential
+            assert isinstance(field, Turning)
+            inertia = np.ravel(motion.inertia_B).tolist()
+            values += [motion.orbit, 0, 0, 1, 3 * exact(motion.orbit) ** 2, *inertia, 1, 0, 0]
+        form = precise.find_field(scene.potential)
+        solve = precise._solver(motion.inertia_B, motion.quaternion, list(map(float, motion.rates)), form, values, 256)
+    _, _, reals = solve(precise._reals([0.0, *motion.t], 256), None)
+    found = np.array([[float(x) for x in row] for row in reals])[1:]
+    np.testing.assert_array_equal(found[:, :4], kept["quaternion_wxyz"])
+    np.testing.assert_array_equal(found[:, 4:], kept["w_WB_B"])
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_digits_by_collocation(name):
+    """Collocation in extended precision, for torque and damping too. Measured: 4.5e-16 (matrices), 2e-16, 4e-16 and 3e-16."""
+    motion, kept = CATALOGUE[name], FILES[name]
+    found = collocate(motion.scene, Grid(motion.steps * motion.step, motion.samples), 8)
+    R, w = found.R_WB[1:], found.w_WB_B[1:]
+    L = w @ np.array(motion.inertia_B)
+    energy = (w * L).sum(axis=1) / 2 + (motion.scene.potential.energy(R) if motion.weight else 0)
+    momentum = np.einsum("nij,nj->ni", R, L + np.array(motion.rotor_momentum_B or [0, 0, 0]))
+    assert np.abs(R - kept["R_WB"]).max() <= 1e-15
+    for key, value in (("w_WB_B", w), ("energy", energy), ("momentum_W", momentum)):
+        size = np.abs(kept[key]).max() if key != "energy" else kept["scale"]["energy"] + np.abs(kept["energy"]).max()
+        assert np.abs(value - kept[key]).max() <= 1e-15 * size
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_what_a_sample_says_agrees(name):
+    """The quaternion is that of the matrix, and continuous; world rates are the turned body rates."""
+    kept = FILES[name]
+    R, q = np.array([kept["R_WB0"], *kept["R_WB"]]), np.array([kept["quaternion_wxyz0"], *kept["quaternion_wxyz"]])
+    assert np.abs(from_quaternion(q) - R).max() <= 4e-16
+    assert (np.sum(q[1:] * q[:-1], axis=1) > 0).all()
+    assert np.abs(np.einsum("nij,nj->ni", R[1:], kept["w_WB_B"]) - kept["w_WB_W"]).max() <= 1e-15 * kept["scale"]["rates"]
+    assert np.linalg.eigvalsh(kept["inertia_B"])[2] <= np.trace(kept["inertia_B"]) / 2  # the body exists
+    if "weight" in kept:  # also about its centre of mass
+        c, mass = np.array(kept["com_B"]), kept["weight"] / -kept["gravity_W"][2]
+        own = np.linalg.eigvalsh(np.array(kept["inertia_B"]) - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+        assert own[0] > 0
+        assert own[2] <= own[0] + own[1]
+
+
+def test_quaternions_pass_zero():
+    starts = {name: [kept["quaternion_wxyz0"][0], *(q[0] for q in kept["quaternion_wxyz"])] for name, kept in FILES.items()}
+    assert sum(min(x) < 0 < max(x) for x in starts.values()) >= 5
+
+
+SOME = ["separatrix", "damped_and_driven", "tiny", "orbit", "heavy", "rotor_dominates"]
+
+
+@pytest.fixture(scope="module")
+def measured():
+    motions = [CATALOGUE[name] for name in SOME]
+    return [files.describe(motion, each) for motion, each in zip(motions, programs.measure(motions), strict=True)]
+
+
+def test_tolerances_and_factors_are_measured_again(measured):
+    for each in measured:
+        for key in ("scale", "tolerance", "single", "catches"):
+            assert each[key] == FILES[each["name"]][key]
+
+
+@slow
+def test_the_command_writes_the_files_again(tmp_path):
+    done = CliRunner().invoke(main, ["motions", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert len(list(tmp_path.iterdir())) == 96
+    for path in tmp_path.iterdir():
+        assert path.read_text() == (MOTIONS / path.name).read_text(), path.name
+
+
+@pytest.mark.parametrize("order", programs.ORDERS)
+def test_methods_have_their_order(order):
+    """Errors fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.13 of the order."""
+    motions = [CATALOGUE["world_tensor"], CATALOGUE["heavy"], CATALOGUE["damped_and_driven"]]
+    scale, f = programs._scales(motions), programs.Slope([Equations(motion.scene) for motion in motions])
+    assert len(programs.OF_ORDER[order]) >= 4
+    for name, step in programs.OF_ORDER[order].items():
+        coarse, fine = (programs._errors(motions, scale, f, step, parts, programs.Mistake("")) for parts in (1, 10))
+        assert np.abs(np.log10(coarse / fine)[:, :2].max(axis=1) - order).max() <= 0.2, name
+
+
+def test_every_mistake_is_caught_by_a_factor_of_ten():
+    best = dict.fromkeys(programs.MISTAKES, 0.0)
+    for kept in FILES.values():
+        for each in kept["catches"]:
+            best[each["mistake"]] = max(best[each["mistake"]], each["factor"]["2"])
+    assert len(best) >= 20
+    assert min(best.values()) >= 10, min(best, key=best.get)  # measured: 290, of clamped rates and stale ones
+
+
+def test_order_one_allows_what_order_two_does_not():
+    """A program that declares order 1 passes with stale rates."""
+    for kept in FILES.values():
+        for each in kept["catches"]:
+            if each["mistake"] in ("stale rates", "attitude by normalisation"):
+                assert each["factor"]["1"] < 1 < each["factor"]["2"]
+
+
+def names(lines):
+    return [line.partition("with: ")[2] or "unknown" for line in lines[:-1]]
+
+
+def needs(language):
+    return pytest.param(language, marks=[pytest.mark.skipif(bool(missing(language)), reason=str(missing(language)))])
+
+
+RK2 = METHODS["explicit midpoint"][1]
+ALL = [needs(language) for language in LANGUAGES]
+
+
+@pytest.mark.parametrize("language", ALL)
+def test_right_program_passes(language, tmp_path):
+    assert run(language, tmp_path, "", RK2, 2) == ["0 of 48 motions failed"]
+
+
+@pytest.mark.parametrize("language", ALL)
+def test_missing_term_is_named(language, tmp_path):
+    """Only motions whose rates are constant pass: a ball, and turns about a principal axis."""
+    lines = run(language, tmp_path, "no gyroscopic term", RK2, 2)
+    assert lines[-1] == "44 of 48 motions failed"
+    assert names(lines).count("no gyroscopic term") >= 40
+    assert re.search(
+        r"\w+: (attitude|rates|energy|momentum) error [\d.e+-]+, tolerance [\d.e+-]+; ", lines[0].replace(".csv", "")
+    )
+
+
+def planted(language):
+    """C runs all mistakes; the other languages do with --all."""
+    return [pytest.param(language, mistake, marks=[] if language == "C" else [slow]) for mistake in programs.MISTAKES]
+
+
+AMBIGUOUS = {"attitude by normalisation": "stale rates"}
+"""Mistakes whose errors are those of another one."""
+
+
+@pytest.mark.parametrize(("language", "mistake"), [each for language in LANGUAGES for each in planted(language)])
+def test_planted_mistakes_fail_and_are_named(language, mistake, tmp_path):
+    """Measured: of the failing motions, at least 0.2 name the mistake; 1.0 for most."""
+    if missing(language):
+        pytest.skip(missing(language))
+    lines = run(language, tmp_path, mistake, RK2, 2)
+    assert len(lines) > 1
+    found = [AMBIGUOUS.get(name, name) for name in names(lines)]
+    assert found.count(AMBIGUOUS.get(mistake, mistake)) >= max(1, max(map(found.count, set(found) - {"unknown"})))
+
+
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("language", [needs("C"), *(pytest.param(each, marks=slow) for each in LANGUAGES if each != "C")])
+def test_right_programs_pass(language, method, single, tmp_path):
+    """Explicit and implicit methods that are not among those of the tolerances, in double and single precision."""
+    if missing(language):
+        pytest.skip(missing(language))
+    order, numbers = METHODS[method]
+    for angle in programs.ANGLES if language == "C" else (0.01,):
+        assert run(language, tmp_path, "", numbers, order, angle, single) == ["0 of 48 motions failed"], angle
+
+
+def test_languages_without_compiler_are_named():
+    """C# needs Mono, which few machines have; Julia is text only."""
+    assert {"C#", *LANGUAGES} == COMPILERS.keys()
+    for name in ("Test.cs", "test.jl"):
+        assert "simulate" in (MOTIONS / name).read_text().lower()
+
+
+def test_every_tolerance_is_above_round_off():
+    for kept in FILES.values():
+        for each in kept["tolerance"]:
+            assert min(each[name] for name in programs.QUANTITIES) >= 1e-12
+            assert all(math.isfinite(each[name]) for name in programs.QUANTITIES)
+
+
+def test_an_engine_that_does_nothing_fails(tmp_path):
+    """The files as they are: `simulate` returns the start."""
+    R0 = np.array([kept["R_WB0"] for kept in FILES.values()])
+    ends = np.array([kept["R_WB"][-1] for kept in FILES.values()])
+    assert angle_between(R0, ends).min() >= 10 * max(each["tolerance"][5]["attitude"] for each in FILES.values())
