@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 import os
 import re
 import tomllib
@@ -171,6 +172,39 @@ def commands() -> str:
     return table(["command", "purpose", "exit code"], rows)
 
 
+def kept_motions() -> list[dict[str, Any]]:
+    """Return the motions of references/motions, in the order of the catalogue."""
+    from conservative.benchmarks.motions.motion import load
+
+    folder = ROOT / "references" / "motions"
+    return [json.loads((folder / f"{motion.name}.json").read_text(encoding="utf-8")) for motion in load()]
+
+
+def motions() -> str:
+    """Return a row for each motion."""
+    rows = [
+        [f"`{each['name']}`", each["about"], ", ".join(each["needs"]), f"{each['tolerance'][0]['steps'] * len(each['t'])}"]
+        for each in kept_motions()
+    ]
+    return table(["motion", "what it is", "needs", "steps of 0.1 rad"], rows)
+
+
+def _factor(x: float) -> str:
+    return "allowed" if x < 1 else f"{x:.0f}" if x < 1000 else f"{x:.0e}".replace("+0", "").replace("+", "")
+
+
+def mistakes() -> str:
+    """Return a row for each mistake that motions catch."""
+    from conservative.benchmarks.motions.programs import MISTAKES
+
+    rows, kept = [], kept_motions()
+    for name, mistake in MISTAKES.items():
+        factors = [each["factor"] for motion in kept for each in motion["catches"] if each["mistake"] == name]
+        best = [max((factor[order], -1.0) for factor in factors)[0] for order in ("1", "2", "4")]
+        rows.append([name, mistake.sentence, str(len(factors)), *map(_factor, best)])
+    return table(["mistake", "what the program does", "motions", "order 1", "order 2", "order 4"], rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,
@@ -179,6 +213,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
     "studies": studies,
     "commands": commands,
+    "motions": motions,
+    "mistakes of motions": mistakes,
     **{f"code of {room}": partial(map_of, ROOT / room) for room in ROOMS},
 }
 """Tables by the name of their mark."""

@@ -10,7 +10,7 @@ from typing import Any
 from conservative.files import write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import FACTOR, ORDERS, PARTS, QUANTITIES, Measured, measure
+from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, measure
 
 
 def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
@@ -37,10 +37,15 @@ def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
         "single": _short(5e-6 + 2.5e-7 * motion.steps * motion.samples * PARTS[-1]),
         "catches": [
             {"mistake": name, "factor": dict(zip(map(str, ORDERS), map(_short, factors), strict=True)), **_named(error)}
-            for name, (factors, error) in sorted(reversed(measured.catches.items()), key=lambda item: -_short(item[1][0][1]))
+            for name, (factors, error) in sorted(measured.catches.items(), key=_rank)
             if factors[1] >= FACTOR
         ],
     }
+
+
+def _rank(item: tuple[str, tuple[Any, Any]]) -> tuple[float, int]:
+    """Return the place in a file: by factors. Of mistakes with the same effect the later one, which is more special, is first."""
+    return -_short(item[1][0][1]), -list(MISTAKES).index(item[0])
 
 
 def _short(x: float) -> float:

@@ -26,6 +26,7 @@ LEAST, FACTOR = 1e-12, 10.0  # an error that round-off may make; factor of a mis
 MARGIN = 5.0
 """Tolerances over the largest error of the methods: order 2 on rotation matrices errs four times as much as on quaternions."""
 QUANTITIES = ("attitude", "rates", "energy", "momentum")
+RK2, RK4, MIDPOINT = STEPS["the explicit midpoint rule (RK2)"], STEPS["RK4"], STEPS["the implicit midpoint rule"].next
 CLAMP, SLEEP, SMALLEST = 100.0, 0.05, 1e-6  # rad/s, rad/s and kg m^2, as engines have them
 
 
@@ -97,17 +98,17 @@ def march(
     return np.array(states)
 
 
-def _compose(f: Any, t: Any, y: Array, h: Any, past: Any, name: str) -> Array:
-    """Return the state of a symmetric method of order 2, composed to order 4 (Yoshida 1990)."""
-    for share in (OUTER := 1 / (2 - 2 ** (1 / 3)), 1 - 2 * OUTER, OUTER):
-        y, t = STEPS[name].next(f, t, y, share * h, ()), t + share * h
+def _compose(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
+    """Return the state of three implicit midpoint steps, composed to order 4 (Yoshida 1990)."""
+    outer = 1 / (2 - 2 ** (1 / 3))
+    for share in (outer, 1 - 2 * outer, outer):
+        y, t = MIDPOINT(f, t, y, share * h, ()), t + share * h
     return y
 
 
 def _extrapolate(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
     """Return the state of the implicit midpoint rule, extrapolated to order 4 from one and two steps."""
-    rule = STEPS["the implicit midpoint rule"].next
-    return (4 * rule(f, t + h / 2, rule(f, t, y, h / 2, ()), h / 2, ()) - rule(f, t, y, h, ())) / 3
+    return (4 * MIDPOINT(f, t + h / 2, MIDPOINT(f, t, y, h / 2, ()), h / 2, ()) - MIDPOINT(f, t, y, h, ())) / 3
 
 
 def _orthonormal(f: Any, t: Any, y: Array, h: Any, past: Any) -> Array:
@@ -136,12 +137,10 @@ OF_ORDER: dict[int, dict[str, Step]] = {
 }
 OF_ORDER[1]["R + h R [w], made orthonormal"] = Step(1, 0, _orthonormal)
 OF_ORDER[4] |= {
-    "three implicit midpoint steps": Step(4, 0, partial(_compose, name="the implicit midpoint rule")),
-    "three trapezoidal steps": Step(4, 0, partial(_compose, name="the trapezoidal rule")),
+    "three implicit midpoint steps": Step(4, 0, _compose),
     "the extrapolated midpoint rule": Step(4, 0, _extrapolate),
     "Gauss 4": Step(4, 0, _gauss),
 }
-RK2, RK4 = STEPS["the explicit midpoint rule (RK2)"], STEPS["RK4"]
 
 
 def _stale(f: Any, t: Any, y: Array, h: Any, past: Any, update: str) -> Array:
@@ -191,12 +190,12 @@ def _of_scene(change: Callable[[Scene], Scene | None], scene: Scene) -> Equation
     return None if other is None else Equations(other)
 
 
-_PLANTED = {"order xyzw": "order wxyz"}  # a program that writes xyzw is read right as xyzw
 MISTAKES: dict[str, Mistake] = {
     **{name: Mistake(sentence, partial(_of_scene, do)) for name, (sentence, do) in SCENES.items() if " and " not in name},
     **{name: Mistake(sentence, build) for name, (sentence, build) in EQUATIONS.items()},
-    **{name: Mistake(READINGS[name][0], read=READINGS[_PLANTED.get(name, name)][1])
-       for name in ("transposed", "order xyzw", "reversed rates")},
+    **{name: Mistake(*READINGS[name][:1], read=READINGS[name][1])
+       for name in ("transposed", "reversed rates")},
+    "order xyzw": Mistake("The quaternions have the scalar last", read=READINGS["order wxyz"][1]),
     "world rates": Mistake("The rates are in world axes", read=lambda R, w: (R, _times(R, w))),
     "diagonal gyroscopic term": Mistake(
         "The gyroscopic term has the diagonal of the inertia only",
@@ -214,7 +213,7 @@ MISTAKES: dict[str, Mistake] = {
     "stale rates": Mistake(
         "The attitude is turned by the rates of the start of the step", step=Step(1, 0, partial(_stale, update="old"))
     ),
-    "smallest moments": Mistake(f"Moments below {SMALLEST:g} kg m^2 are replaced", partial(_of_scene, _coarse)),
+    "smallest moments": Mistake("Moments below 1e-6 kg m^2 are replaced by it", partial(_of_scene, _coarse)),
 }  # fmt: skip
 """What a failing program may have done, by name."""
 
