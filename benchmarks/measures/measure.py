@@ -47,6 +47,7 @@ class Measure(Enum):
     TURNS_OVER = "turns over", "1"
     TURNS_OVER_TRUE = "turns over of the exact motion", "1"
     PRECISION = "precision of numbers", "bit"
+    ALLOWED = "error over tolerance", "1"
 
     def __init__(self, text: str, unit: str) -> None:
         self.text, self.unit = text, unit

@@ -7,10 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+import conservative
+from conservative.attitude import Array, angle_between
 from conservative.files import write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
 from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, measure
+
+NEAR = 0.5
+"""Largest sum of the squares of the logarithms of four ratios of errors, of a mistake that is named."""
 
 
 def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
@@ -44,7 +51,7 @@ def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
 
 
 def _rank(item: tuple[str, tuple[Any, Any]]) -> tuple[float, int]:
-    """Return the place in a file: by factors. Of mistakes with the same effect the later one, which is more special, is first."""
+    """Return the place in a file: by factors. Of mistakes with the same effect the later one is first: it is more special."""
     return -_short(item[1][0][1]), -list(MISTAKES).index(item[0])
 
 
@@ -95,6 +102,29 @@ def contents() -> Iterator[tuple[str, str]]:
         keys = describe(motion, measured)
         yield f"{motion.name}.json", as_json(keys)
         yield f"{motion.name}.csv", as_csv(keys)
+
+
+def read(name: str) -> dict[str, Any]:
+    """Return a motion from its file in this package."""
+    folder = Path(conservative.__file__).parent / "references" / "motions"
+    return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def verdict(motion: dict[str, Any], order: int, angle: float, single: bool, R: Array, w: Array) -> tuple[float, str]:
+    """Return the largest error over its tolerance of samples (n, 3, 3), (n, 3), and the mistake with such errors, or ""."""
+    L = w @ np.array(motion["inertia_B"])
+    energy = (w * L).sum(axis=1) / 2 + motion.get("weight", 0) * R[:, 2] @ np.array(motion.get("com_B", [0, 0, 0]))
+    momentum = (R @ (L + motion.get("rotor_momentum_B", [0, 0, 0]))[..., None])[..., 0]
+    differences = [w - motion["w_WB_B"], (energy - motion["energy"])[:, None], momentum - motion["momentum_W"]]
+    sizes = [np.linalg.norm(x, axis=1).max() / size for x, size in zip(differences, motion["scale"].values(), strict=True)]
+    (row,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (order, angle))
+    allowed = np.array([row[name] + single * motion["single"] for name in QUANTITIES])
+    found = np.array([angle_between(R, np.array(motion["R_WB"])).max(), *sizes])
+    if (found <= allowed).all():
+        return float((found / allowed).max()), ""
+    known = np.array([[each[name] for name in QUANTITIES] for each in motion["catches"]])
+    apart = (np.log(np.maximum(found, allowed) / np.maximum(known, allowed)) ** 2).sum(axis=1)
+    return float((found / allowed).max()), motion["catches"][apart.argmin()]["mistake"] if apart.min() < NEAR else ""
 
 
 def write(folder: Path) -> int:

@@ -22,6 +22,7 @@ from . import (
     hard_cases,
     long_time,
     many_bodies,
+    motions,
     provenance,
     random_bodies,
     ratios,
@@ -32,7 +33,7 @@ from . import (
 )
 from .measured import Measured, of_scene
 
-SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time)}
+SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time, motions)}
 """Sections of the rows and samples of one study, by its name."""
 SCHEMA = 2
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
