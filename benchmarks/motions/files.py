@@ -41,7 +41,7 @@ def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
             {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
             for at, ((order, angle), values) in enumerate(measured.tolerances.items())
         ],
-        "single": _short(5e-6 + 2.5e-7 * motion.steps * motion.samples * PARTS[-1]),
+        "single": _short(2e-5 + 1e-6 * motion.steps * motion.samples * PARTS[-1]),
         "catches": [
             {"mistake": name, "factor": dict(zip(map(str, ORDERS), map(_short, factors), strict=True)), **_named(error)}
             for name, (factors, error) in sorted(measured.catches.items(), key=_rank)

@@ -4,6 +4,7 @@ typedef float real;
 #else
 typedef double real;
 #endif
+#define BOTH "no gyroscopic term and damping 0.05"
 #define IS(name) (!strcmp(MISTAKE, name))
 static const double tableau[] = {METHOD};
 
@@ -45,7 +46,7 @@ static void turning(const real *q, const real *w, real *out) {
   out[3] = (q[0] * w[2] + q[1] * w[1] - q[2] * w[0]) / 2;
 }
 static void slope(real t, const real *y, real *out) {
-  real R[9], back[9], J[9], K[9], G[9], A[9], L[3], T[3], a[3], b[3], sign = IS("no gyroscopic term") ? 0 : IS("sign of the gyroscopic term") ? -1 : 1;
+  real R[9], back[9], J[9], K[9], G[9], A[9], L[3], T[3], a[3], b[3], sign = IS("no gyroscopic term") || IS(BOTH) ? 0 : IS("sign of the gyroscopic term") ? -1 : 1;
   const real *w = y + 4;
   matrix(y, R), transpose(R, back);
   memcpy(J, body.J, sizeof J), memcpy(K, body.K, sizeof K);
@@ -102,9 +103,9 @@ static void step(real t, real h, real *y) {
   normalise(y);
   real speed = (real)sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6]), scale = 1;
   if (IS("damping 0.01")) scale = (real)exp(-0.01 * h);
-  if (IS("damping 0.05")) scale = (real)exp(-0.05 * h);
+  if (IS("damping 0.05") || IS(BOTH)) scale = (real)exp(-0.05 * h);
   if (IS("clamp") && speed > 100) scale = 100 / speed;
-  if (IS("sleep") && speed < 0.05f) scale = 0;
+  if (IS("sleep") && speed < 0.5f) scale = 0;
   for (int i = 4; i < 7; i++) y[i] *= scale;
 }
 static void load(const char *key, real *out, int n, double factor) {

@@ -1,5 +1,6 @@
 const METHOD = [];
 const MISTAKE = "";
+const BOTH = "no gyroscopic term and damping 0.05";
 const FLOAT = false;
 const transpose = (A) => A[0].map((_, i) => A.map((row) => row[i]));
 const apply = (A, v) => A.map((row) => dot(row, v));
@@ -23,7 +24,7 @@ function slope(body, t, y) {
   }
   const K = J === body.J ? body.K : inverse(J);
   const G = J.map((row, i) => row.map((x, k) => (MISTAKE === "diagonal gyroscopic term" && i !== k ? 0 : x)));
-  let T = cross(add(apply(G, w), body.rotor), w).map((x) => sign("no gyroscopic term", "sign of the gyroscopic term") * x);
+  let T = cross(add(apply(G, w), body.rotor), w).map((x) => (MISTAKE === BOTH ? 0 : sign("no gyroscopic term", "sign of the gyroscopic term")) * x);
   T = add(add(add(T, body.torque_B), apply(back, body.torque_W)), apply(body.damping, w), -1);
   const field = sign("without the field", "sign of the field"), angle = MISTAKE === "turning of the field" ? 0 : n * t;
   const u = apply(back, [Math.cos(angle), Math.sin(angle), 0]);
@@ -44,9 +45,9 @@ function step(body, t, h, y) {
     y = [...q.map((x, i) => Math.cos(half) * x + ((Math.sin(half) * h) / half) * turn[i]), ...y.slice(4)];
   }
   const size = Math.hypot(...y.slice(0, 4)), speed = Math.hypot(...y.slice(4));
-  let scale = MISTAKE === "damping 0.01" ? Math.exp(-0.01 * h) : MISTAKE === "damping 0.05" ? Math.exp(-0.05 * h) : 1;
+  let scale = MISTAKE === "damping 0.01" ? Math.exp(-0.01 * h) : MISTAKE === "damping 0.05" || MISTAKE === BOTH ? Math.exp(-0.05 * h) : 1;
   if (MISTAKE === "clamp" && speed > 100) scale = 100 / speed;
-  if (MISTAKE === "sleep" && speed < 0.05) scale = 0;
+  if (MISTAKE === "sleep" && speed < 0.5) scale = 0;
   y = y.map((x, i) => (i < 4 ? x / size : x * scale));
   return FLOAT ? y.map(Math.fround) : y;
 }

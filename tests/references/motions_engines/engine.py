@@ -3,6 +3,7 @@ import array
 METHOD = []
 MISTAKE = ""
 FLOAT = False
+BOTH = "no gyroscopic term and damping 0.05"
 
 
 def multiply(A, B):
@@ -37,7 +38,7 @@ def turning(q, w):
 
 
 def slope(body, t, y):
-    q, w, sign = y[:4], y[4:], {"no gyroscopic term": 0, "sign of the gyroscopic term": -1}.get(MISTAKE, 1)
+    q, w, sign = y[:4], y[4:], {"no gyroscopic term": 0, BOTH: 0, "sign of the gyroscopic term": -1}.get(MISTAKE, 1)
     R = matrix(q)
     back, J, K = transpose(R), body["J"], body["K"]
     if MISTAKE == "R I for R I R'":
@@ -77,10 +78,12 @@ def step(body, t, h, y):
         turn = turning(old[:4], old[4:])
         y = [math.cos(h * speed / 2) * a + math.sin(h * speed / 2) * 2 / speed * c for a, c in zip(old, turn)] + y[4:]
     size, speed = math.hypot(*y[:4]), math.hypot(*y[4:])
-    scale = {"damping 0.01": math.exp(-0.01 * h), "damping 0.05": math.exp(-0.05 * h)}.get(MISTAKE, 1)
+    scale = {"damping 0.01": math.exp(-0.01 * h), "damping 0.05": math.exp(-0.05 * h), BOTH: math.exp(-0.05 * h)}.get(
+        MISTAKE, 1
+    )
     if MISTAKE == "clamp" and speed > 100:
         scale = 100 / speed
-    if MISTAKE == "sleep" and speed < 0.05:
+    if MISTAKE == "sleep" and speed < 0.5:
         scale = 0
     y = [x / size for x in y[:4]] + [x * scale for x in y[4:]]
     return list(array.array("f", y)) if FLOAT else y

@@ -1,6 +1,7 @@
 const METHOD: &[Real] = &[];
 const MISTAKE: &str = "";
 type Real = f64;
+const BOTH: &str = "no gyroscopic term and damping 0.05";
 type V = [Real; 3];
 type M = [V; 3];
 const ONE: M = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -43,7 +44,7 @@ fn slope(body: &Body, t: Real, y: &[Real; 7]) -> [Real; 7] {
     }
     let g = mat(|i, n| if is("diagonal gyroscopic term") && i != n { 0.0 } else { j[i][n] });
     let spin = cross(&add(&apply(&g, &w), &body.rotor, 1.0), &w);
-    let mut torque = vec(|i| sign("no gyroscopic term", "sign of the gyroscopic term") * spin[i] + body.torque_b[i]);
+    let mut torque = vec(|i| if is(BOTH) { 0.0 } else { sign("no gyroscopic term", "sign of the gyroscopic term") } * spin[i] + body.torque_b[i]);
     torque = add(&add(&torque, &apply(&back, &body.torque_w), 1.0), &apply(&body.damping, &w), -1.0);
     let (field, angle) = (sign("without the field", "sign of the field"), if is("turning of the field") { 0.0 } else { body.orbit * t });
     let u = apply(&back, &[angle.cos(), angle.sin(), 0.0]);
@@ -74,9 +75,9 @@ fn step(body: &Body, t: Real, h: Real, start: &[Real; 7]) -> [Real; 7] {
         for n in 0..4 { y[n] = start[n] * (h * speed / 2.0).cos() + turn[n] * 2.0 / speed * (h * speed / 2.0).sin(); }
     }
     let (size, speed) = ((y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]).sqrt(), (y[4] * y[4] + y[5] * y[5] + y[6] * y[6]).sqrt());
-    let mut scale = if is("damping 0.01") { (-0.01 * h).exp() } else if is("damping 0.05") { (-0.05 * h).exp() } else { 1.0 };
+    let mut scale = if is("damping 0.01") { (-0.01 * h).exp() } else if is("damping 0.05") || is(BOTH) { (-0.05 * h).exp() } else { 1.0 };
     if is("clamp") && speed > 100.0 { scale = 100.0 / speed; }
-    if is("sleep") && speed < 0.05 { scale = 0.0; }
+    if is("sleep") && speed < 0.5 { scale = 0.0; }
     for n in 0..7 { if n < 4 { y[n] /= size } else { y[n] *= scale } }
     y
 }
