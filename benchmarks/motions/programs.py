@@ -37,11 +37,11 @@ class Slope:
     """The derivative of states (7, n) of n equations at times (n,), s.
 
     `tensor` returns the inertia in body axes from that of the body and the attitudes (n, 3, 3), `spinning` the one that the
-    gyroscopic term has.
+    gyroscopic term has. Times and rates are in `unit` (n,), s: implicit steps of all motions end by one test.
     """
 
     def __init__(self, equations: Sequence[Equations], tensor: Any = None, spinning: Any = None) -> None:
-        self.tensor, self.spinning = tensor, spinning
+        self.tensor, self.spinning, self.unit = tensor, spinning, np.ones(len(equations))
 
         def gather(read: Callable[[Any], Any]) -> Array:
             return np.array([read(each.scene) for each in equations], dtype=float)
@@ -59,7 +59,7 @@ class Slope:
         self.fixed = None if equations[0].fixed is None else np.array([each.fixed for each in equations], dtype=float)
 
     def __call__(self, t: Any, y: Array) -> Array:
-        q, w = y[:4], y[4:].T
+        q, w, t = y[:4], (y[4:] / self.unit).T, t * self.unit
         R = from_quaternion((q / np.sqrt((q * q).sum(axis=0))).T)
         J, inverse = self.J, self.inverse
         if self.fixed is not None:
@@ -76,8 +76,8 @@ class Slope:
             u = np.cos(angle)[:, None] * R[:, 0] + np.sin(angle)[:, None] * R[:, 1]
             torque = torque + (self.field * self.pull[:, None]) * np.cross(u, _times(self.J, u))
         v, s, out = q[1:].T, q[0], np.empty_like(y)
-        out[0], out[1:4] = -0.5 * (v * w).sum(axis=1), 0.5 * (s * w.T + np.cross(v, w).T)
-        out[4:] = _times(inverse, torque).T
+        out[0], out[1:4] = -0.5 * self.unit * (v * w).sum(axis=1), 0.5 * self.unit * (s * w.T + np.cross(v, w).T)
+        out[4:] = self.unit**2 * _times(inverse, torque).T
         return out
 
 
@@ -279,14 +279,16 @@ def _scales(motions: Sequence[Motion]) -> Array:
 
 def _errors(motions: Sequence[Motion], scale: Array, f: Slope, step: Step, parts: int, mistake: Mistake) -> Array:
     """Return the largest errors (n, 4) of the samples."""
-    h = np.array([each.step / parts for each in motions])
+    f.unit = np.array([1.0 if mistake.sentence else each.step for each in motions])  # mistakes have numbers with units
+    h = np.array([each.step / parts for each in motions]) / f.unit
     ends = [[n * each.steps * parts for n in range(1, each.samples + 1)] for each in motions]
     start = np.array([[*m.exact["quaternion_wxyz"][0], *m.rates] for m in motions]).T
+    start[4:] *= f.unit
     y = march(f, step, start, h, max(map(max, ends)), mistake.first, mistake.after)
     right, out = Slope([Equations(each.scene) for each in motions]), np.empty((len(motions), 4))
     for i, (motion, rows) in enumerate(zip(motions, ends, strict=True)):
         with np.errstate(all="ignore"):
-            R, w, E, L = _read(right, i, y[rows][:, :, i], mistake.read)
+            R, w, E, L = _read(right, i, y[rows][:, :, i] / [1, 1, 1, 1, *[f.unit[i]] * 3], mistake.read)
             R0, w0, E0, L0 = (motion.exact[name][1:] for name in ("R_WB", "w_WB_B", "energy", "momentum_W"))
             parts_of = np.linalg.norm(w - w0, axis=1), np.abs(E - E0), np.linalg.norm(L - L0, axis=1)
             out[i] = angle_between(R, R0).max(), *(x.max() / size for x, size in zip(parts_of, scale[i], strict=True))
