@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method
 from conservative.outcome import OK, Outcome
@@ -37,10 +38,15 @@ def declared_order(method: Method) -> int:
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield the largest error over its tolerance, of each engine on each motion."""
-    tell, motions = study.count(progress, len(study.competitors)), {motion.name: motion for motion in load()}
+    """Yield the largest error over its tolerance, of each engine on each motion.
+
+    Raise `BadInput` for a scene that is not one of the motions.
+    """
+    tell, motions = study.count(progress, len(study.competitors)), {motion.scene.key: motion for motion in load()}
+    if others := [scene.name for scene in study.scenes if scene.key not in motions]:
+        raise BadInput("scenes", repr(others[0]), "motions of conservative/references/motions")
     for scene in study.scenes:
-        motion = motions[scene.name]
+        motion = motions[scene.key]
         kept, every = files.read(motion.name), motion.steps * PARTS[-1]
         for method in study.competitors:
             tell(f"{scene.name}: {method.name}")
@@ -54,4 +60,4 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield case.row(Value(Measure.ALLOWED, ratio), OK, mistake)
 
 
-STUDY = Declaration(findings, Extent.FULL, named=Named.ONLY, apart=True, scenes=scenes, options=())
+STUDY = Declaration(findings, Extent.FULL, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))

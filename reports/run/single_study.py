@@ -46,7 +46,7 @@ def plan_study(
     _require_options(declared, {option: value for option, value in given.items() if value not in (None, (), [])})
     counts = tuple(read_count("sizes", size) for size in sizes)
     extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
-    if declared.named is Named.ONLY:
+    if declared.named is Named.ONLY and not methods:
         compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
     else:
         ours = selection.methods(methods or None, skip_missing, declared.settings)

@@ -15,14 +15,21 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion
 from conservative.benchmarks.judge.motion import Equations
+from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.motions import files, programs
 from conservative.benchmarks.motions.motion import SAMPLE, load
+from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies.selection import Missing
+from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
 from conservative.potentials.turning import Turning
 from conservative.references import precise
 from conservative.references.collocation import collocate
 from conservative.reports.cli.main import main
+from conservative.reports.rows.names import with_names
+from conservative.reports.sections.motions import section
 
+from ..benchmarks.generic_study import Broken
 from .motions_engines.methods import METHODS
 from .motions_engines.run import COMPILERS, LANGUAGES, MOTIONS, missing, run
 
@@ -247,7 +254,7 @@ def test_an_engine_that_does_nothing_fails():
 
 @pytest.mark.skipif(bool(missing("C++")), reason="needs g++")
 def test_the_engine_on_the_page(tmp_path):
-    """Explicit Euler steps of a diagonal inertia: bodies in principal axes pass, the others fail with the mistake that it makes."""
+    """Explicit Euler steps of a diagonal inertia: bodies in principal axes pass, the others fail with this mistake."""
     (code,) = re.findall(r"```cpp\n(.*?)```", (MOTIONS / "README.md").read_text(), re.DOTALL)
     text = re.sub(
         r"^std::vector<State> simulate.*?^}\n", lambda _: code, (MOTIONS / "test.cpp").read_text(), flags=re.DOTALL | re.M
@@ -261,6 +268,24 @@ def test_the_engine_on_the_page(tmp_path):
     tilted = {name for name, kept in FILES.items() if not kept["needs"] and np.count_nonzero(kept["inertia_B"]) > 3}
     assert {line.partition(".csv")[0].rpartition("/")[2] for line in told} == tilted
     assert all(line.endswith("with: no products of inertia") for line in told)
+
+
+def test_the_study_reports_failures_and_refuses_other_scenes():
+    """Methods that integrate pass; those that break are reported by their outcome."""
+    own = tuple(CATALOGUE[name].scene for name in ("separatrix", "torque_strong"))
+    engines = cv.Reduced(), Broken("raises"), Missing("mujoco", error=cv.MissingEngine("MuJoCo", "mujoco"))
+    found = {(row.scene, row.method): row for row in studies.rows(Study("motions", own, engines, skip_missing=True))}
+    assert len(found) == 6
+    assert all(0 < row.value < 1 and row.outcome.ok for (_, method), row in found.items() if method == "reduced")
+    kinds = {row.outcome.kind.value for (_, method), row in found.items() if method != "reduced"}
+    assert kinds == {"crashed", "missing"}
+    seen = []
+    with pytest.raises(cv.BadInput, match="scenes: got 'brick_flip'"):
+        list(
+            studies.findings(Study("motions", (cv.registry.scene("brick_flip"),), engines[:1]), lambda *call: seen.append(call))
+        )
+    (_, table) = section(with_names(frame(found.values())), None).blocks
+    assert [row[1:5] for row in table.rows] == [["2", "0", "0", "0"], ["0", "0", "2", "0"], ["0", "0", "2", "0"]]
 
 
 def test_verdicts_of_the_study():
