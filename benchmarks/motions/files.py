@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import conservative
-from conservative.attitude import Array, angle_between
+from conservative.attitude import Array
 from conservative.files import write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, measure
+from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, compare, measure
 
 NEAR = 0.5
 """Largest sum of the squares of the logarithms of four ratios of errors, of a mistake that is named."""
@@ -112,14 +112,10 @@ def read(name: str) -> dict[str, Any]:
 
 def verdict(motion: dict[str, Any], order: int, angle: float, single: bool, R: Array, w: Array) -> tuple[float, str]:
     """Return the largest error over its tolerance of samples (n, 3, 3), (n, 3), and the mistake with such errors, or ""."""
-    L = w @ np.array(motion["inertia_B"])
-    energy = (w * L).sum(axis=1) / 2 + motion.get("weight", 0) * R[:, 2] @ np.array(motion.get("com_B", [0, 0, 0]))
-    momentum = (R @ (L + motion.get("rotor_momentum_B", [0, 0, 0]))[..., None])[..., 0]
-    differences = [w - motion["w_WB_B"], (energy - motion["energy"])[:, None], momentum - motion["momentum_W"]]
-    sizes = [np.linalg.norm(x, axis=1).max() / size for x, size in zip(differences, motion["scale"].values(), strict=True)]
+    arm = motion.get("weight", 0.0) * np.array(motion.get("com_B", [0.0, 0.0, 0.0]))
+    found = compare(motion["inertia_B"], motion.get("rotor_momentum_B"), arm, motion, motion["scale"].values(), R, w)
     (row,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (order, angle))
     allowed = np.array([row[name] + single * motion["single"] for name in QUANTITIES])
-    found = np.array([angle_between(R, np.array(motion["R_WB"])).max(), *sizes])
     if (found <= allowed).all():
         return float((found / allowed).max()), ""
     known = np.array([[each[name] for name in QUANTITIES] for each in motion["catches"]])

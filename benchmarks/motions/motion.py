@@ -61,6 +61,11 @@ class Motion:
         return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 
     @property
+    def arm(self) -> list[float]:
+        """Weight times centre of mass (3,), N m, body axes; 0 without weight."""
+        return [(self.weight or 0.0) * x for x in self.com_B or (0.0, 0.0, 0.0)]
+
+    @property
     def t(self) -> list[float]:
         """The times of the samples after the start, s."""
         return [n * (self.steps * self.step) for n in range(1, self.samples + 1)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -224,13 +224,8 @@ MISTAKES: dict[str, Mistake] = {
 """What a failing program may have done, by name."""
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What was measured of a motion.
-
-    `scale` has the sizes of rates, energy and momentum, SI units. `tolerances` are by order and angle |w| h, `catches` by
-    mistake: its factors by order at the smallest step, and its own errors there. All errors are those of `QUANTITIES`.
-    """
+class Measured(NamedTuple):
+    """Sizes (3,) of rates, energy and momentum; tolerances by order and |w| h; factors by order and errors of each mistake."""
 
     scale: Array
     tolerances: dict[tuple[int, float], Array]
@@ -285,19 +280,21 @@ def _errors(motions: Sequence[Motion], scale: Array, f: Slope, step: Step, parts
     start = np.array([[*m.exact["quaternion_wxyz"][0], *m.rates] for m in motions]).T
     start[4:] *= f.unit
     y = march(f, step, start, h, max(map(max, ends)), mistake.first, mistake.after)
-    right, out = Slope([Equations(each.scene) for each in motions]), np.empty((len(motions), 4))
+    out = np.empty((len(motions), 4))
     for i, (motion, rows) in enumerate(zip(motions, ends, strict=True)):
-        with np.errstate(all="ignore"):
-            R, w, E, L = _read(right, i, y[rows][:, :, i] / [1, 1, 1, 1, *[f.unit[i]] * 3], mistake.read)
-            R0, w0, E0, L0 = (motion.exact[name][1:] for name in ("R_WB", "w_WB_B", "energy", "momentum_W"))
-            parts_of = np.linalg.norm(w - w0, axis=1), np.abs(E - E0), np.linalg.norm(L - L0, axis=1)
-            out[i] = angle_between(R, R0).max(), *(x.max() / size for x, size in zip(parts_of, scale[i], strict=True))
-    return np.nan_to_num(out, nan=1e6, posinf=1e6)
+        q, w, body = y[rows, :4, i], y[rows, 4:, i] / f.unit[i], motion.scene.body
+        R, w = mistake.read(from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True)), w)
+        exact = {name: each[1:] for name, each in motion.exact.items()}
+        out[i] = compare(body.inertia, body.rotor_momentum, motion.arm, exact, scale[i], R, w)
+    return out
 
 
-def _read(f: Slope, i: int, y: Array, read: Reading) -> tuple[Any, Any, Array, Array]:
-    """Return attitudes (n, 3, 3), rates (n, 3), energy (n,), momentum (n, 3) of states (n, 7) as a program gives them."""
-    R, w = read(from_quaternion(y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)), y[:, 4:])
-    assert R is not None
-    L = np.asarray(w) @ f.J[i]
-    return R, w, (w * L).sum(axis=1) / 2 + R[:, 2] @ f.arm[i], _times(R, L + f.rotor[i])
+def compare(J: Any, rotor: Any, arm: Any, exact: Any, scale: Any, R: Any, w: Any) -> Array:
+    """Return the largest errors (4,) of attitudes (n, 3, 3) and rates (n, 3) against samples by name, in `QUANTITIES`."""
+    with np.errstate(all="ignore"):
+        L = w @ np.array(J)
+        energy = (w * L).sum(axis=1) / 2 + R[:, 2] @ np.array(arm)
+        momentum = _times(R, L if rotor is None else L + rotor)
+        found = (w, exact["w_WB_B"]), (energy[:, None], np.array(exact["energy"])[:, None]), (momentum, exact["momentum_W"])
+        sizes = [np.linalg.norm(a - b, axis=1).max() / size for (a, b), size in zip(found, scale, strict=True)]
+        return np.nan_to_num([angle_between(R, np.array(exact["R_WB"])).max(), *sizes], nan=1e6, posinf=1e6)

@@ -272,7 +272,7 @@ def test_the_engine_on_the_page(tmp_path):
 
 def test_the_study_reports_failures_and_refuses_other_scenes():
     """Methods that integrate pass; those that break are reported by their outcome."""
-    own = tuple(CATALOGUE[name].scene for name in ("separatrix", "torque_strong"))
+    own = tuple(CATALOGUE[name].scene for name in ("separatrix", "rod"))
     engines = cv.Reduced(), Broken("raises"), Missing("mujoco", error=cv.MissingEngine("MuJoCo", "mujoco"))
     found = {(row.scene, row.method): row for row in studies.rows(Study("motions", own, engines, skip_missing=True))}
     assert len(found) == 6
