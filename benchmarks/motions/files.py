@@ -11,7 +11,7 @@ import numpy as np
 
 import conservative
 from conservative.attitude import Array
-from conservative.files import write_text
+from conservative.files import make_folder, write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
 from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, compare, measure
@@ -123,10 +123,17 @@ def verdict(motion: dict[str, Any], order: int, angle: float, single: bool, R: A
     return float((found / allowed).max()), motion["catches"][apart.argmin()]["mistake"] if apart.min() < NEAR else ""
 
 
-def write(folder: Path) -> int:
-    """Write the files into a folder and return their number."""
-    folder.mkdir(parents=True, exist_ok=True)
-    count = 0
-    for count, (name, text) in enumerate(contents(), 1):  # noqa: B007
+def marks() -> Iterator[tuple[str, str]]:
+    """Yield the names of all files, and a text in the beginning of each."""
+    for motion in load():
+        yield f"{motion.name}.json", f'"name": "{motion.name}"'
+        yield f"{motion.name}.csv", f"key,values\nname,{motion.name}\n"
+
+
+def write(folder: Path) -> list[str]:
+    """Write the files into a folder and return their names. Raise `NotWritten` if that is not possible."""
+    make_folder(folder, "out")
+    texts = dict(contents())
+    for name, text in texts.items():
         write_text(folder / name, text, "out")
-    return count
+    return list(texts)

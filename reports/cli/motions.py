@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options import FilePath, epilog
+from .options import FilePath, epilog, json_option, require_replaceable
 
 
 @click.command(
@@ -14,12 +14,19 @@ from .options import FilePath, epilog
     epilog=epilog("conservative motions --out motions"),
 )
 @click.option("--out", required=True, type=FilePath(), help="Folder for the files, two for each motion.")
-def motions(out: Path) -> None:
+@click.option("--force", is_flag=True, help="Replace files that this command did not write.")
+@json_option
+def motions(out: Path, force: bool, as_json: bool) -> None:
     """Write 48 short motions as JSON and CSV, with tolerances and the mistakes that they catch.
 
     The files are those of references/motions, to the last digit. Solutions are computed again in multi-precision and tolerances
     measured again, which takes a minute.
     """
-    from conservative.benchmarks.motions.files import write
+    from conservative.benchmarks.motions import files
 
-    click.echo(f"{write(out)} files in {out}")
+    from ..document import json
+
+    for name, mark in files.marks():
+        require_replaceable(out / name, mark, "out", force)
+    names = files.write(out)
+    click.echo(json.render({"out": str(out), "files": names}) if as_json else f"{len(names)} files in {out}")

@@ -143,6 +143,15 @@ def test_the_command_writes_the_files_again(tmp_path):
         assert path.read_text() == (MOTIONS / path.name).read_text(), path.name
 
 
+def test_the_command_replaces_no_other_file(tmp_path):
+    (tmp_path / "separatrix.csv").write_text("mine\n")
+    done = CliRunner().invoke(main, ["motions", "--out", str(tmp_path)])
+    assert (done.exit_code, (tmp_path / "separatrix.csv").read_text()) == (2, "mine\n")
+    assert "--force" in done.output
+    for name, mark in files.marks():
+        assert mark in (MOTIONS / name).read_text()[:4096]
+
+
 @pytest.mark.parametrize("order", programs.ORDERS)
 def test_methods_have_their_order(order):
     """Errors fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.13 of the order."""
