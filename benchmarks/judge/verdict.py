@@ -172,7 +172,8 @@ def _largest(t: Array, shape: Array | None) -> tuple[float, float]:
 
 def _single_rows(found: _Comparison) -> Explanation:
     number, at, size = found.outliers[0]
-    text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g}; the others agree"
+    unit = ("rad", "of the largest rate")[int(np.argmax(found.worst.max(axis=1)))]
+    text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
     values = {"row": float(number), "time": at, "error": size}
     return Explanation("single rows", text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
