@@ -17,6 +17,7 @@ from conservative.scene import Scene
 
 from .motion import Equations, States, closed, truth
 
+FLOOR = 1e-9  # errors that round-off makes in double precision
 SIGMAS = 7.0  # of noise, that the largest error may have
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 HOPELESS = 30.0  # of noise, that no other first row explains

@@ -16,7 +16,7 @@ from conservative.attitude import Array
 from conservative.needs import Need
 
 from . import mistakes
-from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
+from .compared import FLOOR, LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
 from .explanation import Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
 from .motion import Equations, closed, truth
@@ -45,6 +45,7 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     that leave as little. A candidate leaves less than half of the error. Mistakes that make attitudes or rates worse than they
     are have no place in either. `quaternion` is True if the order of quaternions can be wrong.
     """
+    whole = _before_divergence(whole)
     units = [*_units(whole.first(LONGEST, FEWEST))] if closed(whole.scene) else []
     case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
@@ -75,6 +76,19 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     good = [each for each in good if each.numbers == fewest]
     named = [each for each in good if each.name.removesuffix(BARE) == each.name or all(BARE in one.name for one in good)]
     return Diagnosis(named, tried, _separate(case, named))
+
+
+def _before_divergence(case: Compared) -> Compared:
+    """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
+    w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
+    if w is None or not case.scale > 3 * largest > 0:
+        return case
+    size = np.linalg.norm(w, axis=1)
+    case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
+    scale = float(size[: len(case.t)].max())
+    factors = np.array([1.0, case.scale / scale])
+    allowed = np.where(case.allowed <= FLOOR, FLOOR, case.allowed * factors)
+    return replace(case, scale=scale, allowed=allowed, noise=np.maximum(case.noise * factors, 1e-13))
 
 
 def _separate(case: Compared, named: list[Explanation]) -> list[str]:

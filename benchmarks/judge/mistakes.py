@@ -205,6 +205,24 @@ def _tableau(
     return y + h * sum((weight * k for weight, k in zip(b, slopes, strict=True)), np.zeros_like(y))
 
 
+def _turned_tableau(
+    f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], A: Sequence[Sequence[float]], b: Sequence[float]
+) -> Array:
+    """Return the state of a Runge-Kutta method whose stages and step turn the body by sums of rates, as MuJoCo's RK4 does."""
+    slopes, rates = list[Array](), list[Array]()
+
+    def state(weights: Sequence[float]) -> Array:
+        new = y + h * sum((a * k for a, k in zip(weights, slopes, strict=True)), np.zeros_like(y))
+        new[:4] = _rotate(y[:4], h * sum((a * w for a, w in zip(weights, rates, strict=True)), np.zeros_like(y[4:])))
+        return new
+
+    for row in ((), *A):
+        stage, at = state(row), t + h * sum(row)
+        slopes.append(f(at, stage))
+        rates.append(f.rates(at, stage))
+    return state(b)
+
+
 def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: float) -> Array:
     """Return the state of implicit Euler (at = 1) or of the implicit midpoint rule (at = 1/2)."""
     stage = y
@@ -276,6 +294,7 @@ KUTTA = (((0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6))
 RK4 = (((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 
 
+TURNED = " with the exponential map of weighted rates"
 BARE = " without normalisation"
 """End of the names of methods that do not normalise quaternions: rates alone do not show it."""
 
@@ -327,6 +346,9 @@ STEPS: dict[str, Step] = {
     "RK3 (Heun)": Step(3, 0, partial(_tableau, A=((1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))),
     "RK3 (SSP)": Step(3, 0, partial(_tableau, A=((1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))),
     "RK4": Step(4, 0, partial(_tableau, A=RK4[0], b=RK4[1])),
+    f"the explicit midpoint rule (RK2){TURNED}": Step(2, 0, partial(_turned_tableau, A=((0.5,),), b=(0.0, 1.0))),
+    f"Heun's method{TURNED}": Step(2, 0, partial(_turned_tableau, A=((1.0,),), b=(0.5, 0.5))),
+    f"RK4{TURNED}": Step(2, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1])),
 }
 
 

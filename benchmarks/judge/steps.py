@@ -78,8 +78,8 @@ def count_gaps(case: Compared) -> Any:
 def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
     """Yield motions by methods with a step that divides the distance of the rows.
 
-    The steps are found from errors to first order: those that a method makes between two rows, from the exact state, are
-    carried along by the exact motion. The best methods then run from the first row.
+    Candidates leave least of the differences between a row and the exact motion from the row before (`RowByRow`), or of the
+    differences from the exact motion, to first order (`Linearised`). They then run from the first row.
     """
     numbers, gaps = count_gaps(case), np.diff(case.t)
     if case.data[0] is not None and case.data[1] is not None and case.error[1].max() <= case.allowed[1]:
@@ -91,7 +91,19 @@ def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
     case = case.take(slice(0, int(np.searchsorted(numbers, STEPS_AT_MOST))))
     if np.ptp(np.diff(count_gaps(case))) > 0:  # rows of which only some were written
         return
-    linear = Linearised(case)
+    for ranking in (RowByRow, Linearised):
+        if ranking is Linearised or (all(x is not None for x in case.data) and Equations(case.scene).steady):
+            explained = False
+            for each in _run_best(case, ranking(case)):
+                yield each
+                explained |= each.explains
+            if explained:
+                return
+
+
+def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
+    """Yield motions by the methods that leave the smallest shares."""
+    step_of_rows = float(np.diff(case.t).mean())
     ranked = sorted(((*linear.best(method), name) for name, method in STEPS.items()), key=lambda each: each[0])
     proven = False
     for left, parts, name in ranked[:5]:
@@ -104,7 +116,7 @@ def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
                 some = case.take(slice(0, max(4, most // count)))
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
-                step = float(gaps.mean()) / count
+                step = step_of_rows / count
                 text = f"The rows follow {name} with a step of {step:.4g} s"
                 found = replace(attempt(some, name, text, march(some, STEPS[name], count)), values={"step": step}, numbers=1)
                 if found.share > 0.5 or len(some.t) == len(case.t):
@@ -201,3 +213,36 @@ class Linearised:
         near = [n for n in (parts - 1, parts + 1) if n >= 1]
         best = self.share(method, parts)[0]
         return [n for n in near if self.share(method, n)[0] < max(1.5 * best, best + 0.1)]
+
+
+class RowByRow(Linearised):
+    """Differences of each row from the exact motion of the row before, and those that a method of one step makes there.
+
+    They need attitudes, rates, and equations that do not depend on time. They hold at any distance from the exact motion.
+    """
+
+    def __init__(self, case: Compared) -> None:
+        self.case, self.equations = case, Equations(case.scene)
+        self.used = n = min(len(case.t), 200)
+        self.f, self.made, self.starts = Slope(self.equations), {}, None
+        R, w = case.data
+        assert R is not None
+        assert w is not None
+        self.gap = float(case.t[1] - case.t[0])
+        self.R, self.w = R[:n], w[:n]
+        a, b = self.equations.solve(0.0, self.R[:-1], self.w[:-1], np.array([self.gap]))
+        self.exact, self.weights = (a[:, 0], b[:, 0]), np.repeat(1 / case.noise, 3)
+        self.wanted = self.beside_start(differ(*self.exact, self.R[1:], self.w[1:], case.scale))
+
+    def errors(self, method: Step, parts: int) -> Array:
+        """Return the errors (n, 6) of a method from row to row; 0 for methods that need earlier states."""
+        if method.past or method.recurrent:
+            return np.zeros((self.used - 1, 6))
+        if (id(method), parts) not in self.made:
+            y = self.equations.pack(0.0, self.R[:-1], self.w[:-1])
+            with np.errstate(all="ignore"):
+                for _ in range(parts):
+                    y = method.next(self.f, 0.0, y, self.gap / parts, [])
+                a, b = self.equations.states(y[:, :, None], np.zeros(1))
+            self.made[id(method), parts] = differ(*self.exact, a[:, 0], b[:, 0], self.case.scale)
+        return self.made[id(method), parts]

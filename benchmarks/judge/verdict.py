@@ -18,13 +18,13 @@ from conservative.needs import IN_TIME
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .compared import HOPELESS, NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
+from .compared import FLOOR, HOPELESS, NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
 from .diagnose import Diagnosis, diagnose, fit_moments
 from .explanation import Explanation
 from .motion import closed, truth
 from .table import Recording
 
-FLOOR, ACCURATE = 1e-9, 1e-6  # errors that round-off makes in double precision, and that a good solver may leave
+ACCURATE = 1e-6  # errors that a good solver may leave
 UNITS_OF_DIGITS = 6.0  # of the last digit, that the largest error may have
 MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
 ROUND_OFF = 2e-15  # of an exact motion
