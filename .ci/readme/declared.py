@@ -153,7 +153,7 @@ def studies() -> str:
     rows = []
     for name, each in STUDIES.items():
         report = extents[each.extent] + ", if it draws bodies" * bool(each.draw) + ", if no scene is named" * bool(each.scenes)
-        report = "with `--engines`" if each.named is Named.ONLY else report
+        report = "full, " * (each.extent > Extent.EVERY) + "with `--engines`" if each.named is Named.ONLY else report
         rows.append([f"`{name}`", each.about[0].upper() + each.about[1:], report, "yes" if each.timed else ""])
     return table(["study", "what it measures", "in reports", "measures times"], rows)
 

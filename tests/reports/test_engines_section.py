@@ -116,7 +116,7 @@ def test_a_plan_has_studies_of_engines_only_where_some_are_named():
     without = plan_report([SCENE], ["reduced"], quick=True)
     named = plan_report([SCENE], ["reduced"], quick=True, engines=["pinocchio"])
     assert not set(without.names) & set(ENGINES)
-    assert set(named.names) - set(without.names) == set(ENGINES) - {"motions"}  # of scenes of its own, in full reports
+    assert set(named.names) - set(without.names) == set(ENGINES)
     assert "motions" in plan_report(engines=["pinocchio"], full=True, quick=True).names
     assert {method.family for study in named.studies if study.name in ENGINES for method in study.methods} == {"pinocchio"}
     assert registry.method("pinocchio") not in named.methods

@@ -24,7 +24,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import failures
 from conservative.reports.sections.report import SCHEMA
 
-from ..declared import ENGINES, FULL, MAIN
+from ..declared import ENGINES, FULL, MAIN, ONLY
 from .made_up import measurements
 from .rows import frame, row
 
@@ -76,7 +76,7 @@ def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
 def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_everything():
     default, full = plan_report(), plan_report(full=True)
     assert default.names == ("random", *MAIN)
-    assert set(full.names) == set(studies.STUDIES) - set(ENGINES)
+    assert set(full.names) == set(studies.STUDIES) - set(ONLY)
     assert set(default.methods) < set(full.methods)
     left_out = {name for name, family in registry.list_families().items() if family.card.report == ()}
     assert {"exact", "textbook"} <= left_out
