@@ -119,7 +119,7 @@ def test_quaternions_pass_zero():
     assert sum(min(x) < 0 < max(x) for x in starts.values()) >= 5
 
 
-SOME = ["separatrix", "damped_and_driven", "tiny", "orbit", "heavy", "rotor_dominates"]
+SOME = ["tiny", "torque_strong", "damped", "rotor_turned", "half_turn", "golden_4"]
 
 
 @pytest.fixture(scope="module")
