@@ -298,6 +298,18 @@ def test_the_study_reports_failures_and_refuses_other_scenes():
     assert [row[1:5] for row in table.rows] == [["2", "0", "0", "0"], ["0", "0", "2", "0"], ["0", "0", "2", "0"]]
 
 
+HELD_OUT = ("reduced", "rattle", "lie_variational", "gauss", "splitting:order=2", "taylor:order=8", "textbook:spiers", "scipy")
+
+
+@pytest.mark.parametrize("names_of", [SOME + ["rod", "nearly_prolate", "very_slow"], pytest.param(list(CATALOGUE), marks=slow)])
+def test_methods_that_no_tolerance_was_measured_with_pass(names_of):
+    """Measured: at most 0.52 of a tolerance, over all motions and 67 settings."""
+    study = Study("motions", tuple(CATALOGUE[name].scene for name in names_of), tuple(map(cv.registry.method, HELD_OUT)))
+    found = [row for row in studies.rows(study) if row.outcome.ok]
+    assert len(found) >= 4 * len(names_of)
+    assert max(row.value for row in found) <= 0.7
+
+
 def test_verdicts_of_the_study():
     """A right trajectory passes, one with constant rates is explained."""
     kept = FILES["separatrix"]
