@@ -33,7 +33,7 @@ MARGIN = {1: 15.0, 2: 5.0, 4: 5.0}
 """Tolerances over the largest error of the methods. Order 2 on rotation matrices errs four times as much as on quaternions, and
 order 1 with a joint at the fixed point nine times as much as these methods (Jolt and Rapier, `heavy_fast`)."""
 OURS = {1: (), 2: ("no_squish", "moser_veselov:order=2"), 4: ("no_squish:order=4", "splitting:order=4")}
-"""Methods of this package by order, on the motions that they take: NoSquish errs up to 23 times as much as Runge and Kutta's."""
+"""Methods of this package by order, on motions that they take: NoSquish errs up to 23 times as much as Runge and Kutta's."""
 ROUND_OFF, FACTOR = 1e-11, 10.0  # errors that depend on the machine; factor of a mistake that is listed
 QUANTITIES = ("attitude", "rates", "energy", "momentum")
 RK2, RK4, MIDPOINT = STEPS["the explicit midpoint rule (RK2)"], STEPS["RK4"], STEPS["the implicit midpoint rule"].next
