@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
@@ -14,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from conservative import registry
 from conservative.attitude import Array, hat
@@ -28,8 +30,19 @@ from ..worker.calls import python_worker
 from ..worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
 from . import loaders
 from .loaders import LOADERS
-from .pieces import Link, Piece, distance, join_links, make_pose, steiner
-from .readers import Model, read_files
+from .pieces import (
+    QUANTITIES,
+    Link,
+    Piece,
+    differing,
+    distance,
+    errors,
+    join_links,
+    list_numbers,
+    make_pose,
+    steiner,
+)
+from .readers import DIGITS, Model, read_files
 
 LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
 """Engines that run in this interpreter if no version is named: package and name."""
@@ -42,7 +55,7 @@ LIMIT, MEMORY = 300.0, 2**33
 NOT_FINITE = "accelerations that are not finite"
 NO_BODY = "its accelerations are those of no rigid body"
 RIGID = "no force or torque turns it, as if its inertia were infinite"
-HELD = "the engine holds the body, so that its mass cannot be seen: no force moves it"
+HELD = "no force moves it: the engine holds the body, or has no mass for it"
 ROUNDS = 4
 """Largest number of loads by which forces are adapted to the body that an engine has."""
 CASES = 24
@@ -72,12 +85,12 @@ class FileAnswer:
 
 
 OUTCOMES = {
-    "right": "the engine has the body of the file, or refuses a file that no engine has to load",
+    "right": "the engine has the body of the file, or warns of or refuses one that no engine has to load",
     "wrong": "it has another body",
     "refused": "it refuses a valid file",
     "crashed": "it ended, or took too long",
-    "accepted": "it loads a body that cannot exist",
-    "undecided": "the readers disagree, or the file leaves it open",
+    "accepted": "it loads a body that cannot exist without a word",
+    "undecided": "the readers disagree, there is one reader only, or the file leaves it open",
 }
 
 
@@ -126,6 +139,18 @@ def _steiner(links: list[Link], outer: float, sign: float = 1.0) -> list[Link]:
     return [Link(np.eye(4)).filled(replace(whole, inertia=inertia))]
 
 
+def _other_angles(factor: float) -> Mistake:
+    """Return the mistake that multiplies the angles about fixed axes of all poses, as far as a rotation tells them."""
+
+    def turn(pose: Array) -> Array:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of two axes that coincide
+            angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
+        return make_pose(pose[:3, 3], Rotation.from_euler("xyz", factor * angles))
+
+    return _all(lambda k: {"frame": turn(k.frame), "pose": turn(k.pose)})
+
+
 MISTAKES: dict[str, Mistake] = {
     "the rotation of the inertial frame is ignored": _all(lambda k: {"frame": make_pose(k.frame[:3, 3])}),
     "R I instead of R I R'": _all(lambda k: {"frame": make_pose(k.frame[:3, 3]), "inertia": k.frame[:3, :3] @ k.inertia}),
@@ -157,6 +182,8 @@ MISTAKES: dict[str, Mistake] = {
     "the inertia is the unit matrix": _all(lambda k: {"inertia": np.eye(3)}),
     "mass and inertia are 1": _all(lambda k: {"mass": 1.0, "inertia": np.eye(3)}),
     "the three moments are made equal": _all(lambda k: {"inertia": np.trace(k.inertia) / 3 * np.eye(3)}),
+    "degrees are read as radians": _other_angles(180 / math.pi),
+    "radians are read as degrees": _other_angles(math.pi / 180),
 }
 """Known mistakes of loaders, as functions from the links of a file to the links that a loader makes of them."""
 
@@ -209,10 +236,6 @@ def identify(cases: Array, measured: Array, near: Piece) -> Piece:
     return Piece(float(mass), near.com + d, inertia)
 
 
-def _list(values: ArrayLike) -> str:
-    return ", ".join(f"{value:.3g}" for value in np.ravel(values))
-
-
 def explain(model: Model, seen: Piece, tolerance: float) -> str:
     """Return the mistake, or the pair of mistakes, that turns the links of a file into the body that an engine has; or ""."""
     links, wanted = model.links, join_links(model.links)
@@ -223,22 +246,20 @@ def explain(model: Model, seen: Piece, tolerance: float) -> str:
         part = join_links(changed)
         if part.mass and distance(wanted, part) > tolerance > distance(part, seen, wanted):
             return ", and ".join(names)
-    for name, part in model.units.items():
-        if distance(part, seen) < tolerance < distance(part, wanted):
-            return name
     ratio = np.trace(seen.inertia) / np.trace(wanted.inertia)
     if distance(replace(wanted, mass=seen.mass, inertia=ratio * wanted.inertia), seen) < tolerance:
         return f"mass times {seen.mass / wanted.mass:.6g}, inertia times {ratio:.6g}"
     moments, axes = np.linalg.eigh(wanted.inertia)
     raised = np.maximum(moments, np.diag(axes.T @ seen.inertia @ axes))
     if distance(replace(wanted, inertia=(axes * raised) @ axes.T), seen) < tolerance:
-        return f"small principal moments are raised: {_list(raised)} instead of {_list(moments)} kg m^2"
+        return f"small principal moments are raised: {list_numbers(raised)} instead of {list_numbers(moments)} kg m^2"
     return ""
 
 
 def describe(part: Piece) -> str:
-    """Return mass, kg, centre of mass, m, and inertia, kg m^2, as text."""
-    return f"mass {part.mass:.4g}, centre of mass {_list(part.com)}, inertia {_list(part.inertia)}"
+    """Return mass, kg, centre of mass, m, and the six numbers of the inertia, kg m^2, as text."""
+    inertia = list_numbers(part.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)])
+    return f"mass {part.mass:.4g}, centre of mass {list_numbers(part.com)}, inertia {inertia}"
 
 
 def compare_files(
@@ -276,33 +297,51 @@ def judge_refusal(model: Model, engine: str, words: str) -> tuple[str, str]:
     """Return outcome and words for an engine that refuses a file."""
     if wrong := model.flaw or "; ".join([*model.invalid, *model.bad]):
         return "right", f"it refuses the file ({wrong}): {words}"
-    doubt = model.doubt(engine)
-    return ("undecided", f"{doubt}. It refuses the file: {words}") if doubt else ("refused", words)
+    open_ = model.doubt(engine) or model.lonely or (DIGITS if model.truth.excess else "")
+    return ("undecided", f"{open_}. It refuses the file: {words}") if open_ else ("refused", words)
 
 
-def judge_body(model: Model, engine: str, seen: Piece, tolerance: float, prints: str = "") -> tuple[str, str]:
-    """Return outcome and words for the body that an engine has, where it `prints` something about mass or inertia.
+def judge_body(model: Model, engine: str, seen: Piece | str, tolerance: float, prints: str = "") -> tuple[str, str]:
+    """Return outcome and words for the body that an engine has, or why its motion has none; `prints` is about mass or inertia.
 
-    Nothing is said against an engine if the readers disagree or the file leaves something open; see `Model.doubt`.
+    Nothing is said against an engine if the readers disagree, there is one only, or the file leaves something open.
     """
-    wanted, doubt, flaw = model.truth, model.doubt(engine), model.flaw
-    close = distance(wanted, seen) < tolerance
-    if close and not (flaw or model.disagree or model.invalid):
+    wanted, flaw = model.truth, model.flaw
+    far = errors(wanted, seen) if isinstance(seen, Piece) else dict.fromkeys(QUANTITIES, np.inf)
+    if wanted.excess and not flaw:  # within the rounding of its moments
+        far["inertia"] -= wanted.rounding / np.abs(wanted.inertia).max()
+    differs = [name for name, error in far.items() if not error < tolerance]
+    doubt, has = model.doubt(engine, differs), seen if isinstance(seen, str) else f"it has {describe(seen)}"
+    if not differs and not (flaw or model.disagree or model.invalid):
         return "right", ""
-    if asked := model.asked_for(engine, seen, tolerance):
+    if isinstance(seen, Piece) and (asked := model.asked_for(engine, seen, tolerance)):
         return "right", f"as the file asks: {asked}"
-    if doubt and not (flaw and close):
-        return "undecided", f"{doubt}. It has {describe(seen)}{prints}"
-    if flaw and not seen.flaw:
-        before, after = (_list(np.linalg.eigvalsh(part.inertia)) for part in (wanted, seen))
-        how = f"it repairs that {flaw}{prints}" if prints else f"it changes the inertia without a word, because {flaw}"
-        return "right" if prints else "accepted", f"{how}: principal moments {before} become {after} kg m^2"
+    if doubt and not (flaw and not differs):
+        return "undecided", f"{doubt}; {has}{prints}"
     if flaw:
-        return "accepted", f"{flaw}, and it has {describe(seen)}{prints}"
-    if words := explain(model, seen, tolerance):
-        return "wrong", words + prints
-    words = f"no known mistake explains {describe(seen)} instead of {describe(wanted)}{prints}"
-    return ("undecided", f"{model.lonely}, and {words}") if model.lonely else ("wrong", words)
+        changes = ", ".join(differing(wanted, seen, tolerance)) if isinstance(seen, Piece) and not seen.flaw else ""
+        said = f"{flaw}, and it changes that (file and engine): {changes}" if changes else f"{flaw}; {has}"
+        told = prints and not (differs and isinstance(seen, Piece) and seen.flaw)
+        return "right" if told else "accepted", f"{said}{prints or ', without a word'}"
+    words = explain(model, seen, tolerance) if isinstance(seen, Piece) else has
+    words = (
+        words or f"no known mistake explains the difference (file and engine): {', '.join(differing(wanted, seen, tolerance))}"
+    )
+    return ("undecided", f"{model.lonely}; {words}{prints}") if model.lonely else ("wrong", f"{words}{prints}")
+
+
+def find_warning(output: str, names: Sequence[str]) -> str:
+    """Return the first sentence of an engine's output about mass or inertia, in brackets; "" if it has none.
+
+    `names` are those of the file, which may have these words.
+    """
+    for name in sorted(names, key=len, reverse=True):
+        output = output.replace(name, "...") if _ABOUT_MASS.search(name) else output
+    said = _ABOUT_MASS.search(output)
+    return f" (it prints: {said[0].strip()[:200]})" if said else ""
+
+
+_ABOUT_MASS = re.compile(r"[^.:]*\b(inertias?|inertial|mass|masses|moments?)\b[^.]*", re.IGNORECASE)
 
 
 class Program:
@@ -360,16 +399,14 @@ class Program:
             return answer(*judge_refusal(model, self.engine, result["refused"]))
         if model.alone(self.engine):
             return answer("", f"it is the reference for this format, and there is no second reader: {model.own_refuses}")
-        measured = result["accelerations"]
-        said = re.search(r"[^.:]*(inertia|mass|moment)[^.]*", result["output"], re.IGNORECASE)
-        prints = f" (it prints: {said[0].strip()[:200]})" if said else ""
-        if (seen := self._identify(model, cases, measured, model.truth)) is None:
-            words = NOT_FINITE if not np.isfinite(measured).all() else NO_BODY if measured[:, 3:].any() else RIGID
-            words = words if measured.any() else HELD
-            doubt, flaw = model.doubt(self.engine), model.flaw
-            outcome = "undecided" if doubt or words == HELD else "accepted" if flaw else "wrong"
-            return answer(outcome, "; ".join(filter(None, [words, doubt or flaw])) + prints)
-        outcome, words = judge_body(model, self.engine, seen, self.tolerance, prints)
+        measured, names = result["accelerations"], [model.path.name, model.path.stem, *(link.name for link in model.links)]
+        seen = self._identify(model, cases, measured, model.truth)
+        why = NOT_FINITE if not np.isfinite(measured).all() else NO_BODY if measured[:, 3:].any() else RIGID
+        why = why if measured.any() else HELD
+        found = seen if seen is not None else why
+        outcome, words = judge_body(model, self.engine, found, self.tolerance, find_warning(result["output"], names))
+        if seen is None:
+            return answer(outcome, words)
         expected = accelerations(model.truth, cases) if outcome == "right" and not words else measured
         worst = float(np.abs(measured - expected).max() / np.abs(measured).max())
         return answer(outcome, words, {name: np.asarray(value).tolist() for name, value in vars(seen).items()}, worst)
@@ -404,12 +441,10 @@ class Program:
         """Return the answer of `loaders.probe`, or that of a program to `load` in the same form. Raise as `Worker.ask`."""
         with time_limit(LIMIT):
             result = self._ask(str(model.path.resolve()), model.kind, cases)
-        folders = sorted(
-            {f"{path.parent}/" for path in (model.path, model.path.resolve())}
-        )  # which the words of engines may contain
         for name in ("refused", "output"):
-            for folder in folders:
-                result[name] = str(result.get(name, "")).replace(f"/{folder}", "").replace(folder, "")
+            result[name] = str(result.get(name, ""))
+            for folder in {str(path.parent) for path in (model.path.absolute(), model.path.resolve())} - {"/"}:
+                result[name] = re.sub(rf"(?<![\w./-]){re.escape(folder)}/(?=[^\s/])", "", result[name])
         return result
 
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:

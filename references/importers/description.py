@@ -1,20 +1,18 @@
-"""The rigid body of a model file with one body: mass, centre of mass and inertia as URDF, SDF, USD or MJCF define them.
+"""The rigid body of a URDF or SDF file with one body: mass, centre of mass and inertia as the formats define them.
 
-This is the second opinion: `readers` has the reference readers, and `mjcf` the second one of MJCF. Every element and attribute
-is used, known to be irrelevant to a free body, or named in the notes. trimesh reads meshes, usd-core opens the stage of a file.
+This is the second opinion, beside the reference readers in `readers`. Every element and attribute is used, known to be
+irrelevant to a free body, or named in the notes. trimesh reads meshes.
 
 References
 ----------
 URDF: https://wiki.ros.org/urdf/XML/link
 SDF: http://sdformat.org/spec
-USD: https://openusd.org/release/api/usd_physics_page_front.html
-MJCF: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
 from __future__ import annotations
 
 import math
-import warnings
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,12 +24,9 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array
 from conservative.errors import BadInput
 
-from ..engine import load
-from .files import kind_of, load_mesh, parse, qualified, reason, refuse
-from .pieces import DENSITY, SHAPES, Link, Piece, Reading, join, make_pose, weigh
-from .usd import read_usd
+from .files import Unread, load_mesh, parse, reason, refuse
+from .pieces import DENSITY, ONE, SHAPES, Link, Piece, Reading, join, make_pose, rounding_of, weigh
 
-ONE = "one free rigid body, whose parts are on fixed joints"
 _POSE = "relative_to degrees rotation_format frame"
 _I = "ixx iyy izz ixy ixz iyz"
 KNOWN: dict[str, dict[str, tuple[str, str]]] = {
@@ -69,47 +64,23 @@ KNOWN: dict[str, dict[str, tuple[str, str]]] = {
 MASS = ("inertial", "origin", "pose", "mass", "inertia")
 EXTENSIONS = {"mujoco": "mujoco", "drake": "drake"}
 """Names and prefixes of elements that ask one engine for something."""
+SINCE = {
+    ("pose", "relative_to"): "1.7",
+    ("frame", "attached_to"): "1.7",
+    ("pose", "degrees"): "1.9",
+    ("pose", "rotation_format"): "1.9",
+    ("inertial", "auto"): "1.11",
+    ("inertial", "density"): "1.11",
+    ("collision", "density"): "1.11",
+}
+"""Versions of SDF from which on an element has such an attribute or child."""
 
 
-def read_links(path: Path, angles: float = 1.0, search: Sequence[Path] = ()) -> list[Link]:
-    """Return the links of `read_own`."""
-    return read_own(path, angles, search).links
-
-
-def read_own(path: Path, angles: float = 1.0, search: Sequence[Path] = ()) -> Reading:
-    """Return the links of a URDF, SDF or USD file with one rigid body as this package reads them, and of MJCF as MuJoCo does.
-
-    All angles in URDF and SDF are multiplied by `angles`; if it is not 1, MJCF is read with the other unit of angles. Meshes
-    may lie in the folder of the file or in those of `search`.
-
-    Raises
-    ------
-    BadInput
-        The file cannot be read, has a joint that moves, no inertia, a missing mesh, or no units.
-    MissingEngine, MissingExtra
-        MuJoCo, usd-core, lxml or trimesh is not installed.
-    """
-    kind = kind_of(path)
-    file = File(path, angles, search)
-    try:
-        file.read.links = read_usd(path, search, file.read) if kind == "usd" else {"mjcf": read_mjcf}.get(kind, _read_xml)(file)
-    except RecursionError:
-        raise refuse(path, "frames that refer to each other in a circle", "frames that lead to the model") from None
-    except (ValueError, LookupError, AttributeError, TypeError) as error:
-        if isinstance(error, BadInput):
-            raise
-        what = f"what cannot be read ({type(error).__name__}: {error})"
-        raise refuse(path, what, "elements and numbers of its format") from None
-    links = file.read.links
-    if not all(
-        np.isfinite([*link.inertia.ravel(), *link.frame.ravel(), *link.pose.ravel(), link.mass]).all() for link in links
-    ):
-        raise refuse(path, "numbers that are not finite", "finite numbers in m, kg and kg m^2")
-    if not any(link.mass for link in links):
-        raise refuse(path, "no mass in any link", "mass and inertia of a link")
-    base = np.linalg.inv(links[0].pose)
-    file.read.links = [replace(link, pose=base @ link.pose) for link in links]
-    return file.read
+def version_of(text: str) -> tuple[int, ...]:
+    """Return a version such as "1.11" as numbers. Raise `Unread`."""
+    if not re.fullmatch(r"\d+(\.\d+)*", text):
+        raise Unread(f"the version {text!r}")
+    return tuple(map(int, text.split(".")))
 
 
 @dataclass(frozen=True)
@@ -117,7 +88,6 @@ class File:
     """A file, for messages, poses and geometry; `read` collects what has to be said."""
 
     path: Path
-    angles: float
     search: Sequence[Path] = ()
     read: Reading = field(default_factory=Reading)
 
@@ -128,25 +98,31 @@ class File:
         """Return the pose (4, 4) in an <origin> of URDF or a <pose> of SDF, of a link `of`; without one the identity."""
         if element is None:
             return np.eye(4)
+        owner, form = element.getparent(), element.get("rotation_format")
+        name = owner.get("name") or owner.getparent().get("name")
         if element.tag == "pose":
-            values = numbers(element.text)
+            values = numbers(
+                (element.text or "").strip() or ("0 0 0 0 0 0" + " 1" * (form == "quat_xyzw")), 6 + (form == "quat_xyzw")
+            )
             if element.get("frame"):
-                self.read.doubts.append(
-                    f"a pose has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
-                )
+                said = f"<pose> of {name!r} has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
+                self.read.doubts.append(said)
         else:
-            values = numbers(f"{element.get('xyz', '0 0 0')} {element.get('rpy', '0 0 0')}")
+            values = numbers(element.get("xyz", "0 0 0"), 3) + numbers(element.get("rpy", "0 0 0"), 3)
         if of and (base := element.get("relative_to", of)):
-            said = f"the pose in <{element.getparent().tag}> of {of!r} is relative to {base!r}, which the format does not allow"
+            said = f"the pose in <{owner.tag}> of {of!r} is relative to {base!r}, which the format does not allow"
             (self.read.doubts if base == of else self.read.invalid).extend([said] * ("relative_to" in element.attrib))
         if "quat_xyzw" in element.attrib:
-            if tuple(map(int, version.split("."))) >= (1, 1):
-                return make_pose(values[:3], Rotation.from_quat(numbers(element.get("quat_xyzw"))))
-            self.read.notes.append("quat_xyzw is ignored in URDF 1.0, which has no such attribute")
-        if element.get("rotation_format") == "quat_xyzw":
+            if version_of(version) >= (1, 1):
+                values[3:], form = numbers(element.get("quat_xyzw"), 4), "quat_xyzw"
+            else:
+                self.read.notes.append(f"quat_xyzw of {name!r} is ignored in URDF {version}, which has no such attribute")
+        if form == "quat_xyzw":
+            if not any(values[3:]):
+                raise Unread(f"the quaternion 0 0 0 0 of {name!r}")
             return make_pose(values[:3], Rotation.from_quat(values[3:]))
-        unit = self.angles * (math.pi / 180 if element.get("degrees") in ("true", "1") else 1.0)
-        return make_pose(values[:3], Rotation.from_euler("xyz", unit * np.array(values[3:] or [0, 0, 0])))
+        unit = math.pi / 180 if element.get("degrees") in ("true", "1") else 1.0
+        return make_pose(values[:3], Rotation.from_euler("xyz", unit * np.array(values[3:])))
 
     def weigh(self, element: Any, place: Array, density: float = DENSITY) -> list[Piece]:
         """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane.
@@ -166,34 +142,55 @@ class File:
             raise self.refuse(f"the shape <{form.tag}>", f"shapes whose volume is known: {', '.join(SHAPES)}")
         return weigh(form.tag, numbers(" ".join(values[name] for name in names)), place, density)
 
-    def look(self, element: Any, format_: str) -> None:
-        """Note what no rule here covers, in an element and its children: in the parts with a mass it is a doubt."""
+    def look(self, element: Any, version: str = "") -> None:
+        """Note what no rule here covers in an element of URDF, or of SDF of a `version`; with a mass it is a doubt."""
         tag = element.tag
-        used, ignored = (names.split() for names in KNOWN[format_].get(tag, ("*", "")))
+        used, ignored = (names.split() for names in KNOWN["sdf" if version else "urdf"].get(tag, ("*", "")))
         owners = [*((name, element) for name in element.attrib), *((child.tag, child) for child in element)]
         for name, owner in () if used == ["*"] else owners:
+            if version and version_of(version) < version_of(SINCE.get((tag, name), "0")):
+                said = f"<{tag}> has {name!r}, which is of SDF {SINCE[tag, name]}, and the file of SDF {version}"
+                self.read.doubts.append(said)
             if name not in used and name not in ignored:
-                plain = qualified(owner, name)
-                if engine := EXTENSIONS.get(plain.partition(":")[0]):
-                    inside = [each for each in owner.iter() if each is not element and owner is not element]
-                    values = [f"{each.tag} {key}={value!r}" for each in inside for key, value in each.attrib.items()]
-                    self.read.asks.setdefault(engine, []).append(" ".join([f"<{plain}>", *values]))
+                if engine := EXTENSIONS.get(name.partition(":")[0]):
+                    self._ask(engine, name, owner if owner is not element else None)
                 else:
-                    said = f"<{tag}> has {plain!r}, which is not read here"
+                    said = f"<{tag}> has {name!r}, which is not read here"
                     (self.read.doubts if tag in MASS else self.read.notes).append(said)
             if name in MASS and len(element.findall(name)) > 1:
                 self.read.invalid.append(f"<{tag}> has several elements <{name}>")
         for child in element:
             if child.tag in used:
-                self.look(child, format_)
+                self.look(child, version)
+
+    def _ask(self, engine: str, name: str, owner: Any) -> None:
+        """Add what an element, or an attribute if the owner is None, asks an engine for."""
+        inside = (
+            [] if owner is None else [(each.tag.rpartition(":")[2], *pair) for each in owner.iter() for pair in each.items()]
+        )
+        for tag, key, value in inside or [(name.rpartition(":")[2], "", "")]:
+            option = key if name == "mujoco" else f"{tag} {key}"
+            self.read.ask(engine, option, value, f"<{name}> {tag} {key}={value!r}" if key else f"<{name}>")
 
 
-def numbers(text: str | None) -> list[float]:
-    """Return the finite numbers of a text. Raise ValueError for others."""
-    values = [float(word) for word in (text or "").split()]
-    if not all(map(math.isfinite, values)):
-        raise ValueError(f"{text!r} is not finite")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+
+
+def numbers(text: str | None, count: int = 0) -> list[float]:
+    """Return the finite numbers of a text, `count` if it is given. Raise `Unread` for others."""
+    words = (text or "").split()
+    values = [float(word) if _NUMBER.fullmatch(word) else math.nan for word in words]
+    if wrong := [word for word, value in zip(words, values, strict=True) if not math.isfinite(value)]:
+        finite = wrong[0].lstrip("+-").lower() in ("nan", "inf", "infinity") or _NUMBER.fullmatch(wrong[0])
+        raise Unread(f"{wrong[0]!r}, which is {'not finite' if finite else 'no number'}")
+    if count and len(values) != count:
+        raise Unread(f"{text!r}, which is {len(values)} numbers instead of {count}")
     return values
+
+
+def number(text: str) -> float:
+    """Return the finite number in a text. Raise `Unread`."""
+    return numbers(text, 1)[0]
 
 
 @dataclass(frozen=True)
@@ -236,12 +233,12 @@ class Frames:
         return self.place(base or element.findtext("child", "")) @ self._file.pose(pose)
 
 
-def _read_xml(file: File) -> list[Link]:
+def read_xml(file: File) -> list[Link]:
     """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
     root = parse(file.path)
     urdf = root.tag == "robot"
     version = root.get("version", "1.0") if urdf else "sdf"
-    file.look(root, "urdf" if urdf else "sdf")
+    file.look(root, "" if urdf else root.get("version", "1.0"))
     models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
         raise file.refuse(f"{len(models)} models, or one within another", "one model without includes")
@@ -256,21 +253,25 @@ def _read_xml(file: File) -> list[Link]:
     for name in (each.get("name", "") for each in model.findall("link") if each.get("name") not in free):
         element, link = frames.elements[name], Link(frames.place(name), name=name)
         inertial = element.find("inertial")
-        auto = inertial is not None and inertial.get("auto") in ("true", "1")
+        auto = not urdf and inertial is not None and inertial.get("auto") in ("true", "1")
         try:
             link = replace(link, geometry=join(_shapes(file, frames, name, inertial)))
         except BadInput as error:
             if auto:
                 raise
             file.read.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
-        if auto:
-            link = link.filled(link.geometry)
+        if auto:  # a mass of the file is that of the whole, from libsdformat 15.2 on
+            mass = inertial.findtext("mass")
+            part = link.geometry.scale(number(mass) / link.geometry.mass if mass and link.geometry.mass else 1.0)
+            link = link.filled(part)
         elif inertial is not None or not urdf:
             link = _inertial(file, link, element.makeelement("inertial") if inertial is None else inertial, name, version)
         links[name] = link
     roots = [name for name in links if name not in [joint.child for joint in frames.joints if joint.kind == "fixed"]]
     if len(roots) != 1:
         raise file.refuse(f"{len(roots)} root links", ONE)
+    if links[roots[0]].name == "world":
+        file.read.doubts.append("the body is named 'world', which some engines hold")
     return [links.pop(roots[0]), *links.values()]
 
 
@@ -283,7 +284,7 @@ def _shapes(file: File, frames: Frames, name: str, inertial: Any) -> list[Piece]
         at = file.pose(pose)
         if pose is not None and pose.get("relative_to"):
             at = np.linalg.inv(frames.place(name)) @ frames.place(pose.get("relative_to")) @ at
-        forms += file.weigh(each.find("geometry"), at, float(density))
+        forms += file.weigh(each.find("geometry"), at, number(str(density)))
     return forms
 
 
@@ -296,46 +297,14 @@ def _inertial(file: File, link: Link, inertial: Any, name: str, version: str) ->
     missing += ["mass"] * (urdf and weight is None)
     if missing:
         file.read.invalid.append(f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires")
-    inertia = [[float(given.get(f"i{min(a, b)}{max(a, b)}", a == b and not urdf)) for a in "xyz"] for b in "xyz"]
+    default = {True: "0" if urdf else "1", False: "0"}
+    inertia = [[number(given.get(f"i{min(a, b)}{max(a, b)}", default[a == b])) for a in "xyz"] for b in "xyz"]
     frame = file.pose(inertial.find("origin" if urdf else "pose"), name, version if urdf else "1.0")
-    return replace(link, mass=float(weight or not urdf), frame=frame, inertia=np.array(inertia))
+    moments = rounding_of(np.ravel(inertia).tolist())
+    weight = weight or ("0" if urdf else "1")
+    return replace(link, mass=number(weight), frame=frame, inertia=np.array(inertia), rounding=moments)
 
 
 def _values(element: Any) -> dict[str, str]:
     """Return the attributes and the texts of the children of an element."""
     return {} if element is None else {**element.attrib, **{child.tag: child.text or "" for child in element}}
-
-
-def read_mjcf(file: File) -> list[Link]:
-    """Return the links of an MJCF file as MuJoCo compiles it, with their geometry."""
-    mujoco = load("mujoco", "mujoco", "MuJoCo")
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        try:
-            spec = mujoco.MjSpec.from_file(str(file.path))
-            spec.compiler.degree ^= file.angles != 1
-            model = spec.compile()
-        except (ValueError, mujoco.FatalError) as error:
-            raise file.refuse(f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
-        file.read.notes.extend(f"MuJoCo warns: {each.message}" for each in said)
-        spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
-        try:
-            shapes = spec.compile()
-        except (ValueError, mujoco.FatalError):  # bodies without geometry
-            shapes = None
-    if model.njnt > (model.nq == 7):
-        raise file.refuse(f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
-    if (model.body_parentid[1:] == 0).sum() != 1:
-        raise file.refuse(f"{(model.body_parentid[1:] == 0).sum()} bodies in the world", ONE)
-    data, links = mujoco.MjData(model), []
-    mujoco.mj_kinematics(model, data)
-
-    def part(model: Any, body: int) -> Piece:
-        place = make_pose(model.body_ipos[body], Rotation.from_quat(model.body_iquat[body], scalar_first=True))
-        return Piece(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body])).place(place)
-
-    for body in range(1, model.nbody):
-        link = Link(make_pose(data.xpos[body], data.xmat[body].reshape(3, 3)), name=model.body(body).name)
-        link = link.filled(part(model, body))
-        links.append(replace(link, geometry=part(shapes, body)) if shapes else link)
-    return links

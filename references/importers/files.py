@@ -5,6 +5,7 @@ Call these functions in a worker with limits. lxml refuses deep nesting and endl
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +22,12 @@ MESHES = ("obj", "stl", "ply", "off")
 """Types of meshes that refer to no other file that matters."""
 LARGEST = 2**26
 """Largest file of XML and largest mesh, bytes."""
+_NAMESPACE = re.compile(rb"""\sxmlns(:[\w.-]+)?\s*=\s*("[^"]*"|'[^']*')""")
 _SCHEMES = ("package://", "model://", "file://")
+
+
+class Unread(ValueError):
+    """Something in a file that no reader takes. The message is a part of a sentence."""
 
 
 def refuse(path: Path, what: str, allowed: str) -> BadInput:
@@ -55,10 +61,10 @@ def parse(path: Path, *roots: str) -> Any:
 
     names = roots or tuple(ROOTS)
     allowed = f"a file of XML with the root element <{'>, <'.join(names)}>" + ("" if roots else f", or {', '.join(USD)}")
-    # Undeclared prefixes such as <drake:...> are common, so only other errors count.
+    # Undeclared prefixes such as <drake:...> are common, and parsers of models know no namespaces.
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True, recover=True)
     try:
-        root = etree.fromstring(read_bytes(path), parser)
+        root = etree.fromstring(_NAMESPACE.sub(b"", read_bytes(path)), parser)
     except (OSError, ValueError, etree.XMLSyntaxError) as error:
         raise BadInput(
             "file", f"{str(path)!r}: {' '.join(str(getattr(error, 'strerror', None) or error).split())}", allowed
@@ -74,25 +80,18 @@ def parse(path: Path, *roots: str) -> Any:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of an ordinary file. Raise ValueError for another one and for one larger than `LARGEST`."""
+    """Return the content of an ordinary file. Raise `Unread` for another one and for one larger than `LARGEST`."""
     if path.exists() and not path.is_file():
-        raise ValueError("it is no ordinary file")
+        raise Unread("it is no ordinary file")
     if (size := path.stat().st_size) > LARGEST:
-        raise ValueError(f"{size / 2**20:.0f} MiB, more than {LARGEST / 2**20:.0f} MiB")
+        raise Unread(f"{size / 2**20:.0f} MiB, more than {LARGEST / 2**20:.0f} MiB")
     return path.read_bytes()
-
-
-def qualified(element: Any, name: str) -> str:
-    """Return a name as it stands in the file, "drake:mass" instead of "{uri}mass"."""
-    uri, brace, plain = name.removeprefix("{").partition("}")
-    prefix = next((key for key, value in element.nsmap.items() if value == uri and key), "") if brace else ""
-    return f"{prefix}:{plain}" if brace else name
 
 
 def find(path: Path, name: str, search: Sequence[Path]) -> Path:
     """Return the file that a model refers to by a relative path or URI, in the model's folder or a search path.
 
-    Raise ValueError with the reason if it is not there, or elsewhere after links are followed.
+    Raise `Unread` with the reason if it is not there, or elsewhere after links are followed.
     """
     scheme = next((each for each in _SCHEMES if name.startswith(each)), "")
     plain = name.removeprefix(scheme)
@@ -100,10 +99,10 @@ def find(path: Path, name: str, search: Sequence[Path]) -> Path:
     tails = [plain] if scheme in ("", "file://") else [plain, plain.partition("/")[2]]
     found = [place for folder in folders for tail in tails if tail and (place := folder / tail).is_file()]
     if not found:
-        raise ValueError(f"the file {name!r}, which is not there")
+        raise Unread(f"the file {name!r}, which is not there")
     inside = [each for each in found if any(each.resolve().is_relative_to(folder.resolve()) for folder in folders)]
     if not inside:
-        raise ValueError(f"the file {name!r}, which is outside the folder of the model and the search paths")
+        raise Unread(f"the file {name!r}, which is outside the folder of the model and the search paths")
     return inside[0]
 
 
@@ -130,31 +129,33 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
     return vertices, faces
 
 
-def included(path: Path, search: Sequence[Path], depth: int = 0) -> list[str]:
-    """Look at the files that an MJCF file reads, and return those that are not there or outside the folders.
+def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
+    """Return the root of an MJCF file with the content of the files that it includes, and files that it needs and has not.
 
-    Raise `BadInput` if such a file is included, and for includes in a circle.
+    Raise `BadInput` if an included file is not there or outside the folders, and if it is included twice.
     """
-    root, missing = parse(path, "mujoco", *["mujocoinclude"] * bool(depth)), list[str]()
-    dirs = {
-        key: each.get(key) for each in root.iter("compiler") for key in ("meshdir", "texturedir", "assetdir") if each.get(key)
-    }
-    if depth > 8:
-        raise refuse(path, "files that include each other", "includes without a circle")
+    root, seen, missing = parse(path, "mujoco"), {path.resolve()}, list[str]()
+
+    def look(name: str, needed: bool) -> Path | None:
+        try:
+            return find(path, name, search)
+        except (ValueError, OSError) as error:
+            if needed:
+                raise refuse(path, str(error), "files in the folder of the model or in one of --search") from None
+            missing.append(name)
+            return None
+
+    while (each := next(root.iter("include"), None)) is not None:
+        place = look(each.get("file", ""), True) or path
+        if place.resolve() in seen:
+            raise refuse(path, "files that include each other, or one twice", "each file included once")
+        seen.add(place.resolve())
+        for child in reversed(parse(place, "mujoco", "mujocoinclude")):
+            each.addnext(child)
+        each.getparent().remove(each)
+    folders = {key: value for each in root.iter("compiler") for key, value in each.attrib.items() if key.endswith("dir")}
     for each in root.iter():
-        folder = (
-            dirs.get({"texture": "texturedir"}.get(each.tag, "meshdir"), dirs.get("assetdir", ""))
-            if each.tag != "include"
-            else ""
-        )
+        folder = folders.get({"texture": "texturedir"}.get(each.tag, "meshdir"), folders.get("assetdir", ""))
         for name in [value for key, value in each.attrib.items() if key.startswith("file")]:
-            try:
-                place = find(path, f"{folder}/{name}" if folder else name, search)
-            except (ValueError, OSError) as error:
-                if each.tag in ("include", "model"):
-                    raise refuse(path, str(error), "files in the folder of the model or in one of --search") from None
-                missing.append(name)
-                continue
-            if each.tag == "include":
-                missing += included(place, [path.parent, *search], depth + 1)
-    return missing
+            look(f"{folder}/{name}" if folder else name, each.tag == "model")
+    return root, missing

@@ -62,6 +62,9 @@ def _compile_mujoco(path, kind):
     option.disableflags = sum(int(getattr(flags, f"mjDSBL_{name}", 0)) for name in forces)
     for joint in spec.joints:
         joint.armature = joint.frictionloss = 0
+    for each in (spec.compiler, *spec.joints):  # the body keeps the axes of the file
+        for name in {"align", "alignfree"}.intersection(dir(each)):
+            setattr(each, name, 0)
     return mujoco, spec.compile()
 
 
@@ -109,7 +112,8 @@ def _brax(path, kind):
     from brax.io import mjcf
 
     system = _choose(kind, mjcf=mjcf.load)(path).replace(mj_model=None)
-    system = system.replace(gravity=0 * system.gravity)
+    still = {name: 0 * getattr(system.dof, name) for name in ("armature", "stiffness", "damping")}
+    system = system.replace(gravity=0 * system.gravity, enable_fluid=False, dof=system.dof.replace(**still))
 
     @jax.jit
     def accelerate(v, force):

@@ -1,12 +1,16 @@
-"""The body of an MJCF file as this package reads it, a second opinion beside MuJoCo's compiler.
+"""The body of an MJCF file as MuJoCo compiles it, and as this package computes it from the elements that MuJoCo parses.
 
-Rules: https://mujoco.readthedocs.io/en/stable/XMLreference.html. What has no rule here raises `NotRead` instead of a guess.
+Only MuJoCo's parser knows classes, copies, frames and files within files. The mass, centre of mass and inertia that follow from
+the elements are computed here by the rules of https://mujoco.readthedocs.io/en/stable/XMLreference.html. What has no rule here
+raises `NotRead` instead of a guess.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,25 +20,10 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 
-from .files import find, load_mesh, parse
-from .pieces import DENSITY, Piece, join, make_pose, weigh
+from ..engine import load
+from .files import inline, load_mesh, refuse
+from .pieces import ONE, Link, Piece, join, join_links, make_pose, rounding_of, weigh
 
-IRRELEVANT = ("joint", "freejoint", "site", "camera", "light", "inertial")
-_TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-_UNREAD = {  # attributes of <compiler> and of a shape by the values for which there is a rule
-    "compiler": {
-        "balanceinertia": "false",
-        "settotalmass": "-1",
-        "boundmass": "0",
-        "boundinertia": "0",
-        "inertiagrouprange": "0 5",
-    }
-    | {"alignfree": "false", "coordinate": "local"},
-    "geom": {"shellinertia": "false", "fitscale": "1"},
-    "mesh": {"inertia": "legacy", "refpos": "0 0 0", "refquat": "1 0 0 0", "builtin": "none"},
-    "joint": {"align": "false"},
-    "freejoint": {"align": "false"},
-}
 _HALF = {"capsule": (1, 2), "cylinder": (1, 2), "box": (2, 2, 2), "ellipsoid": (1, 1, 1), "sphere": (1,)}
 """Shapes, and the factors from sizes in MJCF, which are half lengths, to those of `weigh`."""
 
@@ -43,144 +32,137 @@ class NotRead(Exception):
     """The file has something for which there is no rule here. The message names it."""
 
 
-def inline(path: Path, search: Sequence[Path] = ()) -> Any:
-    """Return the root element of an MJCF file with the content of the files that it includes."""
-    root = parse(path, "mujoco", "mujocoinclude")
-    while (each := next(root.iter("include"), None)) is not None:
-        other, parent = parse(find(path, each.get("file"), search), "mujoco", "mujocoinclude"), each.getparent()
-        for child in reversed(other):
-            each.addnext(child)
-        parent.remove(each)
-    return root
+def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any]:
+    """Return the module mujoco and the elements of a file, an `MjSpec`. Raise `BadInput` and `MissingEngine`."""
+    mujoco = load("mujoco", "mujoco", "MuJoCo")
+    from lxml.etree import tostring
+
+    try:
+        spec = mujoco.MjSpec.from_string(tostring(inline(path, search)[0]).decode())
+    except (ValueError, mujoco.FatalError) as error:
+        raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo reads") from None
+    spec.modelfiledir = str(path.parent)
+    for each in (spec.compiler, *spec.joints):  # another body frame, and the same body
+        for name in {"align", "alignfree"}.intersection(dir(each)):
+            setattr(each, name, 0)
+    return mujoco, spec
 
 
-class Model:
-    """An MJCF model: its compiler options, defaults and meshes."""
+def compile_mjcf(path: Path, search: Sequence[Path], notes: list[str]) -> Piece:
+    """Return the body that MuJoCo compiles of a file with one free body, in its axes. Warnings become notes.
 
-    def __init__(self, path: Path, search: Sequence[Path] = (), other_angles: bool = False) -> None:
-        self.path, self.search, self.root = path, search, inline(path, search)
-        self.options = {key: value for each in self.root.findall("compiler") for key, value in each.attrib.items()}
-        self.unit = 1.0 if (self.options.get("angle", "degree") == "radian") != other_angles else math.pi / 180
-        _require_rules("compiler", self.options)
-        self.classes: dict[str, dict[tuple[str, str], str]] = {"main": {}}
-        for each in self.root.findall("default"):
-            self._collect(each, "main")
-        self.meshes = {each.get("name") or Path(each.get("file", "")).stem: each for each in self.root.iterfind("asset/mesh")}
+    Raise `BadInput` for a file that it does not compile, and for several bodies.
+    """
+    mujoco, spec = parse_mjcf(path, search)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            model = spec.compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
+    notes.extend(f"MuJoCo warns: {each.message}" for each in said)
+    if model.njnt > (model.nq == 7):
+        raise refuse(path, f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
+    if (roots := (model.body_parentid[1:] == 0).sum()) != 1:
+        raise refuse(path, f"{roots} bodies in the world", ONE)
+    mujoco.mj_kinematics(model, data := mujoco.MjData(model))
+    parts = [Piece(float(model.body_mass[k]), np.zeros(3), np.diag(model.body_inertia[k])) for k in range(1, model.nbody)]
+    poses = [make_pose(*each) for each in zip(data.xipos[1:], data.ximat[1:].reshape(-1, 3, 3), strict=True)]
+    base = np.linalg.inv(make_pose(data.xpos[1], data.xmat[1].reshape(3, 3)))
+    return join(part.place(base @ pose) for part, pose in zip(parts, poses, strict=True))
 
-    def _collect(self, element: Any, name: str) -> None:
-        own = self.classes.setdefault(name, {})
-        for child in element:
-            own |= {(child.tag, key): value for key, value in child.attrib.items()}
-        for child in element.findall("default"):
-            self.classes[child.get("class")] = dict(own)
-            self._collect(child, child.get("class"))
 
-    def values(self, element: Any, inherited: str) -> dict[str, str]:
-        """Return the attributes of an element with those of its class, `inherited` unless it has one."""
-        of_class = self.classes.get(element.get("class", inherited), {})
-        found = {key: value for (tag, key), value in of_class.items() if tag == element.tag}
-        if "size" in found and "size" in element.attrib:  # fewer numbers than in the class replace the first ones
-            given = element.get("size").split()
-            found |= dict(element.attrib) | {"size": " ".join([*given, *found["size"].split()[len(given) :]])}
-        found |= {key: value for key, value in element.attrib.items() if key != "size" or key not in found}
-        _require_rules(element.tag, found)
-        return found
+def read_mjcf(path: Path, search: Sequence[Path] = ()) -> list[Link]:
+    """Return the links of a file with one body in the world, in its axes. Raise `NotRead` and `BadInput`."""
+    mujoco, spec = parse_mjcf(path, search)
+    options = spec.compiler
+    if len(spec.worldbody.bodies) != 1 or len(getattr(spec, "flexes", ())):
+        raise NotRead(f"{len(spec.worldbody.bodies)} bodies in the world, or flexible ones")
 
-    def pose(self, values: dict[str, str]) -> Array:
-        """Return the pose (4, 4) in attributes."""
-        turn, R = {key: _numbers(values[key]) for key in _TURNS if key in values}, Rotation.identity()
-        if "quat" in turn:
-            R = Rotation.from_quat(turn["quat"], scalar_first=True)
-        if "axisangle" in turn:
-            axis = np.array(turn["axisangle"][:3])
-            R = Rotation.from_rotvec(self.unit * turn["axisangle"][3] * axis / np.linalg.norm(axis))
-        if "euler" in turn:  # small letters turn about axes that move along, which scipy writes in capitals
-            R = Rotation.from_euler(self.options.get("eulerseq", "xyz").swapcase(), self.unit * np.array(turn["euler"]))
-        if "xyaxes" in turn:
-            x = np.array(turn["xyaxes"][:3]) / np.linalg.norm(turn["xyaxes"][:3])
-            y = np.array(turn["xyaxes"][3:]) - x * (x @ turn["xyaxes"][3:])
-            y /= np.linalg.norm(y)
-            R = Rotation.from_matrix(np.transpose([x, y, np.cross(x, y)]))
-        if "zaxis" in turn:
-            R = _from_z(np.array(turn["zaxis"]))
-        return make_pose(_numbers(values.get("pos", "0 0 0")), R)
-
-    def body(self, element: Any, inherited: str, pose: Array) -> list[Piece]:
-        """Return the parts of a body and of those below it, in the axes in which it has a pose (4, 4)."""
-        inherited = element.get("childclass", inherited)
-        inertial, rule = element.find("inertial"), self.options.get("inertiafromgeom", "auto")
-        parts = []
-        if inertial is not None and rule != "true":
-            v = self.values(inertial, inherited)
-            a = _numbers(v.get("fullinertia", v.get("diaginertia", "") + " 0 0 0"))
-            inertia = np.array([[a[0], a[3], a[4]], [a[3], a[1], a[5]], [a[4], a[5], a[2]]])
-            parts.append(Piece(float(v["mass"]), np.zeros(3), inertia).place(self.pose(v)).place(pose))
-        self._below(element, inherited, pose, parts, rule == "true" or (inertial is None and rule == "auto"))
-        return parts
-
-    def _below(self, element: Any, inherited: str, pose: Array, parts: list[Piece], shapes: bool) -> None:
-        for child in element:
-            if child.tag == "geom":
-                parts += self.geom(self.values(child, inherited), pose) if shapes else []
-            elif child.tag == "frame":
-                inner = pose @ self.pose(dict(child.attrib))
-                self._below(child, child.get("childclass", inherited), inner, parts, shapes)
-            elif child.tag == "body":
-                parts += self.body(child, inherited, pose @ self.pose(dict(child.attrib)))
-            elif child.tag not in IRRELEVANT:
-                raise NotRead(f"<{child.tag}>")
-            else:
-                self.values(child, inherited)
-
-    def geom(self, v: dict[str, str], pose: Array) -> list[Piece]:
-        """Return the part of a geometry with given attributes."""
-        kind, place, sizes = v.get("type", "sphere"), self.pose(v), _numbers(v.get("size", ""))
-        if kind in ("plane", "hfield") or float(v.get("mass", "1")) == 0:
+    def weigh_geom(geom: Any) -> list[Piece]:
+        kind = mujoco.mjtGeom(geom.type).name.removeprefix("mjGEOM_").lower()
+        place, sizes = _pose(geom, options), geom.size
+        if kind in ("plane", "hfield") or geom.mass == 0:
             return []
-        if kind == "mesh":
-            asset = self.meshes[v["mesh"]]
-            mesh = self.values(asset, "main")
-            name = "/".join(filter(None, [self.options.get("meshdir", self.options.get("assetdir", "")), mesh.get("file", "")]))
-            vertices, faces = load_mesh(self.path, name, self.search)
-            shape: Any = [vertices * _numbers(mesh.get("scale", "1 1 1")), faces]
-            if weigh("mesh", shape, np.eye(4), 1.0)[0].mass < ConvexHull(shape[0]).volume * (1 - 1e-6):
-                raise NotRead(f"the mesh {name!r}: it is not convex, and what its volume is depends on the version of MuJoCo")
+        if int(geom.typeinertia):
+            raise NotRead("shellinertia='true' of <geom>")
+        if geom.meshname:
+            shape: Any = _mesh(mujoco, spec, geom, kind, path, search)
         elif kind in _HALF:
-            if "fromto" in v:
-                ends = np.reshape(_numbers(v["fromto"]), (2, 3))
-                place = make_pose(ends.mean(axis=0), _from_z(ends[0] - ends[1]))
-                sizes = [sizes[0]] * (1 if kind in ("capsule", "cylinder") else 2) + [
-                    float(np.linalg.norm(ends[1] - ends[0])) / 2
-                ]
+            if np.isfinite(geom.fromto[0]):
+                ends = geom.fromto.reshape(2, 3)
+                place = _pose(geom, options, make_pose(ends.mean(axis=0), _from_z(ends[0] - ends[1])))
+                half = np.linalg.norm(ends[1] - ends[0]) / 2
+                sizes = [sizes[0]] * (len(_HALF[kind]) - 1) + [half]
             shape = np.multiply(sizes[: len(_HALF[kind])], _HALF[kind])
             shape = shape[0] if kind == "sphere" else shape
         else:
             raise NotRead(f"a geometry of type {kind!r}")
-        (part,) = weigh(kind, shape, pose @ place, float(v.get("density", DENSITY)))
-        return [part.scale(float(v["mass"]) / part.mass) if "mass" in v else part]
+        (part,) = weigh(kind, shape, place, float(geom.density))
+        return [part] if np.isnan(geom.mass) else [part.scale(geom.mass / part.mass)]
+
+    def read(body: Any, pose: Array) -> list[Link]:
+        counted = [geom for geom in body.geoms if options.inertiagrouprange[0] <= geom.group <= options.inertiagrouprange[1]]
+        geometry = join(part for geom in counted for part in weigh_geom(geom))
+        link = Link(pose, name=body.name, geometry=geometry)
+        if body.explicitinertial and options.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+            full = body.fullinertia
+            given = body.inertia if np.isnan(full[0]) else full
+            inertia = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
+            inertia = np.diag(given) if len(given) == 3 else inertia
+            frame = make_pose(body.ipos, _turn(body.iquat, body.ialt, options))
+            link = replace(link, mass=float(body.mass), frame=frame, inertia=inertia, rounding=rounding_of(given))
+        elif options.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE:
+            link = link.filled(geometry)
+        moments, axes = np.linalg.eigh(link.inertia)
+        raised = np.maximum(moments, options.boundinertia)
+        if options.balanceinertia and raised[2] > raised[0] + raised[1]:
+            raised[:] = raised.mean()
+        link = link if (raised == moments).all() else replace(link, inertia=(axes * raised) @ axes.T)
+        links = [replace(link, mass=max(link.mass, options.boundmass))]
+        return links + [each for child in body.bodies for each in read(child, pose @ _pose(child, options))]
+
+    links = read(spec.worldbody.bodies[0], np.eye(4))
+    wanted = options.settotalmass / (join_links(links).mass or 1.0) if options.settotalmass > 0 else 1.0
+    return [replace(link, mass=wanted * link.mass, inertia=wanted * link.inertia) for link in links]
 
 
-def second_opinion(path: Path, search: Sequence[Path] = (), other_angles: bool = False) -> Piece:
-    """Return the body of an MJCF file with one body in the world, in its axes. Raise `NotRead` and `BadInput`."""
-    model = Model(path, search, other_angles)
-    found: list[tuple[Any, str]] = []
-    for world in model.root.findall("worldbody"):
-        found += [(each, world.get("childclass", "main")) for each in world.findall("body")]
-        if world.find("frame") is not None:
-            raise NotRead("<frame> in the world")
-    if len(found) != 1:
-        raise NotRead(f"{len(found)} bodies in the world")
-    return join(model.body(*found[0], np.eye(4)))
+def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequence[Path]) -> list[Array]:
+    """Return vertices and triangles of a mesh whose volume is the same by all rules of MuJoCo, as it is convex."""
+    mesh = next((each for each in spec.meshes if (each.name or Path(each.file).stem) == geom.meshname), None)
+    if mesh is None or kind != "mesh" or not mesh.file or np.any(mesh.refpos) or abs(mesh.refquat[0]) != 1:
+        raise NotRead(f"the mesh {geom.meshname!r} of a geometry of type {kind!r}")
+    if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL:
+        raise NotRead(f"the mesh {geom.meshname!r}, which is a shell")
+    vertices, faces = load_mesh(path, "/".join(filter(None, [spec.compiler.meshdir, mesh.file])), search)
+    shape = [vertices * mesh.scale, faces]
+    if weigh("mesh", shape, np.eye(4), 1.0)[0].mass < ConvexHull(shape[0]).volume * (1 - 1e-6):
+        raise NotRead(f"the mesh {geom.meshname!r}: it is not convex, and its volume depends on the version of MuJoCo")
+    return shape
 
 
-def _require_rules(tag: str, values: dict[str, str]) -> None:
-    for key, value in _UNREAD.get(tag, {}).items():
-        if key in values and values[key] != value:
-            raise NotRead(f"{key}={values[key]!r} of <{tag}>")
+def _pose(element: Any, options: Any, own: Array | None = None) -> Array:
+    """Return the pose (4, 4) of an element in its body from its `own`, with those of the frames around it."""
+    own = make_pose(element.pos, _turn(element.quat, element.alt, options)) if own is None else own
+    return own if element.frame is None else _pose(element.frame, options) @ own
 
 
-def _numbers(text: str) -> list[float]:
-    return [float(word) for word in text.split()]
+def _turn(quaternion: Array, other: Any, options: Any) -> Rotation:
+    """Return the rotation of a quaternion, scalar first, or of what stands for it."""
+    unit, kind = math.pi / 180 if options.degree else 1.0, other.type.name.removeprefix("mjORIENTATION_")
+    if kind == "AXISANGLE":
+        axis = np.array(other.axisangle[:3])
+        return Rotation.from_rotvec(unit * other.axisangle[3] * axis / np.linalg.norm(axis))
+    if kind == "EULER":  # small letters turn about axes that move along, which scipy writes in capitals
+        sequence = "".join(options.eulerseq[number] for number in range(3))
+        return Rotation.from_euler(sequence.swapcase(), unit * np.array(other.euler))
+    if kind == "XYAXES":
+        x, y = np.reshape(other.xyaxes, (2, 3))
+        x = x / np.linalg.norm(x)
+        y = y - x * (x @ y)
+        y /= np.linalg.norm(y)
+        return Rotation.from_matrix(np.transpose([x, y, np.cross(x, y)]))
+    return _from_z(np.array(other.zaxis)) if kind == "ZAXIS" else Rotation.from_quat(quaternion, scalar_first=True)
 
 
 def _from_z(z: Array) -> Rotation:

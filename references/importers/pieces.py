@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -12,32 +14,44 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 
+ONE = "one free rigid body, whose parts are on fixed joints"
 DENSITY = 1000.0
 """Density of geometry that has none in a file, kg/m^3."""
 SHAPES = ("box", "sphere", "ellipsoid", "cylinder", "capsule", "cone", "mesh", "plane")
 """Shapes of `weigh`; a plane has no mass."""
 
 
+QUANTITIES = ("mass", "centre of mass", "inertia")
+
+
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Mass, kg, centre of mass (3,), m, and inertia about it (3, 3), kg m^2."""
+    """Mass, kg, centre of mass (3,), m, and inertia about it (3, 3), kg m^2, with the rounding error of its moments."""
 
     mass: float
     com: Array
     inertia: Array
+    rounding: float = 0.0
 
     def place(self, pose: Array) -> Piece:
         """Return the part in other axes, in which its own have a pose (4, 4)."""
         R = pose[:3, :3]
-        return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T)
+        return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T, self.rounding)
 
     def scale(self, factor: float) -> Piece:
         """Return the part with another density."""
-        return Piece(factor * self.mass, self.com, factor * self.inertia)
+        return Piece(factor * self.mass, self.com, factor * self.inertia, abs(factor) * self.rounding)
+
+    @property
+    def excess(self) -> float:
+        """Largest moment minus the sum of the others, kg m^2, without round-off; a body has none."""
+        moments = np.linalg.eigvalsh(self.inertia)
+        excess = float(moments[2] - moments[0] - moments[1])
+        return excess if excess > 1e-9 * moments[2] else 0.0
 
     @property
     def flaw(self) -> str:
-        """Why no body has this mass and inertia; empty if one has. Files may round the moments of a planar body."""
+        """Why no body has this mass and inertia; empty if one has, or may have within the digits of a planar body's moments."""
         moments = np.linalg.eigvalsh(self.inertia)
         if not self.mass > 0:
             return "the mass is not positive"
@@ -45,7 +59,15 @@ class Piece:
             return "there is a mass without inertia"
         if not moments[0] > 0:
             return "a principal moment is not positive"
-        return "a moment exceeds the sum of the others" if moments[2] > (moments[0] + moments[1]) * (1 + 1e-6) else ""
+        # A single digit says too little to excuse a body: 0.01, 0.02, 0.04 is a mistake.
+        slack = max(1e-6 * moments[2], min(self.rounding, 0.1 * moments[2]))
+        return "a moment exceeds the sum of the others" if self.excess > slack else ""
+
+
+def rounding_of(moments: Iterable[Any]) -> float:
+    """Return the largest rounding error of a sum of three moments, kg m^2, from the digits that they are written with."""
+    exponents = [Decimal(str(each)).normalize().as_tuple().exponent for each in moments if each and np.isfinite(each)]
+    return 1.5 * 10.0 ** min(map(int, exponents), default=-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +75,7 @@ class Link:
     """A link, fixed to the root link.
 
     `pose` (4, 4) is its pose in the root link, and `frame` (4, 4) that of the inertial frame in the link, m. `inertia` (3, 3)
-    is in the inertial frame, kg m^2. `geometry` is its geometry with `DENSITY`.
+    is in the inertial frame, kg m^2, with a `rounding` as in `Piece`. `geometry` is its geometry with `DENSITY`.
     """
 
     pose: Array
@@ -62,32 +84,35 @@ class Link:
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
     name: str = ""
+    rounding: float = 0.0
+
+    @property
+    def part(self) -> Piece:
+        """Mass and inertia in the axes of the root link."""
+        return Piece(self.mass, np.zeros(3), self.inertia, self.rounding).place(self.pose @ self.frame)
 
     @property
     def flaw(self) -> str:
         """Why no body has this mass and inertia, as `Piece.flaw`; empty for a link without both, which is a frame."""
-        return Piece(self.mass, np.zeros(3), self.inertia).flaw if self.mass or self.inertia.any() else ""
+        return self.part.flaw if self.mass or self.inertia.any() else ""
 
     def filled(self, part: Piece) -> Link:
         """Return the link with mass and inertia of a part in its axes."""
-        return replace(self, mass=part.mass, frame=make_pose(part.com), inertia=part.inertia)
+        return replace(self, mass=part.mass, frame=make_pose(part.com), inertia=part.inertia, rounding=part.rounding)
 
 
 def join_links(links: Iterable[Link]) -> Piece:
-    """Return links as one part, in the axes of the root link."""
-    return join(Piece(each.mass, np.zeros(3), each.inertia).place(each.frame).place(each.pose) for each in links)
+    """Return mass, centre of mass and inertia of links, in the axes of the root link."""
+    return join(link.part for link in links)
 
 
 def join(parts: Iterable[Piece]) -> Piece:
-    """Return several parts as one: J = sum J_i + m_i (d_i.d_i 1 - d_i d_i'), d_i = c_i - c (Steiner)."""
+    """Return the whole: m = sum m_i, m c = sum m_i c_i, J = sum J_i + m_i (d_i.d_i 1 - d_i d_i'), d_i = c_i - c (Steiner)."""
     parts = list(parts)
     mass = sum(part.mass for part in parts)
     com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
-    inertia = np.zeros((3, 3))
-    for part in parts:
-        d = part.com - com
-        inertia = inertia + part.inertia + steiner(part.mass, d)
-    return Piece(mass, com, inertia)
+    inertia = sum((part.inertia + steiner(part.mass, part.com - com) for part in parts), np.zeros((3, 3)))
+    return Piece(mass, com, inertia, sum(part.rounding for part in parts))
 
 
 def steiner(mass: float, d: Array) -> Array:
@@ -103,14 +128,40 @@ def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Arra
     return T
 
 
-def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
-    """Return the largest difference of mass, centre of mass and inertia, relative to those of `scale`, by default `part`."""
+def errors(part: Piece, other: Piece, scale: Piece | None = None) -> dict[str, float]:
+    """Return the differences of the `QUANTITIES`, relative to those of `scale`, by default `part`."""
     unit = scale or part
     size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass)) if unit.mass else 0.0
     size = max(size, 1e-9 * np.linalg.norm(unit.com)) or 1.0  # below that the centre of mass is round-off
-    parts = (other.mass - part.mass, unit.mass), (other.com - part.com, size), (other.inertia - part.inertia, unit.inertia)
-    errors = [np.linalg.norm(each) and np.linalg.norm(each) / (np.linalg.norm(of) or 1e-300) for each, of in parts]
-    return float(np.nan_to_num(max(errors), nan=np.inf))
+    pairs = (other.mass - part.mass, unit.mass), (other.com - part.com, size), (other.inertia - part.inertia, unit.inertia)
+    found = [np.linalg.norm(each) and np.linalg.norm(each) / (np.linalg.norm(of) or 1e-300) for each, of in pairs]
+    return dict(zip(QUANTITIES, map(float, np.nan_to_num(found, nan=np.inf)), strict=True))
+
+
+def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
+    """Return the largest of `errors`."""
+    return max(errors(part, other, scale).values())
+
+
+def differing(part: Piece, other: Piece, tolerance: float) -> list[str]:
+    """Return the quantities that differ, each with both values: "mass 2 and 3 kg"."""
+    far = [name for name, error in errors(part, other).items() if not error < tolerance]
+    texts = {
+        "mass": ([part.mass], [other.mass], "kg"),
+        "centre of mass": (part.com, other.com, "m"),
+        "inertia": (*(each.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] for each in (part, other)), "kg m^2"),
+    }
+    return [f"{name} {list_numbers(texts[name][0])} and {list_numbers(texts[name][1])} {texts[name][2]}" for name in far]
+
+
+ROUND_OFF = 1e-7
+"""Numbers below this share of the largest one beside them are shown as 0."""
+
+
+def list_numbers(values: Any) -> str:
+    """Return numbers as text, with 0 for round-off."""
+    values = np.ravel(values)
+    return " ".join(f"{value:.4g}" if abs(value) > ROUND_OFF * np.abs(values).max() else "0" for value in values)
 
 
 @dataclass
@@ -126,14 +177,37 @@ class Reading:
     invalid
         How the file breaks the rules of its format. An engine that refuses it is right.
     asks
-        Options of the file for one engine, by the engine's name.
+        Options of the file for one engine that may change the body, by the engine's name: texts by the name of the option.
     """
 
     links: list[Link] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     invalid: list[str] = field(default_factory=list)
-    asks: dict[str, list[str]] = field(default_factory=dict)
+    asks: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    def ask(self, engine: str, option: str, value: str, text: str) -> None:
+        """Add an option for an engine; a note if it cannot change the body."""
+        if touched(option) and value not in _OFF:
+            self.asks.setdefault(engine, {})[option] = text
+        else:
+            self.notes.append(f"{text} is for {engine}, and does not change a mass or an inertia")
+
+
+_TOUCHED = {
+    "balanceinertia": ("inertia",),
+    "boundinertia": ("inertia",),
+    "boundmass": ("mass",),
+    "settotalmass": ("mass", "inertia"),
+}
+_OFF = ("false", "0", "auto", "-1", "0 5")
+"""Values of such options that ask for nothing."""
+
+
+def touched(option: str) -> Sequence[str]:
+    """Return the `QUANTITIES` that an option of an engine may change."""
+    known = re.search("mass|inertia|density", option.lower()) and "rotor" not in option.lower()
+    return _TOUCHED.get(option.lower(), QUANTITIES if known else ())
 
 
 def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:

@@ -6,29 +6,31 @@ disagree about a body, no engine can be called wrong.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import QhullError
 
 from conservative.errors import BadInput, MissingEngine, MissingExtra
 
-from ..engine import version
+from ..engine import load, version
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
-from .description import read_links, read_own
-from .files import kind_of, reason, refuse
-from .mjcf import NotRead, second_opinion
-from .model_files import MEMORY, SECONDS, urdf_bodies
-from .pieces import Link, Piece, distance, join, join_links
-from .robots import split
-from .usd import reference_usd
+from .description import File, read_xml
+from .files import Unread, kind_of, reason, refuse
+from .mjcf import NotRead, compile_mjcf, read_mjcf
+from .pieces import QUANTITIES, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
+from .robots import Body, split
+from .usd import read_usd, reference_usd
 
+SECONDS = 60.0
+"""Time in seconds that reading a file may take."""
+MEMORY = 2 * 2**30
+"""Memory in bytes that reading a file may take, including the engine, where the system supports a limit."""
 AGREE = 1e-4
 """Largest relative distance of two readings of one body. usd-core has single precision: measured 1.6e-7."""
 FAMILY = {
@@ -38,30 +40,29 @@ FAMILY = {
 }
 """Engines that read a format with its reference reader."""
 OWN = "this package"
+DIGITS = "the digits of the file leave open if a body is like this"
 
 
 @dataclass
-class Model:
-    """A body of a model file, and what its readers make of it; see `Reading` for notes, doubts, invalid and asks.
+class Model(Reading):
+    """A body of a model file, and what its readers make of it.
 
     `reference` is the body by the `reader`, which is "" if none is installed, and `own` that by this package; or None, and why.
-    `units` has the body with angles in the other unit, by the mistake.
     """
 
-    label: str
-    path: Path
-    kind: str
-    notes: list[str]
-    doubts: list[str] = field(default_factory=list)
-    invalid: list[str] = field(default_factory=list)
-    asks: dict[str, list[str]] = field(default_factory=dict)
-    links: list[Link] = field(default_factory=list)
+    label: str = ""
+    body: Body = field(default_factory=Body)
+    kind: str = ""
     own: Piece | None = None
     own_refuses: str = ""
     reader: str = ""
     reference: Piece | None = None
     reference_refuses: str = ""
-    units: dict[str, Piece] = field(default_factory=dict)
+
+    @property
+    def path(self) -> Path:
+        """The file that engines load."""
+        return self.body.path
 
     @property
     def truth(self) -> Piece:
@@ -77,8 +78,9 @@ class Model:
     @property
     def disagree(self) -> str:
         """How the readers disagree; "" if they do not."""
-        if self.own and self.reference and not self._repaired and distance(self.own, self.reference) > AGREE:
-            return f"the readers disagree, {self.reader} and {OWN}"
+        both = (self.reference, self.own)
+        if self.own and self.reference and not self._repaired and (far := differing(*both, AGREE)):
+            return f"the readers disagree, {self.reader} and {OWN}: {', '.join(far)}"
         if self.own and self.reference_refuses and not self.own.flaw:
             return f"{self.reader} does not read the file ({self.reference_refuses})"
         return ""
@@ -100,10 +102,18 @@ class Model:
             return "no reference reader is installed"
         return "" if self.own else f"{OWN} does not read the file ({self.own_refuses})"
 
-    def doubt(self, engine: str) -> str:
-        """Return why nothing can be said against an engine; "" if it can."""
-        asks = [f"the file asks for {', '.join(asks)}" for name, asks in self.asks.items() if engine in _family(name)]
-        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *asks]))
+    def _asks(self, engine: str) -> dict[str, str]:
+        """Return the options of the file for an engine that change this body."""
+        found = {key: text for name, asks in self.asks.items() if engine in _family(name) for key, text in asks.items()}
+        possible = not self.truth.flaw and not self.bad
+        return {key: text for key, text in found.items() if not (possible and key == "balanceinertia")}
+
+    def doubt(self, engine: str, differs: Sequence[str] = QUANTITIES) -> str:
+        """Return why nothing can be said against an engine whose body `differs` in these quantities; "" if it can."""
+        asks = self._asks(engine)
+        excused = asks and set(differs) <= {name for option in asks for name in touched(option)}
+        said = [f"the file asks for {', '.join(asks.values())}"] if excused else []
+        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *said]))
 
     def alone(self, engine: str) -> bool:
         """Whether an engine would be compared with itself."""
@@ -111,14 +121,12 @@ class Model:
 
     def asked_for(self, engine: str, seen: Piece, tolerance: float) -> str:
         """Return the options of the file for an engine if they explain the body that it has."""
-        asks = ", ".join(ask for name, asks in self.asks.items() if engine in _family(name) for ask in asks)
-        mean = Piece(self.truth.mass, self.truth.com, np.eye(3) * np.trace(self.truth.inertia) / 3)
-        options = {"inertiafromgeom": join(link.geometry.place(link.pose) for link in self.links), "balanceinertia": mean}
-        return (
-            asks
-            if any(name in asks and distance(part, seen) < tolerance for name, part in options.items() if part.mass)
-            else ""
-        )
+        asks, part = self._asks(engine), self.truth
+        if "inertiafromgeom" in asks:
+            part = join(link.geometry.place(link.pose) for link in self.links)
+        if "balanceinertia" in asks and (part.flaw or self.bad):
+            part = replace(part, inertia=np.eye(3) * np.trace(part.inertia) / 3)
+        return ", ".join(asks.values()) if asks and part.mass and distance(part, seen) < tolerance else ""
 
     def readings(self) -> dict[str, Any]:
         """Return the body by each reader, or why it has none."""
@@ -158,79 +166,96 @@ def read_files(paths: Sequence[Path], folder: Path, search: Sequence[Path] = ())
 def read_here(path: Path, label: str, folder: Path, search: Sequence[Path] = ()) -> list[Model]:
     """Return the bodies of a file as `read_files`, in this process."""
     kind = kind_of(path)
-    try:
+    with _sentences(path):
         bodies = split(path, kind, folder, search)
-    except (BadInput, MissingExtra):
-        raise
-    except RecursionError:
-        raise refuse(path, "frames that refer to each other in a circle", "frames that lead to the model") from None
-    except Exception as error:  # of the libraries that read it
-        what = f"what cannot be read ({type(error).__name__}: {error})"
-        raise refuse(path, what, "elements and numbers of its format") from None
     models, refused = [], list[tuple[str, BadInput]]()
-    for name, place, notes in bodies:
+    for body in bodies:
+        model = Model(label=f"{label}: {body.name}" if len(bodies) > 1 else label, body=body, kind=kind, notes=[*body.notes])
         try:
-            models.append(
-                _read(
-                    Model(f"{label}: {name}" if name else label, place, kind, list(notes)), [place.parent, path.parent, *search]
-                )
-            )
+            with _sentences(path):
+                _read(model, [body.path.parent, path.parent, *search])
+            models.append(model)
         except BadInput as error:
-            refused.append((name, error))
+            refused.append((body.name, error))
     if not models:
         raise refused[0][1]
     models[0].notes += [f"{name!r} is left out: {reason(error)}" for name, error in refused]
     return models
 
 
-def _read(model: Model, search: Sequence[Path]) -> Model:
-    """Return a body with what both readers say about it. Raise `BadInput` if it cannot be read."""
-    path, kind, reading = model.path, model.kind, read_own(model.path, 1.0, search)
-    model.links, model.own = reading.links, join_links(reading.links)
-    model.notes += reading.notes
-    model.doubts, model.invalid, model.asks = reading.doubts, reading.invalid, reading.asks
-    if kind == "mjcf":  # MuJoCo has read it so far
-        model.reader, model.reference = f"MuJoCo {version('mujoco', 'MuJoCo')}", model.own
-        try:
-            model.own = second_opinion(path, search)
-        except (NotRead, BadInput, KeyError, ValueError, IndexError, QhullError) as error:
-            model.own, model.own_refuses = None, f"there is no rule here for {error}"
-    elif kind == "usd":
-        model.reader = f"usd-core {version('usd-core', 'usd-core')}"
-        model.reference, model.reference_refuses = _attempt(partial(reference_usd, path, search))
-    elif kind == "urdf":
-        try:
-            model.reader = f"urdfdom in Pinocchio {version('pin', 'Pinocchio')}"
-            model.reference, model.reference_refuses = _attempt(partial(_urdfdom, path))
-        except MissingEngine:
-            pass
-    if kind != "usd" and model.own:
-        for name, factor in (("degrees are read as radians", 180 / math.pi), ("radians are read as degrees", math.pi / 180)):
-            model.units[name] = join_links(read_links(path, factor, search))
-    if flaw := model.flaw:
-        moments = ", ".join(f"{value:.3g}" for value in np.linalg.eigvalsh(model.truth.inertia))
-        model.notes.append(f"no body is like this: {flaw} (mass {model.truth.mass:.4g} kg, principal moments {moments} kg m^2)")
-    model.notes += [
-        *model.invalid,
-        *model.bad,
-        *model.doubts,
-        *(f"the file asks {name} for {', '.join(asks)}" for name, asks in model.asks.items()),
-    ]
-    model.notes = list(dict.fromkeys(model.notes))
-    return model
-
-
-def _attempt(read: partial[Piece]) -> tuple[Piece | None, str]:
+@contextmanager
+def _sentences(path: Path) -> Iterator[None]:
+    """Turn errors about a file into `BadInput`, without the messages of libraries that read its numbers."""
     try:
-        part = read()
-    except BadInput as error:
-        return None, reason(error)
-    finite = np.isfinite([part.mass, *part.com, *part.inertia.ravel()]).all()
-    return (part, "") if finite and part.mass else (None, f"it finds mass {part.mass:g} and no finite inertia")
+        yield
+    except (BadInput, MissingEngine, MissingExtra):
+        raise
+    except RecursionError:
+        raise refuse(path, "frames that refer to each other in a circle", "frames that lead to the model") from None
+    except Exception as error:
+        what = f"{error}" if isinstance(error, Unread) else f"something that cannot be read ({type(error).__name__})"
+        what = f"a reference to {error}, which is not there" if isinstance(error, KeyError) else what
+        raise refuse(path, what, "elements and numbers of its format") from None
+
+
+def _read(model: Model, search: Sequence[Path]) -> None:
+    """Fill a model with what both readers say about its body. Raise `BadInput` if it cannot be read."""
+    path, kind = model.path, model.kind
+    references = {
+        "urdf": ("urdfdom in Pinocchio", "pin", "Pinocchio", partial(_urdfdom, path)),
+        "mjcf": ("MuJoCo", "mujoco", "MuJoCo", partial(compile_mjcf, path, search, model.notes)),
+        "usd": ("usd-core", "usd-core", "usd-core", partial(reference_usd, path, search)),
+    }
+    own = {"usd": partial(read_usd, path, search, model), "mjcf": partial(read_mjcf, path, search)}
+    try:
+        model.links = own.get(kind, partial(read_xml, File(path, search, model)))()
+    except NotRead as error:
+        model.own_refuses = f"there is no rule here for {error}"
+    except Exception as error:
+        if kind != "mjcf" or isinstance(error, MissingEngine):  # only MuJoCo defines MJCF
+            raise
+        model.own_refuses = reason(error) if isinstance(error, BadInput) else f"{type(error).__name__}"
+    finite = [number for each in model.links for number in (each.mass, *each.inertia.flat, *each.frame.flat, *each.pose.flat)]
+    if not np.isfinite(finite).all():
+        raise refuse(path, "numbers that are not finite", "finite numbers in m, kg and kg m^2")
+    if not model.own_refuses and not any(link.mass for link in model.links):
+        raise refuse(path, "no mass in any link", "mass and inertia of a link")
+    if model.links:
+        base = np.linalg.inv(model.links[0].pose)
+        model.links = [replace(link, pose=base @ link.pose) for link in model.links]
+        model.own = join_links(model.links)
+    if kind in references:
+        name, package, engine, read = references[kind]
+        try:
+            model.reader = f"{name} {version(package, engine)}"
+            model.reference = read()
+            if not np.isfinite([model.reference.mass, *model.reference.inertia.flat]).all() or not model.reference.mass:
+                model.reference, model.reference_refuses = None, "it finds no mass, or an inertia that is not finite"
+        except MissingEngine:
+            model.reader = ""
+        except BadInput as error:
+            if model.own is None or kind == "mjcf":
+                raise
+            model.reference_refuses = reason(error)
+    truth = model.truth
+    if model.flaw or truth.excess:
+        said = (
+            f"no body is like this: {model.flaw}" if model.flaw else "the digits of the file leave open if a body is like this"
+        )
+        moments = list_numbers(np.linalg.eigvalsh(truth.inertia))
+        model.notes.append(f"{said} (mass {truth.mass:.4g} kg, principal moments {moments} kg m^2)")
+    asks = [f"the file asks {name} for {', '.join(each.values())}" for name, each in model.asks.items()]
+    model.notes = list(dict.fromkeys([*model.notes, *model.invalid, *model.bad, *model.doubts, *asks]))
 
 
 def _urdfdom(path: Path) -> Piece:
-    bodies = [part for part, _ in urdf_bodies(str(path)).values() if part.mass]
+    """Return the body of a URDF file with one body, as urdfdom reads it in Pinocchio."""
+    pin = load("pinocchio", "pin", "Pinocchio")
+    try:
+        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+    except ValueError as error:
+        raise refuse(path, f"an error ({' '.join(str(error).split())})", "a URDF file that Pinocchio reads") from None
+    bodies = [Piece(each.mass, np.array(each.lever), np.array(each.inertia)) for each in model.inertias if each.mass]
     if len(bodies) != 1:
         raise refuse(path, f"{len(bodies)} bodies that have a mass", "one body")
     return bodies[0]

@@ -7,17 +7,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .description import File, Frames
-from .files import find, included, parse, refuse
-from .mjcf import inline
+from .files import find, inline, parse, refuse
+from .mjcf import parse_mjcf
 
-Bodies = list[tuple[str, Path, list[str]]]
-"""For each body its name, empty if it is the only one, its file, and notes."""
+
+@dataclass
+class Body:
+    """A free body of a file: its root link, the file that has it alone, and notes.
+
+    `pivots` has the joints that move it or hold it, by their kinds, and where they are in its axes (3,), m.
+    """
+
+    name: str = ""
+    path: Path = Path()
+    notes: Sequence[str] = ()
+    pivots: Sequence[tuple[str, Any]] = ()
+
+
+Bodies = list[Body]
 FREE = "the joints of {} are left out: it is checked as a free body"
 PLAIN = {"type": "free", **dict.fromkeys(("armature", "damping", "stiffness", "frictionloss"), "0"), "limited": "false"}
 """The joint of a free body in MJCF, against defaults of the file. More engines know it than <freejoint>."""
@@ -33,7 +47,7 @@ def split(path: Path, kind: str, folder: Path, search: Sequence[Path] = ()) -> B
     bodies = {"mjcf": _mjcf, "usd": _usd}.get(kind, _links)(path, folder, search)
     if not 0 < len(bodies) <= MOST:
         raise refuse(path, f"{len(bodies) or 'no'} bodies that have a mass", f"1 to {MOST} bodies")
-    return [("", *bodies[0][1:])] if len(bodies) == 1 else bodies
+    return bodies
 
 
 def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[str, list[str]]:
@@ -63,12 +77,12 @@ def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         if model.find("include") is not None or model.find("model") is not None:
             raise refuse(path, "a model within another, or an include", "models without includes")
         prefix = f"{model.get('name')}: " if several else ""
-        bodies += [(prefix + name, place, notes) for name, place, notes in _links_of(path, model, folder, search, several)]
+        bodies += [replace(each, name=prefix + each.name) for each in _links_of(path, model, folder, search, several)]
     return bodies
 
 
 def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], several: bool) -> Bodies:
-    urdf, frames = model.tag == "robot", Frames(File(path, 1.0, search), model)
+    urdf, frames = model.tag == "robot", Frames(File(path, search), model)
     links = {each.get("name", ""): each for each in model.findall("link")}
     parents, moving = _tree(path, frames, links)
     groups = group(path, list(links), parents)
@@ -80,17 +94,21 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     # a floating joint from a link without inertia is how URDF writes a free body
     free = urdf and len(groups) == 1 and all(each.kind == "floating" for each in frames.joints if each.child in moving)
     one = set(groups) == {next(iter(links), "")} and not moving
-    if (free or one) and not (several or held or elsewhere or meshes):
-        return [(name, path, []) for name in groups]
+    alone = (free or one) and not (several or held or elsewhere or meshes)
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
     root = None if urdf else model.getroottree().getroot()
     bodies: Bodies = []
     for name, members in groups.items():
+        joints = [each for each in frames.joints if each.child == name and name in moving]
+        base = np.linalg.inv(frames.place(name))
+        pivots = [(each.kind, np.zeros(3) if urdf else (base @ frames.place(each.name))[:3, 3]) for each in joints]
+        if alone:
+            return [Body(name, path, notes, pivots)]
         copy = _copy(model, frames, members)
         for link in copy.findall("link"):
             _strip(path, link, search)
         loose = [FREE.format(repr(name))] if moving or held else []
-        bodies.append((name, _write(folder, copy, path, root), notes + loose))
+        bodies.append(Body(name, _write(folder, copy, path, root), notes + loose, pivots))
     return bodies
 
 
@@ -190,8 +208,7 @@ def _write(folder: Path, made: Any, path: Path, sdf: Any = None) -> Path:
 
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of an MJCF file: those in the world, and those on joints."""
-    missing = included(path, search)
-    root = inline(path, search)
+    root, missing = inline(path, search)
     found: list[tuple[Any, str]] = []
 
     def walk(element: Any, inherited: str, world: bool) -> None:
@@ -207,8 +224,14 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     for world in root.findall("worldbody"):
         walk(world, "main", True)
     free = all(len(body.findall("joint")) + len(body.findall("freejoint")) <= 1 and _is_free(body) for body, _ in found)
+    spec = parse_mjcf(path, search)[1]
+
+    def pivots(name: str) -> list[tuple[str, Any]]:
+        joints = spec.body(name).joints if name else ()
+        return [(each.type.name.removeprefix("mjJNT_").lower(), np.array(each.pos)) for each in joints]
+
     if len(found) == 1 and free and not missing:
-        return [("", path, [])]
+        return [Body(found[0][0].get("name", ""), path, [], pivots(found[0][0].get("name", "")))]
     notes = (
         [f"engines get a copy of the file without {missing[0]!r}, which is not in its folder or a search path"]
         if missing
@@ -236,7 +259,8 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         world = made.makeelement("worldbody")
         world.append(copy)
         made.append(world)
-        bodies.append((name, _write(folder, made, path), [*notes, FREE.format(repr(name))]))
+        moved = pivots(body.get("name", ""))
+        bodies.append(Body(name, _write(folder, made, path), [*notes, FREE.format(repr(name))], moved))
     return bodies
 
 
@@ -295,6 +319,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
     stage = Stage(path, open_stage(path, search))
     names, parents, moving = [str(body.GetPath()) for body in stage.bodies], dict[str, str](), []
+    pivots: dict[str, list[tuple[str, Any]]] = {name: [] for name in names}
     for joint in stage.joints:
         ends = [
             [str(each) for each in relation.GetTargets()]
@@ -304,9 +329,14 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
             parents[ends[1][0]] = ends[0][0]
         else:
             moving.append(joint.GetPath())
+            for number, end in enumerate(ends):
+                place = stage.metre * np.array(joint.GetAttribute(f"physics:localPos{number}").Get())
+                for name in set(end).intersection(names):
+                    place = stage.pose(stage.stage.GetPrimAtPath(name))[1] @ place
+                    pivots[name].append((joint.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower(), place))
     groups = group(path, names, parents)
     if len(groups) == 1 and not moving:
-        return [("", path, [])]
+        return [Body(next(iter(groups)), path)]
     bodies: Bodies = []
     for name, members in groups.items():
         copy = Usd.Stage.Open(stage.stage.Flatten())
@@ -323,5 +353,5 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         place = folder / str(len(list(folder.iterdir())))
         place.mkdir()
         copy.GetRootLayer().Export(str(place / f"{path.stem}.usda"))
-        bodies.append((name, place / f"{path.stem}.usda", [FREE.format(repr(name))]))
+        bodies.append(Body(name, place / f"{path.stem}.usda", [FREE.format(repr(name))], pivots[name]))
     return bodies

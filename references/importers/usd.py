@@ -1,6 +1,8 @@
 """Rigid bodies of USD files, twice: as usd-core computes them, and from the attributes by the rules of UsdPhysics.
 
-usd-core opens the stage in both, after a look at what its layers refer to. Volumes of shapes are those of `weigh` in both.
+usd-core opens the stage in both, after a look at what its layers refer to. Volumes of shapes are those of `weigh` in both; a
+round shape whose scale differs by axis is an ellipsoid in one, as it is drawn, and has the largest scale in the other, as in
+the schema's parser.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from conservative.attitude import Array
 from conservative.errors import BadInput, require_extra
 
 from .files import find, refuse
-from .pieces import DENSITY, Link, Piece, Reading, join, make_pose, weigh
+from .pieces import DENSITY, ONE, Link, Piece, Reading, join, make_pose, rounding_of, weigh
 
 ASKS = {"newton": "newton", "mjc": "newton"}
 """Namespaces of attributes that ask an engine for something."""
@@ -113,8 +115,11 @@ class Stage:
                 found.append(prim)
         return found
 
-    def form(self, prim: Any, pose: Array, density: float) -> Piece:
-        """Return the part of a collider after a map `pose` (4, 4), with lengths in the units of the stage before it."""
+    def form(self, prim: Any, pose: Array, density: float, stay_round: bool = False) -> Piece:
+        """Return the part of a collider after a map `pose` (4, 4), with lengths in the units of the stage before it.
+
+        With `stay_round`, a round shape is scaled by the largest scale across its axis.
+        """
         kind = prim.GetTypeName().lower()
         if kind == "mesh":
             points, counts, corners = (
@@ -134,6 +139,10 @@ class Stage:
         sizes = [prim.GetAttribute(key).Get() for key in keys]
         axis = "XYZ".index(prim.GetAttribute("axis").Get()) if len(sizes) == 2 else 2
         turn = make_pose(R=np.roll(np.eye(3), axis - 2, axis=0))
+        if stay_round and name != "box":
+            scales = np.linalg.norm(pose[:3, :3], axis=0)
+            across = np.arange(3) != (axis if len(sizes) == 2 else 3)
+            pose = pose @ np.diag([*np.where(across, scales[across].max() / scales, 1), 1])
         (part,) = weigh(name, sizes if len(sizes) == 2 else sizes[0], pose @ turn, density)
         return part
 
@@ -176,9 +185,6 @@ def reference_usd(path: Path, search: Sequence[Path] = ()) -> Piece:
     return join(compute(stage, body).place(base @ stage.pose(body)[0]) for body in stage.bodies)
 
 
-ONE = "one free rigid body, whose parts are on fixed joints"
-
-
 def read_usd(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]:
     """Return the links of a file from its attributes, and note attributes that are not read.
 
@@ -199,21 +205,26 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
     colliders = stage.colliders(body)
     for prim in {body.GetPath(): body, **{each.GetPath(): each for each in colliders}}.values():
         for attribute in prim.GetAuthoredAttributes():
-            space, colon, _ = attribute.GetName().partition(":")
+            space, colon, name = attribute.GetName().partition(":")
             if colon and space not in ("physics", "xformOp", "primvars", "material"):
                 said = f"{prim.GetPath()}.{attribute.GetName()}"
                 if space in ASKS:
-                    reading.asks.setdefault(ASKS[space], []).append(f"{said} = {attribute.Get()}")
+                    reading.ask(ASKS[space], name, str(attribute.Get()).lower(), f"{said} = {attribute.Get()}")
                 else:
                     reading.notes.append(f"{said} is an attribute of a vendor, which is not read here")
     mass, density, com, inertia = _authored(stage, body)
+    moments = body.GetAttribute("physics:diagonalInertia").Get() if inertia is not None else ()
+    rounding = rounding_of(map(np.float32, moments)) * stage.kilogram * stage.metre**2
     for prim in colliders:
         own, its_density, its_com, its_inertia = _authored(stage, prim) if prim != body else (None, None, None, None)
         place, its_scale = stage.pose(prim)
         place = np.linalg.inv(pose) @ place
         try:
             part = stage.form(
-                prim, make_pose(R=stage.metre * its_scale), its_density or density or _of_material(stage, prim) or DENSITY
+                prim,
+                make_pose(R=stage.metre * its_scale),
+                its_density or density or _of_material(stage, prim) or DENSITY,
+                stay_round=True,
             )
         except BadInput:
             if mass and com is not None and inertia is not None:
@@ -233,7 +244,7 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
     link = Link(pose, geometry=whole, name=str(body.GetPath())).filled(whole)
     if com is not None:
         link = replace(link, frame=make_pose(scale @ com))
-    return replace(link, mass=mass or link.mass, inertia=link.inertia if inertia is None else inertia)
+    return replace(link, mass=mass or link.mass, inertia=link.inertia if inertia is None else inertia, rounding=rounding)
 
 
 def _authored(stage: Stage, prim: Any) -> tuple[float | None, float | None, Array | None, Array | None]:

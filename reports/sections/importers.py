@@ -15,10 +15,6 @@ GOOD = ("right", "undecided", "")
 """Outcomes that are not faults of an engine."""
 
 
-ROUND_OFF = 1e-7
-"""Numbers below this share of the largest one beside them are shown as 0."""
-
-
 def build(findings: Sequence[FileAnswer]) -> Document:
     """Return the document of `compare_files`: a table of files and engines, what is not right, by all readers, and notes."""
     engines = list(dict.fromkeys(each.engine for each in findings))
@@ -68,9 +64,9 @@ def _readings(answer: FileAnswer) -> list[str]:
 
 def _body(part: dict[str, Any] | str) -> str:
     """Return mass, kg, centre of mass, m, and the six numbers of the inertia, kg m^2, as text."""
+    from conservative.references.importers.pieces import list_numbers
+
     if isinstance(part, str):
         return part[:120]
-    J = part["inertia"]
-    numbers = [part["mass"]], part["com"], [J[0][0], J[1][1], J[2][2], J[0][1], J[0][2], J[1][2]]
-    texts = [[f"{value * (abs(value) > ROUND_OFF * max(map(abs, each))):.4g}" for value in each] for each in numbers]
-    return "{} kg at {}; {}".format(*map(" ".join, texts))
+    inertia = [part["inertia"][i][j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return "{} kg at {}; {}".format(*map(list_numbers, (part["mass"], part["com"], inertia)))

