@@ -259,7 +259,8 @@ def explain(model: Model, seen: Piece, tolerance: float) -> str:
 def describe(part: Piece) -> str:
     """Return mass, kg, centre of mass, m, and the six numbers of the inertia, kg m^2, as text."""
     inertia = list_numbers(part.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)])
-    return f"mass {part.mass:.4g}, centre of mass {list_numbers(part.com)}, inertia {inertia}"
+    size = math.sqrt(abs(np.trace(part.inertia) / part.mass))
+    return f"mass {part.mass:.4g}, centre of mass {list_numbers(part.com, size)}, inertia {inertia}"
 
 
 def compare_files(
@@ -312,6 +313,7 @@ def judge_body(model: Model, engine: str, seen: Piece | str, tolerance: float, p
         far["inertia"] -= wanted.rounding / np.abs(wanted.inertia).max()
     differs = [name for name, error in far.items() if not error < tolerance]
     doubt, has = model.doubt(engine, differs), seen if isinstance(seen, str) else f"it has {describe(seen)}"
+    doubt = doubt or (DIGITS if wanted.excess and prints and not flaw else "")
     if not differs and not (flaw or model.disagree or model.invalid):
         return "right", ""
     if isinstance(seen, Piece) and (asked := model.asked_for(engine, seen, tolerance)):
@@ -337,11 +339,12 @@ def find_warning(output: str, names: Sequence[str]) -> str:
     """
     for name in sorted(names, key=len, reverse=True):
         output = output.replace(name, "...") if _ABOUT_MASS.search(name) else output
-    said = _ABOUT_MASS.search(output)
-    return f" (it prints: {said[0].strip()[:200]})" if said else ""
+    output = re.sub(r"\x1b?\[[\d;]*m", "", output)  # colours
+    said = next(filter(_ABOUT_MASS.search, re.split(r"(?<=[.])\s", output)), "")
+    return f" (it prints: {said.strip()[:200]})" if said else ""
 
 
-_ABOUT_MASS = re.compile(r"[^.:]*\b(inertias?|inertial|mass|masses|moments?)\b[^.]*", re.IGNORECASE)
+_ABOUT_MASS = re.compile(r"(?<![a-z])(inertias?|inertial|mass|masses|moments?)(?![a-z])", re.IGNORECASE)
 
 
 class Program:

@@ -156,7 +156,7 @@ class File:
                     self._ask(engine, name, owner if owner is not element else None)
                 else:
                     said = f"<{tag}> has {name!r}, which is not read here"
-                    (self.read.doubts if tag in MASS else self.read.notes).append(said)
+                    (self.read.doubts if tag in MASS or name == "namespace" else self.read.notes).append(said)
             if name in MASS and len(element.findall(name)) > 1:
                 self.read.invalid.append(f"<{tag}> has several elements <{name}>")
         for child in element:

@@ -23,6 +23,7 @@ MESHES = ("obj", "stl", "ply", "off")
 LARGEST = 2**26
 """Largest file of XML and largest mesh, bytes."""
 _NAMESPACE = re.compile(rb"""\sxmlns(:[\w.-]+)?\s*=\s*("[^"]*"|'[^']*')""")
+"""Declarations of namespaces. Parsers of models know none; one without a prefix becomes an attribute, which is named."""
 _SCHEMES = ("package://", "model://", "file://")
 
 
@@ -64,7 +65,7 @@ def parse(path: Path, *roots: str) -> Any:
     # Undeclared prefixes such as <drake:...> are common, and parsers of models know no namespaces.
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True, recover=True)
     try:
-        root = etree.fromstring(_NAMESPACE.sub(b"", read_bytes(path)), parser)
+        root = etree.fromstring(_NAMESPACE.sub(_keep_default, read_bytes(path)), parser)
     except (OSError, ValueError, etree.XMLSyntaxError) as error:
         raise BadInput(
             "file", f"{str(path)!r}: {' '.join(str(getattr(error, 'strerror', None) or error).split())}", allowed
@@ -77,6 +78,10 @@ def parse(path: Path, *roots: str) -> Any:
     if root.tag not in names:
         raise BadInput("file", f"{str(path)!r}: root element <{root.tag}>", allowed)
     return root
+
+
+def _keep_default(found: re.Match[bytes]) -> bytes:
+    return b"" if found[1] else b" namespace=" + found[2]
 
 
 def read_bytes(path: Path) -> bytes:
@@ -145,6 +150,8 @@ def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
             missing.append(name)
             return None
 
+    if "namespace" in root.attrib:
+        raise refuse(path, "a namespace, which MJCF has not", "a file of MJCF without xmlns")
     while (each := next(root.iter("include"), None)) is not None:
         place = look(each.get("file", ""), True) or path
         if place.resolve() in seen:

@@ -5,6 +5,7 @@ acceleration (6,) of that origin, all linear before angular and in its axes. Som
 """
 
 import os
+import sys
 import tempfile
 import warnings
 
@@ -20,12 +21,14 @@ def probe(engine, path, kind, cases):
     answer, kept = {}, os.dup(2)
     with tempfile.TemporaryFile() as stream, warnings.catch_warnings():
         warnings.simplefilter("always")
+        # Without the lines of code that Python shows: they name masses, too.
+        warnings.showwarning = lambda message, kind, *_: print(f"{kind.__name__}: {message}", file=sys.stderr, flush=True)
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
         try:
             accelerate = LOADERS[engine](path, kind)
         except (NotImplementedError, ImportError) as error:
-            raise NotImplementedError(str(error)) from None
+            raise NotImplementedError(f"it does not support this: {error}" if str(error) else "") from None
         except (Exception, SystemExit) as error:
             answer["refused"] = f"{type(error).__name__}: {' '.join(str(error).split())}"
         finally:
@@ -45,6 +48,12 @@ def _choose(kind, **readers):
     return readers[kind]
 
 
+def _one_free(bodies):
+    if len(bodies) != 1:
+        raise ValueError(f"after loading there are {len(bodies)} free bodies")
+    return bodies
+
+
 def _linear(vector):
     return np.concatenate([vector, np.zeros(3)])
 
@@ -55,6 +64,7 @@ def _compile_mujoco(path, kind):
 
     spec = _choose(kind, urdf=mujoco.MjSpec, mjcf=mujoco.MjSpec).from_file(path)
     if not spec.joints:
+        _one_free(list(spec.worldbody.bodies))
         spec.worldbody.first_body().add_freejoint()
     option, flags = spec.option, mujoco.mjtDisableBit
     option.gravity, option.wind, option.density, option.viscosity = [0, 0, 0], [0, 0, 0], 0, 0
@@ -111,9 +121,13 @@ def _brax(path, kind):
     from brax.generalized import dynamics, pipeline
     from brax.io import mjcf
 
-    system = _choose(kind, mjcf=mjcf.load)(path).replace(mj_model=None)
-    still = {name: 0 * getattr(system.dof, name) for name in ("armature", "stiffness", "damping")}
-    system = system.replace(gravity=0 * system.gravity, enable_fluid=False, dof=system.dof.replace(**still))
+    model = _choose(kind, mjcf=mjcf.load_mjmodel)(path)
+    option = model.opt
+    option.gravity[:], option.wind[:], option.density, option.viscosity = 0, 0, 0, 0
+    option.integrator, option.cone, option.impratio = 0, 0, 1  # of steps and contacts; it refuses others
+    for values in (model.dof_armature, model.dof_damping, model.jnt_stiffness):
+        values[:] = 0
+    system = mjcf.load_model(model).replace(mj_model=None)
 
     @jax.jit
     def accelerate(v, force):
@@ -144,7 +158,7 @@ def _drake(path, kind):
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    (body,) = plant.GetFloatingBaseBodies()
+    (body,) = _one_free(plant.GetFloatingBaseBodies())
     plant.SetFreeBodyPose(context, plant.get_body(body), drake.RigidTransform())
 
     def accelerate(v, force):
@@ -162,9 +176,10 @@ def _dart(path, kind):
     world = _choose(
         kind, urdf=utils.DartLoader().parseSkeleton, sdf=utils.SdfParser.readSkeleton, mjcf=utils.MjcfParser.readWorld
     )(path)
-    skeleton = world.getSkeleton(0) if kind == "mjcf" else world
+    skeleton = world.getSkeleton(0) if world and kind == "mjcf" else world
     if skeleton is None:
         raise ValueError("DART's loader returned nothing")
+    _one_free([skeleton.getRootJoint()] * bool(skeleton.getNumDofs()))
     skeleton.setGravity([0, 0, 0])
     skeleton.setPositions(np.zeros(skeleton.getNumDofs()))
     body, joint = skeleton.getBodyNode(0), skeleton.getRootJoint()

@@ -38,8 +38,8 @@ def body_from_file(path: str | PathLike[str], name: str, kind: str) -> MassDistr
     path
         The file.
     name
-        A link or body whose joints turn about one point, which becomes the fixed point. If it is free, its centre of mass becomes
-        the fixed point. In USD, the path of a prim.
+        A link or body whose joints turn about one point, which becomes the fixed point. For a free one, the centre of mass
+        becomes the fixed point. In USD, the path of a prim.
     kind
         "urdf", "mjcf", "sdf" or "usd".
 

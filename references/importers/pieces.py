@@ -158,10 +158,11 @@ ROUND_OFF = 1e-7
 """Numbers below this share of the largest one beside them are shown as 0."""
 
 
-def list_numbers(values: Any) -> str:
-    """Return numbers as text, with 0 for round-off."""
+def list_numbers(values: Any, unit: float = 0.0) -> str:
+    """Return numbers as text, with 0 for the round-off of numbers of the size `unit`."""
     values = np.ravel(values)
-    return " ".join(f"{value:.4g}" if abs(value) > ROUND_OFF * np.abs(values).max() else "0" for value in values)
+    least = ROUND_OFF * max(unit, np.abs(values).max())
+    return " ".join(f"{value:.4g}" if abs(value) > least else "0" for value in values)
 
 
 @dataclass

@@ -66,24 +66,24 @@ class Model(Reading):
 
     @property
     def truth(self) -> Piece:
-        """The body by the reference reader if it has one; the possible one if the readers disagree."""
+        """The body by the reference reader if it has one; the possible one if there is one; else that by this package."""
         parts = [part for part in (None if self._repaired else self.reference, self.own) if part]
-        return next((part for part in parts if not part.flaw), parts[0])
+        return next((part for part in parts if not part.flaw), parts[-1])
 
     @property
     def _repaired(self) -> bool:
         """Whether the reference reader is an engine that has repaired an impossible inertia."""
-        return bool(self.kind == "sdf" and self.own and self.own.flaw and self.reference and not self.reference.flaw)
+        bad = self.kind == "sdf" and self.own and (self.own.flaw or self.own.excess)
+        return bool(bad and self.reference and not (self.reference.flaw or self.reference.excess))
 
     @property
     def disagree(self) -> str:
-        """How the readers disagree; "" if they do not."""
-        both = (self.reference, self.own)
-        if self.own and self.reference and not self._repaired and (far := differing(*both, AGREE)):
+        """How the readers disagree; "" if they do not, or if no body is like any reading."""
+        if not self.own or self._repaired or all(part.flaw for part in (self.own, self.reference) if part):
+            return ""
+        if self.reference and (far := differing(self.reference, self.own, AGREE)):
             return f"the readers disagree, {self.reader} and {OWN}: {', '.join(far)}"
-        if self.own and self.reference_refuses and not self.own.flaw:
-            return f"{self.reader} does not read the file ({self.reference_refuses})"
-        return ""
+        return f"{self.reader} does not read the file ({self.reference_refuses})" if self.reference_refuses else ""
 
     @property
     def flaw(self) -> str:
@@ -218,7 +218,7 @@ def _read(model: Model, search: Sequence[Path]) -> None:
     finite = [number for each in model.links for number in (each.mass, *each.inertia.flat, *each.frame.flat, *each.pose.flat)]
     if not np.isfinite(finite).all():
         raise refuse(path, "numbers that are not finite", "finite numbers in m, kg and kg m^2")
-    if not model.own_refuses and not any(link.mass for link in model.links):
+    if kind != "mjcf" and not any(link.mass for link in model.links):
         raise refuse(path, "no mass in any link", "mass and inertia of a link")
     if model.links:
         base = np.linalg.inv(model.links[0].pose)

@@ -329,7 +329,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
             parents[ends[1][0]] = ends[0][0]
         else:
             moving.append(joint.GetPath())
-            for number, end in enumerate(ends):
+            for number, end in [(1, ends[1])] if ends[1] else [(0, ends[0])]:
                 place = stage.metre * np.array(joint.GetAttribute(f"physics:localPos{number}").Get())
                 for name in set(end).intersection(names):
                     place = stage.pose(stage.stage.GetPrimAtPath(name))[1] @ place

@@ -142,7 +142,8 @@ class Stage:
         if stay_round and name != "box":
             scales = np.linalg.norm(pose[:3, :3], axis=0)
             across = np.arange(3) != (axis if len(sizes) == 2 else 3)
-            pose = pose @ np.diag([*np.where(across, scales[across].max() / scales, 1), 1])
+            sizes = list(np.multiply(sizes, [scales[across].max(), scales[axis]][: len(sizes)]))
+            pose = pose @ np.diag([*1 / scales, 1])
         (part,) = weigh(name, sizes if len(sizes) == 2 else sizes[0], pose @ turn, density)
         return part
 
