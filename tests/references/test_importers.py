@@ -359,12 +359,12 @@ def test_newton_turned_inertia_on_one_side_until_1_1():
 
 
 def test_every_rule_of_the_formats_has_a_model_and_every_model_a_rule():
-    """123 rules."""
+    """132 rules."""
     rows = [line.strip("|").split("|") for line in (CATALOGUE.parent / "rules.md").read_text().splitlines() if line[:2] == "| "]
     rules = [(kind.strip(), models.split(", ")) for kind, _, models in rows[2:]]
     named = [model.strip() for _, models in rules for model in models]
     assert sorted(named) == sorted(path.name for path in TRAPS)
-    assert {kind: sum(kind == each for each, _ in rules) for kind, _ in rules} == {"URDF": 28, "SDF": 31, "MJCF": 33, "USD": 31}
+    assert {kind: sum(kind == each for each, _ in rules) for kind, _ in rules} == {"URDF": 31, "SDF": 34, "MJCF": 34, "USD": 33}
     suffixes = {"URDF": ".urdf", "SDF": ".sdf", "MJCF": ".xml", "USD": ".usda"}
     assert all(model.strip().endswith(suffixes[kind]) for kind, models in rules for model in models)
     assert all(Path(path).stat().st_size < 5000 for path in TRAPS)

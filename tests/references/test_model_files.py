@@ -161,6 +161,51 @@ def test_the_error_of_an_unknown_body_has_the_line_of_its_name(written):
 
 SLIDE = '<joint type="slide"/>'
 APART = '<joint type="hinge"/><joint type="hinge" axis="1 0 0" pos="0 0 0.1"/>'
+SDF = f"""<sdf version="1.11"><model name="m"><link name="base"/><link name="arm"><pose>1 2 3 0.1 0.2 0.3</pose><inertial>
+<pose>{numbers(COM)} {numbers(RPY)}</pose><mass>{MASS}</mass><inertia><ixx>0.5</ixx><iyy>0.6</iyy><izz>0.7</izz><ixy>0.01</ixy>
+<ixz>-0.02</ixz><iyz>0.03</iyz></inertia></inertial></link><joint name="j" type="ball"><pose>{numbers(ANCHOR)} 0 0 0</pose>
+<parent>base</parent><child>arm</child></joint></model></sdf>"""
+USD = f"""#usda 1.0
+( metersPerUnit = 1 kilogramsPerUnit = 1 )
+def Xform "arm" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
+{{
+    float physics:mass = {MASS}
+    point3f physics:centerOfMass = ({", ".join(map(str, COM))})
+    float3 physics:diagonalInertia = ({", ".join(map(str, MOMENTS))})
+    quatf physics:principalAxes = ({", ".join(map(str, QUATERNION))})
+    double3 xformOp:translate = (1, 2, 3)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}}
+def PhysicsSphericalJoint "j"
+{{
+    rel physics:body1 = </arm>
+    point3f physics:localPos1 = ({", ".join(map(str, ANCHOR))})
+}}
+""".replace("( metersPerUnit = 1 kilogramsPerUnit = 1 )", "(\n metersPerUnit = 1\n kilogramsPerUnit = 1\n)")
+
+
+@pytest.mark.parametrize(("kind", "text", "name"), [("sdf", SDF, "arm"), ("usd", USD, "/arm")])
+def test_sdf_and_usd_bodies_turn_about_their_joint(written, kind, text, name):
+    """USD has single precision: measured 2e-8."""
+    path = written(text, f"robot.{kind}{'a' * (kind == 'usd')}")
+    scene = registry.scene(str(written(SCENE.format(kind=kind, file=path.name, name=name, more=""), "my.toml")))
+    tensor = R_BI @ TENSOR_I @ R_BI.T if kind == "sdf" else TURNED[1]
+    tolerance = 1e-14 if kind == "sdf" else 1e-6
+    np.testing.assert_allclose(scene.potential.moment_B / (MASS * 9.81), COM - ANCHOR, atol=tolerance)
+    np.testing.assert_allclose(scene.body.inertia, about(COM - ANCHOR, tensor), atol=tolerance)
+
+
+def test_a_mesh_outside_the_folder_is_not_read(written, tmp_path):
+    outside = tmp_path.parent / "outside.obj"
+    outside.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    head = '<mujoco><asset><mesh name="m" file="{}outside.obj"/></asset>'
+    text = mjcf(JOINT + '<geom type="mesh" mesh="m"/>').replace("<mujoco>", head)
+    with pytest.raises(cv.BadInput, match=r"outside\.obj', which is outside"):
+        body_from_mjcf(written(text.format("../")), "arm")
+    (tmp_path / "outside.obj").write_text(outside.read_text())
+    assert body_from_mjcf(written(text.format("")), "arm").mass == pytest.approx(1000 / 6)
+
+
 BAD = {
     "mjcf: no file": (body_from_mjcf, None, "arm", "path", "No such file", "<mujoco>"),
     "mjcf: no XML": (body_from_mjcf, "hello", "arm", "path", "line 1", "<mujoco>"),
