@@ -232,6 +232,12 @@ class Frames:
         base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
         return self.place(base or element.findtext("child", "")) @ self._file.pose(pose)
 
+    def inside(self, link: str, element: Any) -> Array:
+        """Return the pose (4, 4) of an element of a link in the link."""
+        pose = element.find(self.own)
+        base = "" if pose is None else pose.get("relative_to", "")
+        return (np.linalg.inv(self.place(link)) @ self.place(base) if base else np.eye(4)) @ self._file.pose(pose)
+
 
 def read_xml(file: File) -> list[Link]:
     """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
@@ -280,11 +286,7 @@ def _shapes(file: File, frames: Frames, name: str, inertial: Any) -> list[Piece]
     forms = []
     for each in frames.elements[name].findall("collision"):
         density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
-        pose = each.find(frames.own)
-        at = file.pose(pose)
-        if pose is not None and pose.get("relative_to"):
-            at = np.linalg.inv(frames.place(name)) @ frames.place(pose.get("relative_to")) @ at
-        forms += file.weigh(each.find("geometry"), at, number(str(density)))
+        forms += file.weigh(each.find("geometry"), frames.inside(name, each), number(str(density)))
     return forms
 
 

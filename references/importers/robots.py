@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .description import File, Frames
-from .files import find, inline, parse, refuse
+from .files import Unread, find, inline, parse, refuse
 from .mjcf import parse_mjcf
 
 
@@ -69,15 +70,13 @@ def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[
 def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of a URDF or SDF file."""
     root = parse(path)
-    urdf = root.tag == "robot"
-    models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
-    several = len(models) > 1
+    models = [root] if root.tag == "robot" else [*root.findall("model"), *root.findall("world/model")]
     bodies: Bodies = []
     for model in models:
         if model.find("include") is not None or model.find("model") is not None:
             raise refuse(path, "a model within another, or an include", "models without includes")
-        prefix = f"{model.get('name')}: " if several else ""
-        bodies += [replace(each, name=prefix + each.name) for each in _links_of(path, model, folder, search, several)]
+        prefix = f"{model.get('name')}: " if len(models) > 1 else ""
+        bodies += [replace(each, name=prefix + each.name) for each in _links_of(path, model, folder, search, bool(prefix))]
     return bodies
 
 
@@ -90,25 +89,26 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     if urdf or held:  # links without inertia are frames, or scenery
         full = {name for name, link in links.items() if (inertial := link.find("inertial")) is not None and len(inertial)}
         groups = {name: members for name, members in groups.items() if full.intersection(members)}
-    meshes, elsewhere = _meshes(path, links, search)
+    missing, elsewhere = dict[str, None](), False
+    for shape in model.iterfind("link//geometry/*"):
+        name = shape.get("filename") or shape.findtext("uri") or ""
+        try:  # an engine does not know the search paths
+            elsewhere |= bool(name) and find(path, name, search) != path.parent / name.removeprefix("file://")
+        except Unread as error:
+            missing[str(error)] = None
+    meshes = ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1))
     # a floating joint from a link without inertia is how URDF writes a free body
     free = urdf and len(groups) == 1 and all(each.kind == "floating" for each in frames.joints if each.child in moving)
-    one = set(groups) == {next(iter(links), "")} and not moving
-    alone = (free or one) and not (several or held or elsewhere or meshes)
+    alone = (free or (set(groups) == {next(iter(links), "")} and not moving)) and not (several or held or elsewhere or meshes)
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
-    root = None if urdf else model.getroottree().getroot()
     bodies: Bodies = []
     for name, members in groups.items():
         joints = [each for each in frames.joints if each.child == name and name in moving]
         base = np.linalg.inv(frames.place(name))
         pivots = [(each.kind, np.zeros(3) if urdf else (base @ frames.place(each.name))[:3, 3]) for each in joints]
-        if alone:
-            return [Body(name, path, notes, pivots)]
-        copy = _copy(model, frames, members)
-        for link in copy.findall("link"):
-            _strip(path, link, search)
-        loose = [FREE.format(repr(name))] if moving or held else []
-        bodies.append(Body(name, _write(folder, copy, path, root), notes + loose, pivots))
+        copy = path if alone else _write(folder, _copy(path, model, frames, members, search), path)
+        loose = [FREE.format(repr(name))] if not alone and (moving or held) else []
+        bodies.append(Body(name, copy, notes + loose, pivots))
     return bodies
 
 
@@ -129,50 +129,43 @@ def _tree(path: Path, frames: Frames, links: Mapping[str, Any]) -> tuple[dict[st
     return parents, moving
 
 
-def _meshes(path: Path, links: Mapping[str, Any], search: Sequence[Path]) -> tuple[str, bool]:
-    """Return which meshes are not there, as text, and whether one is there that an engine would not find."""
-    missing, elsewhere = dict[str, None](), False
-    for shape in [each for link in links.values() for each in link.iterfind(".//geometry/*")]:
-        name = shape.get("filename") or shape.findtext("uri") or ""
-        try:
-            elsewhere |= bool(name) and find(path, name, search) != path.parent / name.removeprefix("file://")
-        except ValueError as error:
-            missing[str(error)] = None
-    return ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1)), elsewhere
+def _copy(path: Path, model: Any, frames: Frames, members: Sequence[str], search: Sequence[Path]) -> Any:
+    """Return a copy of a model with the links of one body and the joints between them, without visuals.
 
-
-def _copy(model: Any, frames: Frames, members: Sequence[str]) -> Any:
-    """Return a copy of a model with the links of one body and the joints between them."""
+    Meshes are left out unless the mass follows from them; then they get their absolute path.
+    """
     copy = deepcopy(model)
     dropped = {"joint", "link", "frame", "static", "pose", "transmission", "gripper"}
     for each in [each for each in copy if each.tag in dropped]:
-        joins = each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]
-        if not joins and not (each.tag == "link" and each.get("name") in members):
-            copy.remove(each)
-        elif joins:  # such as <mimic>, which refers to other joints
+        if each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]:
             for child in [child for child in each if child.tag not in ("origin", "parent", "child")]:
-                each.remove(child)
-    if not frames.urdf:  # poses and joints of SDF may refer to frames that are left out
-        base = np.linalg.inv(frames.place(members[0]))
-        for link in copy.findall("link"):
-            _place(link, base @ frames.place(link.get("name")))
-        for child in members[1:]:
-            joint = copy.makeelement("joint", name=f"{child}_is_fixed", type="fixed")
-            joint.extend([_text(copy, "parent", members[0]), _text(copy, "child", child)])
-            copy.append(joint)
-    return copy
-
-
-def _strip(path: Path, link: Any, search: Sequence[Path]) -> None:
-    """Remove visuals, and meshes unless the mass follows from them. Other meshes get their absolute path."""
-    inertial = link.find("inertial")
-    auto = inertial is not None and inertial.get("auto") in ("true", "1")
-    for each in [*link.findall("visual"), *link.findall("collision")]:
-        mesh = each.find("geometry/mesh")
-        if each.tag == "visual" or (mesh is not None and not auto):
-            link.remove(each)
-        elif mesh is not None and mesh.find("uri") is not None:
-            mesh.find("uri").text = str(find(path, mesh.findtext("uri"), search).resolve())
+                each.remove(child)  # such as <mimic>, which refers to other joints
+        elif each.tag != "link" or each.get("name") not in members:
+            copy.remove(each)
+    for link in copy.findall("link"):
+        inertial = link.find("inertial")
+        auto = inertial is not None and inertial.get("auto") in ("true", "1")
+        for each in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = each.find("geometry/mesh")
+            if each.tag == "visual" or (mesh is not None and not auto):
+                link.remove(each)
+            elif mesh is not None and mesh.find("uri") is not None:
+                mesh.find("uri").text = str(find(path, mesh.findtext("uri"), search).resolve())
+    if frames.urdf:
+        return copy
+    base = np.linalg.inv(frames.place(members[0]))
+    for link in copy.findall("link"):  # poses and joints of SDF may refer to frames that are left out
+        name = link.get("name")
+        for each in link.findall("collision"):
+            _place(each, frames.inside(name, each))
+        _place(link, base @ frames.place(name))
+    for child in members[1:]:
+        joint = copy.makeelement("joint", name=f"{child}_is_fixed", type="fixed")
+        joint.extend([_text(copy, "parent", members[0]), _text(copy, "child", child)])
+        copy.append(joint)
+    outer = copy.makeelement("sdf", dict(model.getroottree().getroot().attrib))
+    outer.append(copy)
+    return outer
 
 
 def _text(element: Any, tag: str, text: str) -> Any:
@@ -181,27 +174,21 @@ def _text(element: Any, tag: str, text: str) -> Any:
     return made
 
 
-def _place(link: Any, pose: Any) -> None:
-    """Give a link of SDF its pose (4, 4) in the model as numbers."""
-    from scipy.spatial.transform import Rotation
-
-    for each in link.findall("pose"):
-        link.remove(each)
+def _place(element: Any, pose: Any) -> None:
+    """Give an element of SDF its pose (4, 4) in its parent as numbers."""
+    for each in element.findall("pose"):
+        element.remove(each)
     if np.abs(pose - np.eye(4)).max() > 1e-15:
         angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
-        link.insert(0, _text(link, "pose", " ".join(map(repr, [*pose[:3, 3].tolist(), *angles.tolist()]))))
+        element.insert(0, _text(element, "pose", " ".join(map(repr, [*pose[:3, 3].tolist(), *angles.tolist()]))))
 
 
-def _write(folder: Path, made: Any, path: Path, sdf: Any = None) -> Path:
+def _write(folder: Path, made: Any, path: Path) -> Path:
     """Write a model into a folder of its own, named as the file. Return the path."""
     from lxml import etree
 
     place = folder / str(len(list(folder.iterdir())))
     place.mkdir()
-    if sdf is not None:
-        outer = sdf.makeelement("sdf", dict(sdf.attrib))
-        outer.append(made)
-        made = outer
     (place / path.name).write_bytes(etree.tostring(made))
     return place / path.name
 
@@ -209,145 +196,123 @@ def _write(folder: Path, made: Any, path: Path, sdf: Any = None) -> Path:
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of an MJCF file: those in the world, and those on joints."""
     root, missing = inline(path, search)
-    found: list[tuple[Any, str]] = []
+    spec, found = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
 
     def walk(element: Any, inherited: str, world: bool) -> None:
         inherited = element.get("childclass", inherited)
         for child in element:
             if child.tag == "body":
-                if world or child.find("joint") is not None or child.find("freejoint") is not None:
+                if world or _moves(child):
                     found.append((child, child.get("childclass", inherited)))
                 walk(child, inherited, False)
             elif child.tag in ("frame", "replicate"):
                 walk(child, inherited, world)
 
-    for world in root.findall("worldbody"):
-        walk(world, "main", True)
-    free = all(len(body.findall("joint")) + len(body.findall("freejoint")) <= 1 and _is_free(body) for body, _ in found)
-    spec = parse_mjcf(path, search)[1]
-
-    def pivots(name: str) -> list[tuple[str, Any]]:
-        joints = spec.body(name).joints if name else ()
-        return [(each.type.name.removeprefix("mjJNT_").lower(), np.array(each.pos)) for each in joints]
-
-    if len(found) == 1 and free and not missing:
-        return [Body(found[0][0].get("name", ""), path, [], pivots(found[0][0].get("name", "")))]
-    notes = (
-        [f"engines get a copy of the file without {missing[0]!r}, which is not in its folder or a search path"]
-        if missing
-        else []
-    )
-    for each in root.findall("compiler"):
+    for each in root.findall("worldbody"):
+        walk(each, "main", True)
+    free = all(len(_moves(body)) <= 1 and all(joint.get("type") == "free" for joint in _moves(body)) for body, _ in found)
+    alone = len(found) == 1 and free and bool(_moves(found[0][0])) and not missing
+    notes = [f"engines get a copy without {name!r}, which is not in the file's folder or a search path" for name in missing[:1]]
+    for each in root.findall("compiler") * (not alone):
         if float(each.attrib.pop("settotalmass", "-1")) > 0:
             notes.append("settotalmass is left out: masses are those before they are scaled")
-    wanted, bodies = {"compiler", "default", "asset"}, []
+    bodies: Bodies = []
     for number, (body, inherited) in enumerate(found):
-        made = root.makeelement("mujoco", {"model": path.stem, **root.attrib})  # Drake needs a name
-        made.extend(deepcopy(each) for each in root if each.tag in wanted)
-        copy, name = deepcopy(body), body.get("name") or f"body {number}"
-        copy.set("name", name)
-        if inherited != "main":
-            copy.set("childclass", inherited)
+        joints = spec.body(body.get("name")).joints if body.get("name") else ()
+        pivots = [(each.type.name.removeprefix("mjJNT_").lower(), np.array(each.pos)) for each in joints]
+        if alone:
+            return [Body(body.get("name", ""), path, [], pivots)]
+        name, copy = body.get("name") or f"body {number}", deepcopy(body)
+        copy.attrib.update({"name": name} | ({"childclass": inherited} if inherited != "main" else {}))
         for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
             copy.attrib.pop(key, None)
-        _loosen(copy)
-        rule = next((each.get("inertiafromgeom") for each in root.findall("compiler") if each.get("inertiafromgeom")), "auto")
-        _lighten(path, made, copy, root, rule, search)
+        made = root.makeelement("mujoco", {"model": path.stem, **root.attrib})  # Drake needs a name
+        made.extend(deepcopy(each) for each in root if each.tag in {"compiler", "default", "asset"})
+        _lighten(path, made, copy, root, search)
         if next(copy.iter("inertial", "geom"), None) is None:
             continue
         copy.insert(0, copy.makeelement("joint", PLAIN))
         world = made.makeelement("worldbody")
         world.append(copy)
         made.append(world)
-        moved = pivots(body.get("name", ""))
-        bodies.append(Body(name, _write(folder, made, path), [*notes, FREE.format(repr(name))], moved))
+        bodies.append(Body(name, _write(folder, made, path), [*notes, FREE.format(repr(name))], pivots))
     return bodies
 
 
-def _is_free(body: Any) -> bool:
-    joint = body.find("joint")
-    return body.find("freejoint") is not None or (joint is not None and joint.get("type") == "free")
+def _moves(body: Any) -> list[Any]:
+    """Return the joints of a body of MJCF; a <freejoint> gets its type."""
+    for each in body.findall("freejoint"):
+        each.set("type", "free")
+    return [*body.findall("joint"), *body.findall("freejoint")]
 
 
-def _loosen(body: Any) -> None:
-    """Remove joints of a body and the bodies below it that move, and what refers to other parts of the model."""
-    for child in list(body):
-        moves = child.tag == "body" and (child.find("joint") is not None or child.find("freejoint") is not None)
-        if moves or child.tag in ("joint", "freejoint", "site", "camera", "light"):
-            body.remove(child)
-        elif child.tag in ("body", "frame"):
-            _loosen(child)
+def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]) -> None:
+    """Remove the joints of a body, bodies below it that move, materials, and meshes that do not matter.
 
-
-def _lighten(path: Path, made: Any, body: Any, root: Any, rule: str, search: Sequence[Path]) -> None:
-    """Remove materials, and meshes that do not matter; the others get their absolute path."""
-    for each in list(body.iter("body")):
-        for geom in list(each.iter("geom")):
-            owner = next(geom.iterancestors("body"))
-            if (
-                owner.find("inertial") is not None
-                and rule != "true"
-                and (geom.get("mesh") or geom.get("type") in (None, "mesh"))
-            ):
-                geom.getparent().remove(geom)
+    The other meshes get their absolute path.
+    """
+    for each in list(body.iter("body", "joint", "freejoint", "site", "camera", "light")):
+        if each is not body and (each.tag != "body" or _moves(each)):
+            each.getparent().remove(each)
+    options = {key: value for each in root.findall("compiler") for key, value in each.attrib.items()}
+    for geom in list(body.iter("geom")):
+        written = next(geom.iterancestors("body")).find("inertial") is not None and options.get("inertiafromgeom") != "true"
+        if written and (geom.get("mesh") or geom.get("type") in (None, "mesh")):
+            geom.getparent().remove(geom)
     for each in [*made.iter("geom"), *body.iter("geom")]:
         each.attrib.pop("material", None)
     used = {each.get("mesh") for each in body.iter("geom")}
-    folders = {key: each.get(key) for each in root.findall("compiler") for key in ("assetdir", "meshdir") if each.get(key)}
+    base = options.get("meshdir", options.get("assetdir", ""))
     for each in made.iter("compiler"):
         for key in ("assetdir", "meshdir", "texturedir"):
             each.attrib.pop(key, None)
-    for asset in made.findall("asset"):
-        for each in list(asset):
-            if each.tag != "mesh" or (each.get("name") or Path(each.get("file", "")).stem) not in used:
-                asset.remove(each)
-            elif name := each.get("file"):
-                base = folders.get("meshdir", folders.get("assetdir", ""))
-                each.set("name", each.get("name") or Path(name).stem)
-                try:
-                    each.set("file", str(find(path, f"{base}/{name}" if base else name, search).resolve()))
-                except ValueError as error:
-                    allowed = "the mesh in the folder of the file or in one of --search"
-                    raise refuse(path, f"a body whose mass follows from {error}", allowed) from None
+    for each in [each for asset in made.findall("asset") for each in asset]:
+        name = each.get("file", "")
+        if each.tag != "mesh" or (each.get("name") or Path(name).stem) not in used:
+            each.getparent().remove(each)
+        elif name:
+            each.set("name", each.get("name") or Path(name).stem)
+            try:
+                each.set("file", str(find(path, f"{base}/{name}" if base else name, search).resolve()))
+            except Unread as error:
+                allowed = "the mesh in the folder of the file or in one of --search"
+                raise refuse(path, f"a body whose mass follows from {error}", allowed) from None
 
 
 def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of a USD file. In a copy all other bodies and the joints that move are not active."""
-    from pxr import Usd, UsdPhysics
+    from pxr import Usd
 
-    from .usd import Stage, open_stage
+    from .usd import Stage
 
-    stage = Stage(path, open_stage(path, search))
-    names, parents, moving = [str(body.GetPath()) for body in stage.bodies], dict[str, str](), []
+    stage = Stage(path, search)
+    names, parents, physics = [str(body.GetPath()) for body in stage.bodies], dict[str, str](), stage.physics
     pivots: dict[str, list[tuple[str, Any]]] = {name: [] for name in names}
     for joint in stage.joints:
-        ends = [
-            [str(each) for each in relation.GetTargets()]
-            for relation in (UsdPhysics.Joint(joint).GetBody0Rel(), UsdPhysics.Joint(joint).GetBody1Rel())
-        ]
-        if joint.IsA(UsdPhysics.FixedJoint) and all(ends) and all(each[0] in names for each in ends):
+        api = physics.Joint(joint)
+        ends = [[str(each) for each in end.GetTargets()] for end in (api.GetBody0Rel(), api.GetBody1Rel())]
+        if joint.IsA(physics.FixedJoint) and all(ends) and all(each[0] in names for each in ends):
             parents[ends[1][0]] = ends[0][0]
-        else:
-            moving.append(joint.GetPath())
-            for number, end in [(1, ends[1])] if ends[1] else [(0, ends[0])]:
-                place = stage.metre * np.array(joint.GetAttribute(f"physics:localPos{number}").Get())
-                for name in set(end).intersection(names):
-                    place = stage.pose(stage.stage.GetPrimAtPath(name))[1] @ place
-                    pivots[name].append((joint.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower(), place))
+            continue
+        number = 1 if ends[1] else 0
+        for name in set(ends[number]).intersection(names):
+            place = joint.GetAttribute(f"physics:localPos{number}").Get() or (0, 0, 0)
+            place = stage.pose(stage.stage.GetPrimAtPath(name))[1] @ (stage.metre * np.array(place))
+            pivots[name].append((joint.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower(), place))
     groups = group(path, names, parents)
-    if len(groups) == 1 and not moving:
+    if len(groups) == 1 and len(parents) == len(stage.joints):
         return [Body(next(iter(groups)), path)]
     bodies: Bodies = []
     for name, members in groups.items():
         copy = Usd.Stage.Open(stage.stage.Flatten())
-        for joint in [each for each in copy.Traverse() if each.IsA(UsdPhysics.Joint)]:
-            target = UsdPhysics.Joint(joint).GetBody1Rel().GetTargets()
-            if joint.GetPath() in moving or not target or str(target[0]) not in members:
+        for joint in [each for each in copy.Traverse() if each.IsA(physics.Joint)]:
+            target = [str(each) for each in physics.Joint(joint).GetBody1Rel().GetTargets()]
+            if not (joint.IsA(physics.FixedJoint) and set(target).intersection(members[1:])):
                 joint.SetActive(False)
         for other in set(names) - set(members):
             prim = copy.GetPrimAtPath(other)
             if any(each.startswith(f"{other}/") for each in members):
-                prim.RemoveAPI(UsdPhysics.RigidBodyAPI)
+                prim.RemoveAPI(physics.RigidBodyAPI)
             elif prim:
                 prim.SetActive(False)
         place = folder / str(len(list(folder.iterdir())))
