@@ -56,6 +56,7 @@ NOT_FINITE = "accelerations that are not finite"
 NO_BODY = "its accelerations are those of no rigid body"
 RIGID = "no force or torque turns it, as if its inertia were infinite"
 HELD = "no force moves it: the engine holds the body, or has no mass for it"
+BARE = "it loads a copy without visuals, sensors and all else beside the mass"
 ROUNDS = 4
 """Largest number of loads by which forces are adapted to the body that an engine has."""
 CASES = 24
@@ -399,7 +400,15 @@ class Program:
         except (EngineCrashed, EngineTimeout) as failure:
             return answer("crashed", str(failure.outcome))
         if result["refused"]:
-            return answer(*judge_refusal(model, self.engine, result["refused"]))
+            outcome, words = judge_refusal(model, self.engine, result["refused"])
+            if outcome == "refused" and model.body.bare:
+                bare = replace(model, body=replace(model.body, path=model.body.bare, bare=None))
+                if self.check(bare).outcome not in ("refused", "crashed"):
+                    outcome, words = (
+                        "undecided",
+                        f"it loads a copy without what is beside the mass, and refuses the file: {words}",
+                    )
+            return answer(outcome, words)
         if model.alone(self.engine):
             return answer("", f"it is the reference for this format, and there is no second reader: {model.own_refuses}")
         measured, names = result["accelerations"], [model.path.name, model.path.stem, *(link.name for link in model.links)]
@@ -408,6 +417,8 @@ class Program:
         why = why if measured.any() else HELD
         found = seen if seen is not None else why
         outcome, words = judge_body(model, self.engine, found, self.tolerance, find_warning(result["output"], names))
+        if outcome == "wrong" and why == NO_BODY and seen is None and self.single:
+            outcome, words = "undecided", f"{words}, in single precision"
         if seen is None:
             return answer(outcome, words)
         expected = accelerations(model.truth, cases) if outcome == "right" and not words else measured
@@ -447,7 +458,7 @@ class Program:
         for name in ("refused", "output"):
             result[name] = str(result.get(name, ""))
             for folder in {str(path.parent) for path in (model.path.absolute(), model.path.resolve())} - {"/"}:
-                result[name] = re.sub(rf"(?<![\w./-]){re.escape(folder)}/(?=[^\s/])", "", result[name])
+                result[name] = re.sub(rf"(?<![\w./-])/?{re.escape(folder)}/(?=[^\s/])", "", result[name])
         return result
 
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:

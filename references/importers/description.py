@@ -49,7 +49,7 @@ KNOWN: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "link": (
             "name pose inertial collision",
-            "visual sensor projector audio_sink audio_source battery light particle_emitter kinematic gravity enable_wind"
+            "visual sensor projector audio_sink audio_source battery light particle_emitter gravity enable_wind"
             " self_collide velocity_decay must_be_base_link",
         ),
         "inertial": ("auto pose mass inertia density", ""),

@@ -22,7 +22,7 @@ from conservative.attitude import Array
 
 from ..engine import load
 from .files import inline, load_mesh, refuse
-from .pieces import ONE, Link, Piece, join, join_links, make_pose, rounding_of, weigh
+from .pieces import ONE, Link, Piece, Reading, join, join_links, make_pose, rounding_of, weigh
 
 _HALF = {"capsule": (1, 2), "cylinder": (1, 2), "box": (2, 2, 2), "ellipsoid": (1, 1, 1), "sphere": (1,)}
 """Shapes, and the factors from sizes in MJCF, which are half lengths, to those of `weigh`."""
@@ -32,8 +32,8 @@ class NotRead(Exception):
     """The file has something for which there is no rule here. The message names it."""
 
 
-def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any]:
-    """Return the module mujoco and the elements of a file, an `MjSpec`. Raise `BadInput` and `MissingEngine`."""
+def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any, list[str]]:
+    """Return the module mujoco, the elements of a file, an `MjSpec`, and doubts. Raise `BadInput` and `MissingEngine`."""
     mujoco = load("mujoco", "mujoco", "MuJoCo")
     from lxml.etree import tostring
 
@@ -42,25 +42,28 @@ def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any]:
     except (ValueError, mujoco.FatalError) as error:
         raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo reads") from None
     spec.modelfiledir = str(path.parent)
-    for each in (spec.compiler, *spec.joints):  # another body frame, and the same body
+    aligned = 0
+    for each in (spec.compiler, *spec.joints):  # the same body in other axes
         for name in {"align", "alignfree"}.intersection(dir(each)):
+            aligned |= int(getattr(each, name)) == 1
             setattr(each, name, 0)
-    return mujoco, spec
+    return mujoco, spec, ["the axes of the body are its principal axes by an option of the file"] * aligned
 
 
-def compile_mjcf(path: Path, search: Sequence[Path], notes: list[str]) -> Piece:
+def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
     """Return the body that MuJoCo compiles of a file with one free body, in its axes. Warnings become notes.
 
     Raise `BadInput` for a file that it does not compile, and for several bodies.
     """
-    mujoco, spec = parse_mjcf(path, search)
+    mujoco, spec, doubts = parse_mjcf(path, search)
+    reading.doubts.extend(doubts)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
             model = spec.compile()
         except (ValueError, mujoco.FatalError) as error:
             raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
-    notes.extend(f"MuJoCo warns: {each.message}" for each in said)
+    reading.notes.extend(f"MuJoCo warns: {each.message}" for each in said)
     if model.njnt > (model.nq == 7):
         raise refuse(path, f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
     if (roots := (model.body_parentid[1:] == 0).sum()) != 1:
@@ -74,7 +77,7 @@ def compile_mjcf(path: Path, search: Sequence[Path], notes: list[str]) -> Piece:
 
 def read_mjcf(path: Path, search: Sequence[Path] = ()) -> list[Link]:
     """Return the links of a file with one body in the world, in its axes. Raise `NotRead` and `BadInput`."""
-    mujoco, spec = parse_mjcf(path, search)
+    mujoco, spec, _ = parse_mjcf(path, search)
     options = spec.compiler
     if len(spec.worldbody.bodies) != 1 or len(getattr(spec, "flexes", ())):
         raise NotRead(f"{len(spec.worldbody.bodies)} bodies in the world, or flexible ones")

@@ -23,7 +23,7 @@ from ..worker.client import EngineCrashed, EngineTimeout
 from .description import File, read_xml
 from .files import Unread, kind_of, reason, refuse
 from .mjcf import NotRead, compile_mjcf, read_mjcf
-from .pieces import QUANTITIES, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
+from .pieces import QUANTITIES, Link, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
 from .robots import Body, split
 from .usd import read_usd, reference_usd
 
@@ -203,7 +203,7 @@ def _read(model: Model, search: Sequence[Path]) -> None:
     path, kind = model.path, model.kind
     references = {
         "urdf": ("urdfdom in Pinocchio", "pin", "Pinocchio", partial(_urdfdom, path)),
-        "mjcf": ("MuJoCo", "mujoco", "MuJoCo", partial(compile_mjcf, path, search, model.notes)),
+        "mjcf": ("MuJoCo", "mujoco", "MuJoCo", partial(compile_mjcf, path, search, model)),
         "usd": ("usd-core", "usd-core", "usd-core", partial(reference_usd, path, search)),
     }
     own = {"usd": partial(read_usd, path, search, model), "mjcf": partial(read_mjcf, path, search)}
@@ -238,6 +238,7 @@ def _read(model: Model, search: Sequence[Path]) -> None:
                 raise
             model.reference_refuses = reason(error)
     truth = model.truth
+    model.links = model.links or [Link(np.eye(4)).filled(truth)]
     if model.flaw or truth.excess:
         said = (
             f"no body is like this: {model.flaw}" if model.flaw else "the digits of the file leave open if a body is like this"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .description import File, Frames
+from .description import EXTENSIONS, File, Frames
 from .files import Unread, find, inline, parse, refuse
 from .mjcf import parse_mjcf
 
@@ -23,13 +23,15 @@ from .mjcf import parse_mjcf
 class Body:
     """A free body of a file: its root link, the file that has it alone, and notes.
 
-    `pivots` has the joints that move it or hold it, by their kinds, and where they are in its axes (3,), m.
+    `pivots` has the joints that move it or hold it, by their kinds, and where they are in its axes (3,), m. `bare` is a copy
+    of the file that has nothing beside the mass of the body, if `path` is the file itself.
     """
 
     name: str = ""
     path: Path = Path()
     notes: Sequence[str] = ()
     pivots: Sequence[tuple[str, Any]] = ()
+    bare: Path | None = None
 
 
 Bodies = list[Body]
@@ -106,9 +108,9 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
         joints = [each for each in frames.joints if each.child == name and name in moving]
         base = np.linalg.inv(frames.place(name))
         pivots = [(each.kind, np.zeros(3) if urdf else (base @ frames.place(each.name))[:3, 3]) for each in joints]
-        copy = path if alone else _write(folder, _copy(path, model, frames, members, search), path)
+        copy = _write(folder, _copy(path, model, frames, members, search), path)
         loose = [FREE.format(repr(name))] if not alone and (moving or held) else []
-        bodies.append(Body(name, copy, notes + loose, pivots))
+        bodies.append(Body(name, path if alone else copy, notes + loose, pivots, copy if alone else None))
     return bodies
 
 
@@ -130,13 +132,12 @@ def _tree(path: Path, frames: Frames, links: Mapping[str, Any]) -> tuple[dict[st
 
 
 def _copy(path: Path, model: Any, frames: Frames, members: Sequence[str], search: Sequence[Path]) -> Any:
-    """Return a copy of a model with the links of one body and the joints between them, without visuals.
+    """Return a copy of a model with the links of one body, the joints between them, and what is for one engine.
 
     Meshes are left out unless the mass follows from them; then they get their absolute path.
     """
     copy = deepcopy(model)
-    dropped = {"joint", "link", "frame", "static", "pose", "transmission", "gripper"}
-    for each in [each for each in copy if each.tag in dropped]:
+    for each in [each for each in copy if each.tag.partition(":")[0] not in EXTENSIONS]:
         if each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]:
             for child in [child for child in each if child.tag not in ("origin", "parent", "child")]:
                 each.remove(child)  # such as <mimic>, which refers to other joints
@@ -220,8 +221,6 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     for number, (body, inherited) in enumerate(found):
         joints = spec.body(body.get("name")).joints if body.get("name") else ()
         pivots = [(each.type.name.removeprefix("mjJNT_").lower(), np.array(each.pos)) for each in joints]
-        if alone:
-            return [Body(body.get("name", ""), path, [], pivots)]
         name, copy = body.get("name") or f"body {number}", deepcopy(body)
         copy.attrib.update({"name": name} | ({"childclass": inherited} if inherited != "main" else {}))
         for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
@@ -231,11 +230,15 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         _lighten(path, made, copy, root, search)
         if next(copy.iter("inertial", "geom"), None) is None:
             continue
-        copy.insert(0, copy.makeelement("joint", PLAIN))
+        kept = alone and body.find("freejoint") is not None
+        copy.insert(0, copy.makeelement("freejoint") if kept else copy.makeelement("joint", PLAIN))
         world = made.makeelement("worldbody")
         world.append(copy)
         made.append(world)
-        bodies.append(Body(name, _write(folder, made, path), [*notes, FREE.format(repr(name))], pivots))
+        place = _write(folder, made, path)
+        if alone:
+            return [Body(body.get("name", ""), path, [], pivots, place)]
+        bodies.append(Body(name, place, [*notes, FREE.format(repr(name))], pivots))
     return bodies
 
 

@@ -41,7 +41,7 @@ class Stage:
 
         def look(place: Path, seen: set[Path]) -> None:
             layer = Sdf.Layer.FindOrOpen(str(place))
-            for name in layer.GetCompositionAssetDependencies() if layer else []:
+            for name in filter(None, layer.GetCompositionAssetDependencies() if layer else []):  # none within the file
                 found = find(place, name, (path.parent, *search))
                 if found not in seen:
                     seen.add(found)
@@ -190,6 +190,9 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
             reading.ask(ASKS[space], name, str(attribute.Get()).lower(), said)
         elif colon and space not in ("physics", "xformOp", "primvars", "material"):
             reading.notes.append(f"{attribute.GetPath()} is an attribute of a vendor, which is not read here")
+    for name in ("kinematicEnabled", "startsAsleep"):
+        if (held := body.GetAttribute(f"physics:{name}")) and held.Get():
+            reading.doubts.append(f"{held.GetPath()} is true, so that forces do not move the body")
     mass, density, com, inertia = stage.authored(body)
     moments = () if inertia is None else body.GetAttribute("physics:diagonalInertia").Get()
     for prim in colliders:

@@ -501,6 +501,40 @@ def test_notes_name_the_joint_and_no_namespace(read):
     assert "namespace" in str(model.doubts)
 
 
+def test_what_is_beside_the_mass_is_no_reason_to_call_an_engine_a_refuser(read, tmp_path):
+    path = tmp_path / "a.urdf"
+    path.write_text(urdf(more='<transmission name="t"/>'))
+    (model,) = read("a.urdf", path.read_text())
+    program = Program.__new__(Program)
+    program.engine, program.label, program.single = "drake", "drake", False
+    answer = {"output": "", "accelerations": None}
+    program._load = lambda model, cases: answer | {
+        "refused": "no type" * ("transmission" in model.path.read_text()), "accelerations": accelerations(model.truth, cases)
+    }  # fmt: skip
+    assert program.check(model).outcome == "undecided"
+    program._load = lambda model, cases: answer | {"refused": "no"}
+    assert program.check(model).outcome == "refused"
+
+
+OPEN = {
+    "axes.xml": mjcf('<freejoint align="true"/><geom size="0.1" pos="1 2 3"/>'),
+    "held.usda": usda("bool physics:kinematicEnabled = 1\n" + MASS.format(2) + COM.format(0) + DIAGONAL.format(1, 2, 2)),
+    "no rule.xml": mjcf('<freejoint/><geom size="0.1" shellinertia="true"/>'),
+}
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_nothing_is_said_about_what_a_file_leaves_open(read, name):
+    (model,) = read(name, OPEN[name])
+    assert judge_body(model, "dart", replace(model.truth, mass=9.0), 1e-4)[0] == "undecided"
+
+
+def test_instances_in_a_usd_file_are_read(read):
+    inside = 'def Xform "x" (\n instanceable = true\n references = </proto>\n)\n{\n}\n'
+    (model,) = read("a.usda", usda(inside, BODY) + f'class Xform "proto"\n{{\n{cube()}}}\n')
+    assert model.truth.mass == pytest.approx(1000, rel=1e-6)
+
+
 @pytest.mark.engine("brax")
 def test_armature_damping_and_fluids_do_not_count_against_brax():
     path = CATALOGUE / "joints_and_fluids.xml"
