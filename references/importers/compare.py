@@ -380,50 +380,50 @@ class Program:
 
     def read(self, model: Model) -> tuple[Piece | None, str]:
         """Return the body that the engine has after loading a file, or None and why it has none."""
-        try:
-            result = self._load(model, cases := make_cases(model.truth))
-        except (NotImplementedError, EngineCrashed, EngineTimeout) as failure:
-            return None, str(getattr(failure, "outcome", failure))
-        if result["refused"]:
-            return None, result["refused"]
-        part = self._identify(model, cases, result["accelerations"], model.truth)
-        return part, "" if part else NO_BODY
+        kind, words, seen, _ = self._measure(model, make_cases(model.truth))
+        return seen, "" if seen else words or kind
 
     def check(self, model: Model) -> FileAnswer:
         """Return the answer of the engine for a body of a file."""
         answer = partial(FileAnswer, self.label, model.label, readers=model.readings(), notes=model.notes)
-        cases = make_cases(model.truth)
-        try:
-            result = self._load(model, cases)
-        except NotImplementedError as error:
-            return answer("", str(error))
-        except (EngineCrashed, EngineTimeout) as failure:
-            return answer("crashed", str(failure.outcome))
-        if result["refused"]:
-            outcome, words = judge_refusal(model, self.engine, result["refused"])
+        kind, words, seen, measured = self._measure(model, cases := make_cases(model.truth))
+        if kind == "refused":
+            outcome, words = judge_refusal(model, self.engine, words)
             if outcome == "refused" and model.body.bare:
                 bare = replace(model, body=replace(model.body, path=model.body.bare, bare=None))
-                if self.check(bare).outcome not in ("refused", "crashed"):
-                    outcome, words = (
-                        "undecided",
-                        f"it loads a copy without what is beside the mass, and refuses the file: {words}",
-                    )
+                again = self.check(bare)
+                loads = again.outcome not in ("refused", "crashed")
+                outcome, words = ("undecided", f"{BARE}, and refuses the file: {words}") if loads else ("refused", again.words)
             return answer(outcome, words)
+        if kind != "loaded":
+            return answer(kind, words)
         if model.alone(self.engine):
             return answer("", f"it is the reference for this format, and there is no second reader: {model.own_refuses}")
-        measured, names = result["accelerations"], [model.path.name, model.path.stem, *(link.name for link in model.links)]
-        seen = self._identify(model, cases, measured, model.truth)
+        names = [model.path.name, model.path.stem, *(link.name for link in model.links)]
         why = NOT_FINITE if not np.isfinite(measured).all() else NO_BODY if measured[:, 3:].any() else RIGID
         why = why if measured.any() else HELD
-        found = seen if seen is not None else why
-        outcome, words = judge_body(model, self.engine, found, self.tolerance, find_warning(result["output"], names))
-        if outcome == "wrong" and why == NO_BODY and seen is None and self.single:
-            outcome, words = "undecided", f"{words}, in single precision"
+        prints = find_warning(words, names)
+        outcome, words = judge_body(model, self.engine, why if seen is None else seen, self.tolerance, prints)
         if seen is None:
-            return answer(outcome, words)
+            noise = outcome == "wrong" and why == NO_BODY and self.single
+            return answer("undecided", f"{words}, in single precision") if noise else answer(outcome, words)
         expected = accelerations(model.truth, cases) if outcome == "right" and not words else measured
         worst = float(np.abs(measured - expected).max() / np.abs(measured).max())
         return answer(outcome, words, {name: np.asarray(value).tolist() for name, value in vars(seen).items()}, worst)
+
+    def _measure(self, model: Model, cases: Array) -> tuple[str, str, Piece | None, Array]:
+        """Return "loaded", "refused", "crashed" or "", the engine's words, the body that it has and accelerations (n, 6)."""
+        nothing = np.empty((0, 6))
+        try:
+            result = self._load(model, cases)
+        except NotImplementedError as error:
+            return "", str(error), None, nothing
+        except (EngineCrashed, EngineTimeout) as failure:
+            return "crashed", str(failure.outcome), None, nothing
+        if result["refused"]:
+            return "refused", result["refused"], None, nothing
+        measured = result["accelerations"]
+        return "loaded", result["output"], self._identify(model, cases, measured, model.truth), measured
 
     def _identify(self, model: Model, cases: Array, measured: Array, near: Piece) -> Piece | None:
         """Return the body that explains the accelerations, or None if no body does.

@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -83,18 +83,52 @@ def version_of(text: str) -> tuple[int, ...]:
     return tuple(map(int, text.split(".")))
 
 
-@dataclass(frozen=True)
-class File:
-    """A file, for messages, poses and geometry; `read` collects what has to be said."""
+class Joint(NamedTuple):
+    """A joint of URDF or SDF: its name and kind, the links that it joins, and its pose (4, 4) in the parent of URDF."""
 
-    path: Path
-    search: Sequence[Path] = ()
-    read: Reading = field(default_factory=Reading)
+    name: str
+    kind: str
+    parent: str
+    child: str
+    pose: Array
 
-    def refuse(self, what: str, allowed: str) -> BadInput:
-        return refuse(self.path, what, allowed)
 
-    def pose(self, element: Any, of: str = "", version: str = "9") -> Array:
+class Description:
+    """A model of URDF or SDF: its joints, and the poses of its links, joints and frames. `reading` collects what is said."""
+
+    def __init__(self, path: Path, model: Any, search: Sequence[Path] = (), reading: Reading | None = None) -> None:
+        self.path, self.model, self.search, self.reading = path, model, search, reading or Reading()
+        self.urdf = model.tag == "robot"
+        self.version = model.getroottree().getroot().get("version", "1.0")
+        self.own, attribute = ("origin", "link") if self.urdf else ("pose", "name")
+        tags = ("link",) if self.urdf else ("joint", "frame", "link")  # a joint of URDF may have the name of its link
+        self.elements = {each.get("name", ""): each for tag in tags for each in model.findall(tag)}
+        self.joints = []
+        for each in model.findall("joint"):
+            ends = [each.find(name) for name in ("parent", "child")]
+            parent, child = ("" if end is None else (end.get(attribute) or end.text or "").strip() for end in ends)
+            pose = self.pose(each.find(self.own)) if self.urdf else np.eye(4)
+            self.joints.append(Joint(each.get("name", ""), each.get("type", ""), parent, child, pose))
+        self._bases = {joint.child: joint for joint in self.joints if joint.kind == "fixed"}
+
+    def place(self, name: str) -> Array:
+        """Return the pose (4, 4) of a link, frame or joint in the model, in URDF in the link that it is fixed to."""
+        if name in ("", "__model__"):
+            return np.eye(4)
+        if self.urdf:
+            return self.place(self._bases[name].parent) @ self._bases[name].pose if name in self._bases else np.eye(4)
+        element = self.elements[name]
+        pose = element.find(self.own)
+        base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
+        return self.place(base or element.findtext("child", "")) @ self.pose(pose)
+
+    def inside(self, link: str, element: Any) -> Array:
+        """Return the pose (4, 4) of an element of a link in the link."""
+        pose = element.find(self.own)
+        base = "" if pose is None else pose.get("relative_to", "")
+        return (np.linalg.inv(self.place(link)) @ self.place(base) if base else np.eye(4)) @ self.pose(pose)
+
+    def pose(self, element: Any, of: str = "") -> Array:
         """Return the pose (4, 4) in an <origin> of URDF or a <pose> of SDF, of a link `of`; without one the identity."""
         if element is None:
             return np.eye(4)
@@ -106,17 +140,19 @@ class File:
             )
             if element.get("frame"):
                 said = f"<pose> of {name!r} has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
-                self.read.doubts.append(said)
+                self.reading.doubts.append(said)
         else:
             values = numbers(element.get("xyz", "0 0 0"), 3) + numbers(element.get("rpy", "0 0 0"), 3)
         if of and (base := element.get("relative_to", of)):
             said = f"the pose in <{owner.tag}> of {of!r} is relative to {base!r}, which the format does not allow"
-            (self.read.doubts if base == of else self.read.invalid).extend([said] * ("relative_to" in element.attrib))
+            (self.reading.doubts if base == of else self.reading.invalid).extend([said] * ("relative_to" in element.attrib))
         if "quat_xyzw" in element.attrib:
-            if version_of(version) >= (1, 1):
+            if version_of(self.version) >= (1, 1):
                 values[3:], form = numbers(element.get("quat_xyzw"), 4), "quat_xyzw"
             else:
-                self.read.notes.append(f"quat_xyzw of {name!r} is ignored in URDF {version}, which has no such attribute")
+                self.reading.notes.append(
+                    f"quat_xyzw of {name!r} is ignored in URDF {self.version}, which has no such attribute"
+                )
         if form == "quat_xyzw":
             if not any(values[3:]):
                 raise Unread(f"the quaternion 0 0 0 0 of {name!r}")
@@ -139,29 +175,63 @@ class File:
             form.tag, ("radius", "length")
         )
         if form.tag not in SHAPES or not set(names) <= set(values):
-            raise self.refuse(f"the shape <{form.tag}>", f"shapes whose volume is known: {', '.join(SHAPES)}")
+            raise refuse(self.path, f"the shape <{form.tag}>", f"shapes whose volume is known: {', '.join(SHAPES)}")
         return weigh(form.tag, numbers(" ".join(values[name] for name in names)), place, density)
 
-    def look(self, element: Any, version: str = "") -> None:
-        """Note what no rule here covers in an element of URDF, or of SDF of a `version`; with a mass it is a doubt."""
+    def link(self, name: str) -> Link:
+        """Return a link with its mass and inertia. In URDF all values are required; in SDF the defaults are 1 and 0."""
+        element, link = self.elements[name], Link(self.place(name), name=name)
+        inertial = element.find("inertial")
+        auto = not self.urdf and inertial is not None and inertial.get("auto") in ("true", "1")
+        try:
+            forms = []
+            for each in element.findall("collision"):
+                density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
+                forms += self.weigh(each.find("geometry"), self.inside(name, each), number(str(density)))
+            link = replace(link, geometry=join(forms))
+        except BadInput as error:
+            if auto:
+                raise
+            self.reading.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
+        if auto:  # a mass of the file is that of the whole, from libsdformat 15.2 on
+            mass = inertial.findtext("mass")
+            return link.filled(link.geometry.scale(number(mass) / link.geometry.mass if mass and link.geometry.mass else 1.0))
+        if inertial is None and self.urdf:
+            return link
+        inertial = element.makeelement("inertial") if inertial is None else inertial
+        mass, given = inertial.find("mass"), _values(inertial.find("inertia"))
+        weight = None if mass is None else mass.get("value") if self.urdf else mass.text
+        missing = [each for each in _I.split() if each not in given] + ["mass"] * (weight is None)
+        if self.urdf and missing:
+            said = f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires"
+            self.reading.invalid.append(said)
+        one = "0" if self.urdf else "1"
+        inertia = [[number(given.get(f"i{min(a, b)}{max(a, b)}", one if a == b else "0")) for a in "xyz"] for b in "xyz"]
+        frame, rounding = self.pose(inertial.find(self.own), name), rounding_of(np.ravel(inertia).tolist())
+        return replace(link, mass=number(weight or one), frame=frame, inertia=np.array(inertia), rounding=rounding)
+
+    def look(self, element: Any) -> None:
+        """Note what no rule here covers in an element; with a mass it is a doubt."""
         tag = element.tag
-        used, ignored = (names.split() for names in KNOWN["sdf" if version else "urdf"].get(tag, ("*", "")))
+        used, ignored = (names.split() for names in KNOWN["urdf" if self.urdf else "sdf"].get(tag, ("*", "")))
         owners = [*((name, element) for name in element.attrib), *((child.tag, child) for child in element)]
         for name, owner in () if used == ["*"] else owners:
-            if version and version_of(version) < version_of(SINCE.get((tag, name), "0")):
-                said = f"<{tag}> has {name!r}, which is of SDF {SINCE[tag, name]}, and the file of SDF {version}"
-                self.read.doubts.append(said)
+            if not self.urdf and version_of(self.version) < version_of(SINCE.get((tag, name), "0")):
+                said = f"<{tag}> has {name!r}, which is of SDF {SINCE[tag, name]}, and the file of SDF {self.version}"
+                self.reading.doubts.append(said)
             if name not in used and name not in ignored:
                 if engine := EXTENSIONS.get(name.partition(":")[0]):
                     self._ask(engine, name, owner if owner is not element else None)
                 else:
                     said = f"<{tag}> has {name!r}, which is not read here"
-                    (self.read.doubts if tag in MASS or name == "namespace" else self.read.notes).append(said)
+                    (self.reading.doubts if tag in MASS or name in ("namespace", "kinematic") else self.reading.notes).append(
+                        said
+                    )
             if name in MASS and len(element.findall(name)) > 1:
-                self.read.invalid.append(f"<{tag}> has several elements <{name}>")
+                self.reading.invalid.append(f"<{tag}> has several elements <{name}>")
         for child in element:
             if child.tag in used:
-                self.look(child, version)
+                self.look(child)
 
     def _ask(self, engine: str, name: str, owner: Any) -> None:
         """Add what an element, or an attribute if the owner is None, asks an engine for."""
@@ -170,7 +240,35 @@ class File:
         )
         for tag, key, value in inside or [(name.rpartition(":")[2], "", "")]:
             option = key if name == "mujoco" else f"{tag} {key}"
-            self.read.ask(engine, option, value, f"<{name}> {tag} {key}={value!r}" if key else f"<{name}>")
+            self.reading.ask(engine, option, value, f"<{name}> {tag} {key}={value!r}" if key else f"<{name}>")
+
+
+def read_xml(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]:
+    """Return the links of a URDF or SDF file with one body, and note what is not read. Raise `BadInput`."""
+    root = parse(path)
+    models = [root] if root.tag == "robot" else [*root.findall("model"), *root.findall("world/model")]
+    if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
+        raise refuse(path, f"{len(models)} models, or one within another", "one model without includes")
+    model = Description(path, models[0], search, reading)
+    model.look(root)
+    free, fixed = list[str](), [joint.child for joint in model.joints if joint.kind == "fixed"]
+    for joint in model.joints:
+        if model.urdf and joint.kind == "floating" and model.elements[joint.parent].find("inertial") is None:
+            free.append(joint.parent)
+        elif joint.kind != "fixed" or joint.parent == "world":
+            raise refuse(path, f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
+    links = [model.link(each.get("name", "")) for each in models[0].findall("link") if each.get("name") not in free]
+    roots = [link for link in links if link.name not in fixed]
+    if len(roots) != 1:
+        raise refuse(path, f"{len(roots)} root links", ONE)
+    if roots[0].name == "world":
+        reading.doubts.append("the body is named 'world', which some engines hold")
+    return [*roots, *(link for link in links if link.name in fixed)]
+
+
+def _values(element: Any) -> dict[str, str]:
+    """Return the attributes and the texts of the children of an element."""
+    return {} if element is None else {**element.attrib, **{child.tag: child.text or "" for child in element}}
 
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
@@ -191,122 +289,3 @@ def numbers(text: str | None, count: int = 0) -> list[float]:
 def number(text: str) -> float:
     """Return the finite number in a text. Raise `Unread`."""
     return numbers(text, 1)[0]
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint of URDF or SDF: its name and kind, the links that it joins, and its pose (4, 4) in the parent of URDF."""
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    pose: Array
-
-
-class Frames:
-    """The joints of a model of URDF or SDF, and the poses of its links, joints and frames."""
-
-    def __init__(self, file: File, model: Any) -> None:
-        self.urdf = model.tag == "robot"
-        self._file, version = file, model.get("version", "1.0") if self.urdf else "1.0"
-        self.own, attribute = ("origin", "link") if self.urdf else ("pose", "name")
-        tags = ("link",) if self.urdf else ("joint", "frame", "link")  # a joint of URDF may have the name of its link
-        self.elements = {each.get("name", ""): each for tag in tags for each in model.findall(tag)}
-        self.joints = []
-        for each in model.findall("joint"):
-            ends = [each.find(name) for name in ("parent", "child")]
-            names = ["" if end is None else (end.get(attribute) or end.text or "").strip() for end in ends]
-            pose = file.pose(each.find(self.own), version=version) if self.urdf else np.eye(4)
-            self.joints.append(Joint(each.get("name", ""), each.get("type", ""), names[0], names[1], pose))
-        self._bases = {joint.child: joint for joint in self.joints if joint.kind == "fixed"}
-
-    def place(self, name: str) -> Array:
-        """Return the pose (4, 4) of a link, frame or joint in the model, in URDF in the link that it is fixed to."""
-        if name in ("", "__model__"):
-            return np.eye(4)
-        if self.urdf:
-            return self.place(self._bases[name].parent) @ self._bases[name].pose if name in self._bases else np.eye(4)
-        element = self.elements[name]
-        pose = element.find(self.own)
-        base = ("" if pose is None else pose.get("relative_to", "")) or element.get("attached_to", "")
-        return self.place(base or element.findtext("child", "")) @ self._file.pose(pose)
-
-    def inside(self, link: str, element: Any) -> Array:
-        """Return the pose (4, 4) of an element of a link in the link."""
-        pose = element.find(self.own)
-        base = "" if pose is None else pose.get("relative_to", "")
-        return (np.linalg.inv(self.place(link)) @ self.place(base) if base else np.eye(4)) @ self._file.pose(pose)
-
-
-def read_xml(file: File) -> list[Link]:
-    """Return the links of a URDF or SDF file, whose elements have the same names. URDF has attributes where SDF has texts."""
-    root = parse(file.path)
-    urdf = root.tag == "robot"
-    version = root.get("version", "1.0") if urdf else "sdf"
-    file.look(root, "" if urdf else root.get("version", "1.0"))
-    models = [root] if urdf else [*root.findall("model"), *root.findall("world/model")]
-    if len(models) != 1 or models[0].find("include") is not None or models[0].find("model") is not None:
-        raise file.refuse(f"{len(models)} models, or one within another", "one model without includes")
-    (model,) = models
-    frames, free = Frames(file, model), list[str]()
-    for joint in frames.joints:
-        if urdf and joint.kind == "floating" and frames.elements[joint.parent].find("inertial") is None:
-            free.append(joint.parent)
-        elif joint.kind != "fixed" or joint.parent == "world":
-            raise file.refuse(f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
-    links = {}
-    for name in (each.get("name", "") for each in model.findall("link") if each.get("name") not in free):
-        element, link = frames.elements[name], Link(frames.place(name), name=name)
-        inertial = element.find("inertial")
-        auto = not urdf and inertial is not None and inertial.get("auto") in ("true", "1")
-        try:
-            link = replace(link, geometry=join(_shapes(file, frames, name, inertial)))
-        except BadInput as error:
-            if auto:
-                raise
-            file.read.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
-        if auto:  # a mass of the file is that of the whole, from libsdformat 15.2 on
-            mass = inertial.findtext("mass")
-            part = link.geometry.scale(number(mass) / link.geometry.mass if mass and link.geometry.mass else 1.0)
-            link = link.filled(part)
-        elif inertial is not None or not urdf:
-            link = _inertial(file, link, element.makeelement("inertial") if inertial is None else inertial, name, version)
-        links[name] = link
-    roots = [name for name in links if name not in [joint.child for joint in frames.joints if joint.kind == "fixed"]]
-    if len(roots) != 1:
-        raise file.refuse(f"{len(roots)} root links", ONE)
-    if links[roots[0]].name == "world":
-        file.read.doubts.append("the body is named 'world', which some engines hold")
-    return [links.pop(roots[0]), *links.values()]
-
-
-def _shapes(file: File, frames: Frames, name: str, inertial: Any) -> list[Piece]:
-    """Return the parts of the collision geometry of a link. Raise `BadInput` if one cannot be weighed."""
-    forms = []
-    for each in frames.elements[name].findall("collision"):
-        density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
-        forms += file.weigh(each.find("geometry"), frames.inside(name, each), number(str(density)))
-    return forms
-
-
-def _inertial(file: File, link: Link, inertial: Any, name: str, version: str) -> Link:
-    """Return a link with the <inertial> of URDF, where all values are required, or of SDF, where the defaults are 1 and 0."""
-    urdf = version != "sdf"
-    mass, given = inertial.find("mass"), _values(inertial.find("inertia"))
-    missing = [each for each in KNOWN["urdf"]["inertia"][0].split() if each not in given] if urdf else []
-    weight = None if mass is None else mass.get("value") if urdf else mass.text
-    missing += ["mass"] * (urdf and weight is None)
-    if missing:
-        file.read.invalid.append(f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires")
-    default = {True: "0" if urdf else "1", False: "0"}
-    inertia = [[number(given.get(f"i{min(a, b)}{max(a, b)}", default[a == b])) for a in "xyz"] for b in "xyz"]
-    frame = file.pose(inertial.find("origin" if urdf else "pose"), name, version if urdf else "1.0")
-    moments = rounding_of(np.ravel(inertia).tolist())
-    weight = weight or ("0" if urdf else "1")
-    return replace(link, mass=number(weight), frame=frame, inertia=np.array(inertia), rounding=moments)
-
-
-def _values(element: Any) -> dict[str, str]:
-    """Return the attributes and the texts of the children of an element."""
-    return {} if element is None else {**element.attrib, **{child.tag: child.text or "" for child in element}}

@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 import warnings
+from pathlib import Path
 
 import numpy as np
 
@@ -62,7 +63,12 @@ def _compile_mujoco(path, kind):
     """Return MuJoCo's model of a file, on a free joint, without forces, fluid and the armature of the joint."""
     import mujoco
 
-    spec = _choose(kind, urdf=mujoco.MjSpec, mjcf=mujoco.MjSpec).from_file(path)
+    read = _choose(kind, urdf=mujoco.MjSpec, mjcf=mujoco.MjSpec)
+    if path.endswith((".xml", ".urdf")):
+        spec = read.from_file(path)
+    else:  # MjModel.from_xml_path takes any name, and MjSpec.from_file some
+        spec = read.from_string(Path(path).read_text())
+        spec.modelfiledir = str(Path(path).parent)
     if not spec.joints:
         _one_free(list(spec.worldbody.bodies))
         spec.worldbody.first_body().add_freejoint()

@@ -55,8 +55,7 @@ def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
 
     Raise `BadInput` for a file that it does not compile, and for several bodies.
     """
-    mujoco, spec, doubts = parse_mjcf(path, search)
-    reading.doubts.extend(doubts)
+    mujoco, spec, _ = parse_mjcf(path, search)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
@@ -75,9 +74,10 @@ def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
     return join(part.place(base @ pose) for part, pose in zip(parts, poses, strict=True))
 
 
-def read_mjcf(path: Path, search: Sequence[Path] = ()) -> list[Link]:
+def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]:
     """Return the links of a file with one body in the world, in its axes. Raise `NotRead` and `BadInput`."""
-    mujoco, spec, _ = parse_mjcf(path, search)
+    mujoco, spec, doubts = parse_mjcf(path, search)
+    reading.doubts.extend(doubts)
     options = spec.compiler
     if len(spec.worldbody.bodies) != 1 or len(getattr(spec, "flexes", ())):
         raise NotRead(f"{len(spec.worldbody.bodies)} bodies in the world, or flexible ones")

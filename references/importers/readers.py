@@ -20,7 +20,7 @@ from conservative.errors import BadInput, MissingEngine, MissingExtra
 from ..engine import load, version
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
-from .description import File, read_xml
+from .description import read_xml
 from .files import Unread, kind_of, reason, refuse
 from .mjcf import NotRead, compile_mjcf, read_mjcf
 from .pieces import QUANTITIES, Link, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
@@ -206,9 +206,8 @@ def _read(model: Model, search: Sequence[Path]) -> None:
         "mjcf": ("MuJoCo", "mujoco", "MuJoCo", partial(compile_mjcf, path, search, model)),
         "usd": ("usd-core", "usd-core", "usd-core", partial(reference_usd, path, search)),
     }
-    own = {"usd": partial(read_usd, path, search, model), "mjcf": partial(read_mjcf, path, search)}
     try:
-        model.links = own.get(kind, partial(read_xml, File(path, search, model)))()
+        model.links = {"usd": read_usd, "mjcf": read_mjcf}.get(kind, read_xml)(path, search, model)
     except NotRead as error:
         model.own_refuses = f"there is no rule here for {error}"
     except Exception as error:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .description import EXTENSIONS, File, Frames
+from .description import EXTENSIONS, Description
 from .files import Unread, find, inline, parse, refuse
 from .mjcf import parse_mjcf
 
@@ -83,7 +83,7 @@ def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
 
 def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], several: bool) -> Bodies:
-    urdf, frames = model.tag == "robot", Frames(File(path, search), model)
+    urdf, frames = model.tag == "robot", Description(path, model, search)
     links = {each.get("name", ""): each for each in model.findall("link")}
     parents, moving = _tree(path, frames, links)
     groups = group(path, list(links), parents)
@@ -114,7 +114,7 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     return bodies
 
 
-def _tree(path: Path, frames: Frames, links: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
+def _tree(path: Path, frames: Description, links: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
     """Return the parents of the links that are fixed, and of those that move or are held.
 
     Raise `BadInput` for a circle of fixed joints, and in URDF, where joints form a tree, for any.
@@ -131,7 +131,7 @@ def _tree(path: Path, frames: Frames, links: Mapping[str, Any]) -> tuple[dict[st
     return parents, moving
 
 
-def _copy(path: Path, model: Any, frames: Frames, members: Sequence[str], search: Sequence[Path]) -> Any:
+def _copy(path: Path, model: Any, frames: Description, members: Sequence[str], search: Sequence[Path]) -> Any:
     """Return a copy of a model with the links of one body, the joints between them, and what is for one engine.
 
     Meshes are left out unless the mass follows from them; then they get their absolute path.
@@ -185,13 +185,14 @@ def _place(element: Any, pose: Any) -> None:
 
 
 def _write(folder: Path, made: Any, path: Path) -> Path:
-    """Write a model into a folder of its own, named as the file. Return the path."""
+    """Write a model into a folder of its own, with the name of the file and the usual suffix. Return the path."""
     from lxml import etree
 
-    place = folder / str(len(list(folder.iterdir())))
-    place.mkdir()
-    (place / path.name).write_bytes(etree.tostring(made))
-    return place / path.name
+    suffix = {"robot": "urdf", "mujoco": "xml", "sdf": "sdf"}[made.tag]
+    place = folder / str(len(list(folder.iterdir()))) / f"{path.stem}.{suffix}"
+    place.parent.mkdir()
+    place.write_bytes(etree.tostring(made))
+    return place
 
 
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
