@@ -30,18 +30,7 @@ from ..worker.calls import python_worker
 from ..worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
 from . import loaders
 from .loaders import LOADERS
-from .pieces import (
-    QUANTITIES,
-    Link,
-    Piece,
-    differing,
-    distance,
-    errors,
-    join_links,
-    list_numbers,
-    make_pose,
-    steiner,
-)
+from .pieces import QUANTITIES, Link, Piece, differing, distance, errors, join_links, list_numbers, make_pose, steiner
 from .readers import DIGITS, Model, read_files
 
 LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
@@ -70,9 +59,10 @@ CATALOGUE = Path(__file__).parent / "models"
 class FileAnswer:
     """The answer of an engine for a file.
 
-    The outcome is one of `OUTCOMES`, or "" if the engine has no loader for the format, with `words`. `seen` has mass, com and
-    inertia that explain the accelerations best, and `error` is their largest relative error if they are right. `readers` has
-    the body of the file by its readers, the reference reader first, or why a reader has none. `notes` are about the file.
+    The outcome is "right", "wrong", "refused", "crashed", "accepted" or "undecided", which the README explains, or "" if the
+    engine has no loader for the format. `seen` has mass, com and inertia that explain the accelerations best, and `error` is
+    their largest relative error if they are right. `readers` has the body of the file by its readers, the reference reader
+    first, or why a reader has none. `notes` are about the file.
     """
 
     engine: str
@@ -83,16 +73,6 @@ class FileAnswer:
     error: float = 0.0
     readers: dict[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-
-
-OUTCOMES = {
-    "right": "the engine has the body of the file, or warns of or refuses one that no engine has to load",
-    "wrong": "it has another body",
-    "refused": "it refuses a valid file",
-    "crashed": "it ended, or took too long",
-    "accepted": "it loads a body that cannot exist without a word",
-    "undecided": "the readers disagree, there is one reader only, or the file leaves it open",
-}
 
 
 def _all(change: Callable[[Link], dict[str, Any]]) -> Mistake:
@@ -202,12 +182,9 @@ def accelerations(part: Piece, cases: Array) -> Array:
 
 def make_cases(part: Piece) -> Array:
     """Return generic rates, velocities, forces and torques (n, 2, 6) for a body, so that all terms are of one order."""
-    rng, size = np.random.default_rng(2026), np.sqrt(abs(np.trace(part.inertia) / part.mass)) or 1.0
-    w, force, torque = (
-        rng.normal(size=(3, CASES, 3))
-        * RATE
-        * np.array((1, part.mass * size * RATE, part.mass * size**2 * RATE))[:, None, None]
-    )
+    size = np.sqrt(abs(np.trace(part.inertia) / part.mass)) or 1.0
+    units = RATE * np.array((1, part.mass * size * RATE, part.mass * size**2 * RATE))
+    w, force, torque = np.random.default_rng(2026).normal(size=(3, CASES, 3)) * units[:, None, None]
     force[::2] = torque[::2] = 0
     return np.hstack([-np.cross(w, part.com), w, force, torque + np.cross(part.com, force)]).reshape(-1, 2, 6)
 
@@ -308,28 +285,25 @@ def judge_body(model: Model, engine: str, seen: Piece | str, tolerance: float, p
 
     Nothing is said against an engine if the readers disagree, there is one only, or the file leaves something open.
     """
-    wanted, flaw = model.truth, model.flaw
-    far = errors(wanted, seen) if isinstance(seen, Piece) else dict.fromkeys(QUANTITIES, np.inf)
+    wanted, flaw, body = model.truth, model.flaw, seen if isinstance(seen, Piece) else None
+    far = errors(wanted, body) if body else dict.fromkeys(QUANTITIES, np.inf)
     if wanted.excess and not flaw:  # within the rounding of its moments
         far["inertia"] -= wanted.rounding / np.abs(wanted.inertia).max()
     differs = [name for name, error in far.items() if not error < tolerance]
-    doubt, has = model.doubt(engine, differs), seen if isinstance(seen, str) else f"it has {describe(seen)}"
-    doubt = doubt or (DIGITS if wanted.excess and prints and not flaw else "")
+    doubt = model.doubt(engine, differs) or (DIGITS if wanted.excess and prints and not flaw else "")
+    has = f"it has {describe(body)}" if body else f"{seen}"
+    changes = f"(file and engine): {', '.join(differing(wanted, body, tolerance))}" if body else ""
     if not differs and not (flaw or model.disagree or model.invalid):
         return "right", ""
-    if isinstance(seen, Piece) and (asked := model.asked_for(engine, seen, tolerance)):
+    if body and (asked := model.asked_for(engine, body, tolerance)):
         return "right", f"as the file asks: {asked}"
     if doubt and not (flaw and not differs):
         return "undecided", f"{doubt}; {has}{prints}"
     if flaw:
-        changes = ", ".join(differing(wanted, seen, tolerance)) if isinstance(seen, Piece) and not seen.flaw else ""
-        said = f"{flaw}, and it changes that (file and engine): {changes}" if changes else f"{flaw}; {has}"
-        told = prints and not (differs and isinstance(seen, Piece) and seen.flaw)
-        return "right" if told else "accepted", f"{said}{prints or ', without a word'}"
-    words = explain(model, seen, tolerance) if isinstance(seen, Piece) else has
-    words = (
-        words or f"no known mistake explains the difference (file and engine): {', '.join(differing(wanted, seen, tolerance))}"
-    )
+        broken = body and body.flaw
+        said = f"{flaw}, and it changes that {changes}" if body and not broken else f"{flaw}; {has}"
+        return "right" if prints and not (differs and broken) else "accepted", f"{said}{prints or ', without a word'}"
+    words = (explain(model, body, tolerance) or f"no known mistake explains the difference {changes}") if body else has
     return ("undecided", f"{model.lonely}; {words}{prints}") if model.lonely else ("wrong", f"{words}{prints}")
 
 
@@ -340,7 +314,7 @@ def find_warning(output: str, names: Sequence[str]) -> str:
     """
     for name in sorted(names, key=len, reverse=True):
         output = output.replace(name, "...") if _ABOUT_MASS.search(name) else output
-    output = re.sub(r"\x1b?\[[\d;]*m", "", output)  # colours
+    output = re.sub(r"\x1b?\[[\d;]*m|\[\d{4}-\d\d-\d\d [\d:.]+\] ", "", output)  # colours and times
     said = next(filter(_ABOUT_MASS.search, re.split(r"(?<=[.])\s", output)), "")
     return f" (it prints: {said.strip()[:200]})" if said else ""
 
@@ -462,18 +436,14 @@ class Program:
         return result
 
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:
-        if not self.formats:
-            given = {"engine": self.engine, "path": path, "kind": kind, "cases": cases}
-            try:
-                return self.worker.ask("call", adapter=self._adapter, function="probe", **given)
-            except EngineError as error:  # at the first step
-                return {"refused": error.reason}
-        if kind not in self.formats:
+        if self.formats and kind not in self.formats:
             raise NotImplementedError
         given = {"adapter": self._adapter, "path": path, "kind": kind}
         try:
+            if not self.formats:
+                return self.worker.ask("call", **given, engine=self.engine, function="probe", cases=cases)
             result = self.worker.ask("load", **given, velocities=cases[:, 0], forces=cases[:, 1])
-        except EngineError as error:
+        except EngineError as error:  # also at the first step
             return {"refused": error.reason}
         try:
             measured = np.asarray(result["accelerations"], float)

@@ -74,6 +74,7 @@ def _compile_mujoco(path, kind):
         spec.worldbody.first_body().add_freejoint()
     option, flags = spec.option, mujoco.mjtDisableBit
     option.gravity, option.wind, option.density, option.viscosity = [0, 0, 0], [0, 0, 0], 0, 0
+    option.integrator = 0  # none is needed, and MJX does not have all
     forces = ("CONTACT", "CONSTRAINT", "PASSIVE", "SPRING", "DAMPER", "ACTUATION")  # some only in some versions
     option.disableflags = sum(int(getattr(flags, f"mjDSBL_{name}", 0)) for name in forces)
     for joint in spec.joints:

@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
+from conservative.errors import BadInput
 
 from ..engine import load
 from .files import inline, load_mesh, refuse
@@ -40,7 +41,7 @@ def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any, list[
     try:
         spec = mujoco.MjSpec.from_string(tostring(inline(path, search)[0]).decode())
     except (ValueError, mujoco.FatalError) as error:
-        raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo reads") from None
+        raise _refuse(path, error, "reads") from None
     spec.modelfiledir = str(path.parent)
     aligned = 0
     for each in (spec.compiler, *spec.joints):  # the same body in other axes
@@ -48,6 +49,11 @@ def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any, list[
             aligned |= int(getattr(each, name)) == 1
             setattr(each, name, 0)
     return mujoco, spec, ["the axes of the body are its principal axes by an option of the file"] * aligned
+
+
+def _refuse(path: Path, error: Exception, does: str) -> BadInput:
+    words = " ".join(str(error).removeprefix("Error: ").split())
+    return refuse(path, f"an error ({words})", f"a file that MuJoCo {does}")
 
 
 def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
@@ -61,7 +67,7 @@ def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
         try:
             model = spec.compile()
         except (ValueError, mujoco.FatalError) as error:
-            raise refuse(path, f"an error ({' '.join(str(error).split())})", "a file that MuJoCo compiles") from None
+            raise _refuse(path, error, "compiles") from None
     reading.notes.extend(f"MuJoCo warns: {each.message}" for each in said)
     if model.njnt > (model.nq == 7):
         raise refuse(path, f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
@@ -126,8 +132,10 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
         return links + [each for child in body.bodies for each in read(child, pose @ _pose(child, options))]
 
     links = read(spec.worldbody.bodies[0], np.eye(4))
-    wanted = options.settotalmass / (join_links(links).mass or 1.0) if options.settotalmass > 0 else 1.0
-    return [replace(link, mass=wanted * link.mass, inertia=wanted * link.inertia) for link in links]
+    if options.settotalmass > 0:
+        factor = options.settotalmass / join_links(links).mass
+        return [replace(k, mass=factor * k.mass, inertia=factor * k.inertia, geometry=k.geometry.scale(factor)) for k in links]
+    return links
 
 
 def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequence[Path]) -> list[Array]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Table, filled
 
 if TYPE_CHECKING:
@@ -63,10 +65,9 @@ def _readings(answer: FileAnswer) -> list[str]:
 
 
 def _body(part: dict[str, Any] | str) -> str:
-    """Return mass, kg, centre of mass, m, and the six numbers of the inertia, kg m^2, as text."""
-    from conservative.references.importers.pieces import list_numbers
+    from conservative.references.importers.compare import describe
+    from conservative.references.importers.pieces import Piece
 
     if isinstance(part, str):
         return part[:120]
-    inertia = [part["inertia"][i][j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    return "{} kg at {}; {}".format(*map(list_numbers, (part["mass"], part["com"], inertia)))
+    return describe(Piece(part["mass"], np.array(part["com"]), np.array(part["inertia"])))
