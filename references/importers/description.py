@@ -76,6 +76,11 @@ SINCE = {
 """Versions of SDF from which on an element has such an attribute or child."""
 
 
+def is_true(text: str | None) -> bool:
+    """Return whether a truth value of XML is true."""
+    return (text or "").strip().lower() in ("true", "1")
+
+
 def version_of(text: str) -> tuple[int, ...]:
     """Return a version such as "1.11" as numbers. Raise `Unread`."""
     if not re.fullmatch(r"\d+(\.\d+)*", text):
@@ -157,7 +162,7 @@ class Description:
             if not any(values[3:]):
                 raise Unread(f"the quaternion 0 0 0 0 of {name!r}")
             return make_pose(values[:3], Rotation.from_quat(values[3:]))
-        unit = math.pi / 180 if element.get("degrees") in ("true", "1") else 1.0
+        unit = math.pi / 180 if is_true(element.get("degrees")) else 1.0
         return make_pose(values[:3], Rotation.from_euler("xyz", unit * np.array(values[3:])))
 
     def weigh(self, element: Any, place: Array, density: float = DENSITY) -> list[Piece]:
@@ -182,7 +187,7 @@ class Description:
         """Return a link with its mass and inertia. In URDF all values are required; in SDF the defaults are 1 and 0."""
         element, link = self.elements[name], Link(self.place(name), name=name)
         inertial = element.find("inertial")
-        auto = not self.urdf and inertial is not None and inertial.get("auto") in ("true", "1")
+        auto = not self.urdf and inertial is not None and is_true(inertial.get("auto"))
         try:
             forms = []
             for each in element.findall("collision"):

@@ -74,7 +74,9 @@ def body_from_file(path: str | PathLike[str], name: str, kind: str) -> MassDistr
         allowed = "one that a joint turns" + (": " + ", ".join(sorted(able)) if able else "; this file has none")
         raise BadInput("name", f"{name!r}, which no joint turns", allowed)
     part = model.truth
-    if wrong := model.disagree or model.flaw or "; ".join(model.invalid):
+    if model.flaw:
+        raise BadInput("name", f"{name!r}: {model.flaw}", "a link with a mass and an inertia that a body can have")
+    if wrong := model.disagree or "; ".join(model.invalid):
         raise BadInput("name", f"{name!r}: {wrong}", "a body that the file describes in one way")
     lever = part.com - _fixed_point(model)
     return MassDistribution(part.mass, lever, part.inertia)

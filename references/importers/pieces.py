@@ -169,16 +169,9 @@ def list_numbers(values: Any, unit: float = 0.0) -> str:
 class Reading:
     """What this package reads of a file: its links, the root first, and what has to be said about the file.
 
-    Attributes
-    ----------
-    notes
-        What is not read because it does not matter, or because no rule of the format covers it.
-    doubts
-        Why another body than that of `links` may be right, too. No engine is called wrong against them.
-    invalid
-        How the file breaks the rules of its format. An engine that refuses it is right.
-    asks
-        Options of the file for one engine that may change the body, by the engine's name: texts by the name of the option.
+    `notes` name what is not read because it does not matter. `doubts` say why another body may be right, too: no engine is
+    called wrong against them. `invalid` says how the file breaks the rules of its format, so that an engine may refuse it.
+    `asks` has options of the file for one engine that may change the body, as texts by the engine and the option.
     """
 
     links: list[Link] = field(default_factory=list)

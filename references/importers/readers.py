@@ -99,7 +99,8 @@ class Model(Reading):
     def lonely(self) -> str:
         """Why there is one reader only; "" if there are two."""
         if self.own and not self.reader:
-            return "no reference reader is installed"
+            how = {"sdf": "conservative engines install drake"}.get(self.kind, "pip install pin")
+            return f"no reference reader is installed ({how})"
         return "" if self.own else f"{OWN} does not read the file ({self.own_refuses})"
 
     def _asks(self, engine: str) -> dict[str, str]:

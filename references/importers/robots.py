@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .description import EXTENSIONS, Description
+from .description import EXTENSIONS, Description, is_true
 from .files import Unread, find, inline, parse, refuse
 from .mjcf import parse_mjcf
 
@@ -87,7 +87,7 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     links = {each.get("name", ""): each for each in model.findall("link")}
     parents, moving = _tree(path, frames, links)
     groups = group(path, list(links), parents)
-    held = model.findtext("static") in ("true", "1")
+    held = is_true(model.findtext("static"))
     if urdf or held:  # links without inertia are frames, or scenery
         full = {name for name, link in links.items() if (inertial := link.find("inertial")) is not None and len(inertial)}
         groups = {name: members for name, members in groups.items() if full.intersection(members)}
@@ -145,7 +145,7 @@ def _copy(path: Path, model: Any, frames: Description, members: Sequence[str], s
             copy.remove(each)
     for link in copy.findall("link"):
         inertial = link.find("inertial")
-        auto = inertial is not None and inertial.get("auto") in ("true", "1")
+        auto = inertial is not None and is_true(inertial.get("auto"))
         for each in [*link.findall("visual"), *link.findall("collision")]:
             mesh = each.find("geometry/mesh")
             if each.tag == "visual" or (mesh is not None and not auto):
@@ -188,10 +188,14 @@ def _write(folder: Path, made: Any, path: Path) -> Path:
     """Write a model into a folder of its own, with the name of the file and the usual suffix. Return the path."""
     from lxml import etree
 
-    suffix = {"robot": "urdf", "mujoco": "xml", "sdf": "sdf"}[made.tag]
+    place = _place_for(folder, path, {"robot": "urdf", "mujoco": "xml", "sdf": "sdf"}[made.tag])
+    place.write_bytes(etree.tostring(made))
+    return place
+
+
+def _place_for(folder: Path, path: Path, suffix: str) -> Path:
     place = folder / str(len(list(folder.iterdir()))) / f"{path.stem}.{suffix}"
     place.parent.mkdir()
-    place.write_bytes(etree.tostring(made))
     return place
 
 
@@ -319,8 +323,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
                 prim.RemoveAPI(physics.RigidBodyAPI)
             elif prim:
                 prim.SetActive(False)
-        place = folder / str(len(list(folder.iterdir())))
-        place.mkdir()
-        copy.GetRootLayer().Export(str(place / f"{path.stem}.usda"))
-        bodies.append(Body(name, place / f"{path.stem}.usda", [FREE.format(repr(name))], pivots[name]))
+        place = _place_for(folder, path, "usda")
+        copy.GetRootLayer().Export(str(place))
+        bodies.append(Body(name, place, [FREE.format(repr(name))], pivots[name]))
     return bodies

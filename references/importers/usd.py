@@ -63,6 +63,8 @@ class Stage:
         self.bodies = [prim for prim, api in apis if api.GetRigidBodyEnabledAttr().Get() is not False]
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self.joints = [prim for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get() is not False]
+        children = [each for prim in self.joints for each in UsdPhysics.Joint(prim).GetBody1Rel().GetTargets()]
+        self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are those of the root
 
     def pose(self, prim: Any) -> tuple[Array, Array]:
         """Return the pose (4, 4) of a prim, m, and its linear map (3, 3) in these axes, the scale. A body has no shear."""

@@ -535,6 +535,14 @@ def test_instances_in_a_usd_file_are_read(read):
     assert model.truth.mass == pytest.approx(1000, rel=1e-6)
 
 
+def test_axes_are_those_of_the_root_of_fixed_bodies(read):
+    """1 kg at 0.2 m and 2 kg at 0 have their centre at 0.2/3 from the root, wherever the root is in the file."""
+    text = placed("arm", 1, 0.2) + usd_joint("Fixed", "j", "b", "arm") + usda(MASS.format(2) + cube()).partition(")\n")[2]
+    (model,) = read("a.usda", "#usda 1.0\n(\n metersPerUnit = 1\n kilogramsPerUnit = 1\n)\n" + text)
+    assert model.body.name == "/b"
+    np.testing.assert_allclose(body_of([model]).com, [0.2 / 3, 0, 0], atol=1e-6)
+
+
 @pytest.mark.engine("brax")
 def test_armature_damping_and_fluids_do_not_count_against_brax():
     path = CATALOGUE / "joints_and_fluids.xml"
