@@ -256,13 +256,11 @@ def read_xml(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
         raise refuse(path, f"{len(models)} models, or one within another", "one model without includes")
     model = Description(path, models[0], search, reading)
     model.look(root)
-    free, fixed = list[str](), [joint.child for joint in model.joints if joint.kind == "fixed"]
+    fixed = [joint.child for joint in model.joints if joint.kind == "fixed"]
     for joint in model.joints:
-        if model.urdf and joint.kind == "floating" and model.elements[joint.parent].find("inertial") is None:
-            free.append(joint.parent)
-        elif joint.kind != "fixed" or joint.parent == "world":
+        if joint.kind != "fixed" or joint.parent == "world":
             raise refuse(path, f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
-    links = [model.link(each.get("name", "")) for each in models[0].findall("link") if each.get("name") not in free]
+    links = [model.link(each.get("name", "")) for each in models[0].findall("link")]
     roots = [link for link in links if link.name not in fixed]
     if len(roots) != 1:
         raise refuse(path, f"{len(roots)} root links", ONE)

@@ -99,9 +99,8 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
         except Unread as error:
             missing[str(error)] = None
     meshes = ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1))
-    # a floating joint from a link without inertia is how URDF writes a free body
-    free = urdf and len(groups) == 1 and all(each.kind == "floating" for each in frames.joints if each.child in moving)
-    alone = (free or (set(groups) == {next(iter(links), "")} and not moving)) and not (several or held or elsewhere or meshes)
+    one = set(groups) == {next(iter(links), "")} and not moving  # not on a floating joint: engines then have a massless root
+    alone = one and not (several or held or elsewhere or meshes)
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
     bodies: Bodies = []
     for name, members in groups.items():

@@ -641,6 +641,7 @@ def test_every_link_of_a_robot_is_a_free_body_with_what_is_fixed_to_it(read, nam
 
 HELD = {
     "world.urdf": urdf(more='<link name="world"/>' + joint("fixed", "world", "a")),
+    "floating.urdf": urdf(more='<link name="world"/>' + joint("floating", "world", "a")),
     "held.xml": mjcf(
         '<inertial pos="0 0 0" mass="2" diaginertia="0.02 0.03 0.04"/>', '<worldbody><geom size="1"/></worldbody>'
     ),
