@@ -361,10 +361,10 @@ class Program:
         """Return the answer of the engine for a body of a file."""
         answer = partial(FileAnswer, self.label, model.label, readers=model.readings(), notes=model.notes)
         kind, words, seen, measured = self._measure(model, cases := make_cases(model.truth))
+        bare = replace(model, body=replace(model.body, path=model.body.bare, bare=None)) if model.body.bare else None
         if kind == "refused":
             outcome, words = judge_refusal(model, self.engine, words)
-            if outcome == "refused" and model.body.bare:
-                bare = replace(model, body=replace(model.body, path=model.body.bare, bare=None))
+            if outcome == "refused" and bare:
                 again = self.check(bare)
                 loads = again.outcome not in ("refused", "crashed")
                 outcome, words = ("undecided", f"{BARE}, and refuses the file: {words}") if loads else ("refused", again.words)
@@ -378,6 +378,8 @@ class Program:
         why = why if measured.any() else HELD
         prints = find_warning(words, names)
         outcome, words = judge_body(model, self.engine, why if seen is None else seen, self.tolerance, prints)
+        if seen is None and outcome == "wrong" and bare:  # the file may have a floor that the body touches
+            return self.check(bare)
         if seen is None:
             noise = outcome == "wrong" and why == NO_BODY and self.single
             return answer("undecided", f"{words}, in single precision") if noise else answer(outcome, words)

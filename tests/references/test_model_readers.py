@@ -515,6 +515,13 @@ def test_what_is_beside_the_mass_is_no_reason_to_call_an_engine_a_refuser(read, 
     program._load = lambda model, cases: answer | {"refused": "no"}
     assert program.check(model).outcome == "refused"
 
+    def touch(model, cases):
+        floor = np.sin(cases[:, 0]) * ("<trans" in model.path.read_text())
+        return answer | {"refused": "", "accelerations": accelerations(model.truth, cases) + floor}
+
+    program._load = touch
+    assert program.check(model).outcome == "right"  # without the floor that it touches
+
 
 OPEN = {
     "axes.xml": mjcf('<freejoint align="true"/><geom size="0.1" pos="1 2 3"/>'),
