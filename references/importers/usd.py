@@ -168,6 +168,9 @@ def _compute(stage: Stage, body: Any) -> Piece:
     mass, moments, com, q = api(body).ComputeMassProperties(weigh_collider)
     if failed:
         raise failed[0]
+    axes = body.GetAttribute("physics:principalAxes")
+    if stage.authored(body)[3] is not None and not (axes and axes.HasAuthoredValue()):
+        q = None  # usd-core returns memory that it has not written
     return Piece(mass * stage.kilogram, stage.metre * np.array(com, float), stage.tensor(moments, q))
 
 

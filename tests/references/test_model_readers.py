@@ -27,6 +27,7 @@ from conservative.references.importers.compare import (
 from conservative.references.importers.pieces import Piece, distance, weigh
 from conservative.references.importers.readers import Model, read_files, read_here
 from conservative.references.importers.robots import Body
+from conservative.references.importers.usd import reference_usd
 from conservative.reports.cli.main import main
 
 pytest.importorskip("lxml")
@@ -276,6 +277,17 @@ def test_usd_by_hand(read, name):
     """usd-core has single precision: measured up to 2e-7."""
     text, wanted = USD[name]
     assert distance(wanted, body_of(read("b.usda", text))) < 1e-6
+
+
+def test_axes_that_usd_core_does_not_write_are_not_read(tmp_path, monkeypatch):
+    """Its quaternion is any memory if the file has moments and no axes."""
+    from pxr import Gf, UsdPhysics
+
+    text, wanted = USD["a scaled body"]
+    (tmp_path / "b.usda").write_text(text)
+    answer = (2.0, Gf.Vec3f(0.1, 0.2, 0.25), Gf.Vec3f(0.6, 0, 0), Gf.Quatf(1, 2, 3, 4))
+    monkeypatch.setattr(UsdPhysics.RigidBodyAPI, "ComputeMassProperties", lambda *_: answer)
+    assert distance(wanted, reference_usd(tmp_path / "b.usda")) < 1e-6
 
 
 def test_usd_leaves_open_whether_inertia_moves_to_another_centre_of_mass(read):
