@@ -102,9 +102,9 @@ def test_random_rows_have_no_diagnosis(name):
 
 
 def test_a_method_is_named_up_to_where_it_diverges():
-    """Errors relative to the last rates, which are 100 times the first ones here, would be 0 in the rows that tell the method."""
+    """The first rows tell the method, and their errors are small beside the last rates."""
     name = "semi-implicit Euler with an explicit gyroscopic term"
     scene = FREE.rename("fast", w_WB_B0=[14.0, -22.0, 32.0])
-    R, w = stepped(scene, name, 1, np.arange(60) * 0.02)
-    assert np.linalg.norm(w, axis=1).max() > 10 * np.linalg.norm(w[0])
-    assert diagnosed(scene, R, w, np.arange(60) * 0.02).name.startswith(name)
+    R, w = stepped(scene, name, 1, np.arange(40) * 0.02)
+    assert np.linalg.norm(w, axis=1).max() > 3 * np.linalg.norm(w[0])
+    assert diagnosed(scene, R, w, np.arange(40) * 0.02).name.startswith(name)
