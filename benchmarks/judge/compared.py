@@ -175,7 +175,7 @@ class Compared:
                 p, now = q, new
                 if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
                     break
-            if free and now @ now > k * HOPELESS**2:
+            if free and now @ now > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
                 break  # no start explains these rows, so none explains more
         R, w = self.evaluate(motion, p[None])
         return p[:6], p[6:], (R[0], w[0])

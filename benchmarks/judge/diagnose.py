@@ -263,14 +263,14 @@ def _fits(case: Compared, _: bool) -> Iterator[Explanation]:
             return case.equations(scene, term, damping=p[:, 0] * case.scale).solve(case.start, R, w, case.t[:n])
 
         yield attempt(case, name, text, motion, [0.0], lambda p: {"damping": float(p[0]) * case.scale})
-    if not case.free and case.start == case.t[0]:
+    if case.start == case.t[0]:
         have = [*range(3)] * (case.data[0] is not None) + [*range(3, 6)] * (case.data[1] is not None)
         rest = replace(case.take(slice(1, None)), free=tuple(have))
         if len(rest.t) > 3:
             initial, _extra, fitted = rest.fit(exact(rest), np.empty(0), np.empty(0))
             names = [f"start_{kind}_{i}" for kind in ("turn", "rate") for i in (1, 2, 3)]
             text = "The first row does not fit the others: the motion starts at another attitude or other rates"
-            found = explain(rest, "first row", text, fitted, {names[i]: float(initial[i]) for i in have})
+            found = explain(replace(rest, free=()), "first row", text, fitted, {names[i]: float(initial[i]) for i in have})
             yield replace(found, numbers=len(have), explains=found.explains and found.size < 100)
     moments = fit_moments(case)
     yield replace(moments, sentence=f"It is the motion of another body. {moments.sentence}. Correct --body")
