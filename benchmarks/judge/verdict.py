@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.attitude import Array, from_quaternion, hat, to_quaternion
 from conservative.errors import BadInput
 from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
@@ -151,7 +151,7 @@ def _compare(case: Compared, recording: Recording, from_row: bool) -> _Compariso
         undecided = f"Rows after {case.t[-1] + shift:g} s are not compared: no closed form is known. A shorter file decides"
     parts, missing, alone = _stretches(case, from_row)
     errors = np.concatenate([part.error for part in parts], axis=1)
-    passed = all(part.passes(part.error) for part in parts)
+    passed = all(part.passes(part.error) and not _late(part) for part in parts)
     whole = len(parts) == 1 and len(errors[0]) == len(case.t)
     if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
@@ -162,6 +162,20 @@ def _compare(case: Compared, recording: Recording, from_row: bool) -> _Compariso
         passed = passed and bad is None
         outliers = outliers or ([] if bad is None else [bad])
     return _Comparison(case, parts, errors, worst, compared, alone, passed, outliers, undecided or missing, shape, shift)
+
+
+def _late(case: Compared) -> bool:
+    """Return whether errors that pass as noise lie along the motion, as those of times do: noise has all directions."""
+    (R, w), n = case.exact, len(case.t)
+    if n < 14 or (case.noise * SIGMAS <= 0.5 * case.allowed).all():
+        return False
+    turned = (R @ hat(w)).reshape(n, 9) / np.sqrt(2) * (case.data[0] is not None)
+    moved = np.gradient(w, case.t, axis=0) / case.scale * (case.data[1] is not None)
+    weights = 1 / np.repeat(case.noise, [9, 3])
+    v, d = np.hstack([turned, moved]) * weights, case.differences(R, w) * weights
+    v = v / (np.linalg.norm(v, axis=1, keepdims=True) + 1e-300)
+    varied = np.linalg.eigvalsh(v.T @ v / n)[-1] < 0.9  # of a motion in one direction nothing can be told
+    return bool(varied and ((d * v).sum(axis=1) ** 2).sum() > 0.8 * (d * d).sum())
 
 
 def _largest(t: Array, shape: Array | None) -> tuple[float, float]:
