@@ -2,7 +2,7 @@
 
 No right file is called wrong, no wrong file right, and no diagnosis that is called proven is false. Of the mistakes that are
 identifiable 99 of 100 are named. `pytest` judges 60 files, `pytest --attack` 1,000, and writes the tables of the page
-`reports/documentation/planted_files.md`. An attack that was interrupted goes on where it was, unless the code has changed. By hand:
+`reports/documentation/planted_files.md`. An interrupted attack goes on where it was, unless the code has changed. By hand:
 
     python -m tests.attack.test_recordings results.jsonl 0 1000
 """

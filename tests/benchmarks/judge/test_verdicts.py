@@ -266,3 +266,15 @@ def test_our_own_samples_of_every_scene_are_right_whole_and_without_their_start(
     made = cv.integrate(scene, scene.dt, cv.Taylor())
     for k in (0, len(made.t) // 3):
         assert verdict(made.t[k:], made.R_WB[k:], made.w_WB_B[k:], scene)["verdict"] == "right"  # measured: at most 2e-10
+
+
+def test_times_that_jitter_are_no_noise():
+    """Errors of times lie along the motion. Noise of the same size has all directions, and is right."""
+    random = np.random.default_rng(4)
+    at = np.append(0.0, T[1:] + 0.004 * np.clip(random.normal(size=len(T) - 1), -2, 2))
+    R_late, w_late = free_body(SCENE.body, np.eye(3), W0, at)
+    found = verdict(T, R_late, w_late)
+    assert (found["verdict"], found["diagnosis"].name) == ("wrong", "jittered times")
+    assert max(found["diagnosis"].left) < 1e-8  # measured: 4e-14
+    turned = R @ Rotation.from_rotvec(0.005 * random.normal(size=(len(T), 3))).as_matrix()
+    assert verdict(T, turned, W + 0.005 * random.normal(size=W.shape))["verdict"] == "right"
