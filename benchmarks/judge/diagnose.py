@@ -17,7 +17,7 @@ from conservative.needs import Need
 
 from . import mistakes
 from .compared import FLOOR, LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
-from .explanation import Explanation, attempt, explain
+from .explanation import PROVEN, Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
 from .motion import Equations, closed, truth
 from .steps import PARTS, STEPS_AT_MOST, find_steps
@@ -64,6 +64,8 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share))
+    if all(each.rest > PROVEN for each in tried if each.explains):  # an error that noise hides says little about its cause
+        tried = [replace(each, explains=False) for each in tried]
     explaining = [each for each in tried if each.explains]
     if not explaining:
         notes = [f"The search ended after {LIMIT:g} s."] * (monotonic() > case.limit)

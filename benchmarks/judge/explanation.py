@@ -13,7 +13,7 @@ from conservative.attitude import Array
 
 from .compared import HOPELESS, Compared, Solution
 
-PROVEN = 0.2  # of the error, that an explanation may leave: an error that noise hides says little about its cause
+HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Explanation:
     `left` and `plain` are the largest errors with it and without it, over the rows that it was tried on: of attitudes, rad, and
     of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
     units of the noise, and `explains` is True if what is left is noise. `numbers` are those that were fitted, and `made` is the
-    motion (n, 3, 3), (n, 3), None for another reading of the file.
+    motion (n, 3, 3), (n, 3), None for another reading of the file. `rest` is the share of the root of the mean square.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Explanation:
     explains: bool = False
     numbers: int = 0
     made: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
+    rest: float = 0.0
 
 
 def explain(
@@ -53,7 +54,7 @@ def explain(
     """
     of, plain = read or case, case.plain.max(axis=1)
     error = of.errors(*made)
-    share = float(error.max() / max(plain.max(), 1e-15))
+    share, rest = float(error.max() / max(plain.max(), 1e-15)), of.size(error) / max(case.size(case.plain), 1e-15)
     return Explanation(
         name,
         text.format(**values),
@@ -62,9 +63,10 @@ def explain(
         plain.tolist(),
         share,
         of.size(error),
-        of.passes(error) and of.size(error) < PROVEN * case.size(case.plain),
+        of.passes(error) and rest < HALF,
         len(values) if numbers is None else numbers,
         made if read is None else None,
+        rest,
     )
 
 
