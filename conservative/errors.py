@@ -222,7 +222,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "ensembles": ("zarr",),
         "parquet": ("pyarrow",),
         "video": ("matplotlib", "imageio_ffmpeg"),
-        "models": ("pxr", "trimesh", "lxml"),
+        "models": ("pxr", "trimesh", "lxml", "cloudpickle"),
         "cluster": ("distributed", "cloudpickle"),
         "docs": ("sphinx", "myst_nb", "furo", "sphinx_click"),
         "gate": ("pytest", "pytest_benchmark", "heyoka"),

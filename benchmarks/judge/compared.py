@@ -20,6 +20,7 @@ from .motion import Equations, States, closed, truth
 FLOOR = 1e-9  # errors that round-off makes in double precision
 SIGMAS = 7.0  # of noise, that the largest error may have
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
+HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
 LINEAR = 0.3  # rad, differences of motions that are taken as small
 PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
@@ -39,7 +40,8 @@ class Compared:
     `allowed` and `noise` (2,) are errors of attitudes, rad, and rates, relative to `scale`, rad/s. `free` says which of six
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. A search ends at the
-    time `limit`, s, of the monotonic clock.
+    time `limit`, s, of the monotonic clock. `rounded` are the errors that digits make; with an allowed error of the user, which
+    alone decides, it is that.
     """
 
     scene: Scene
@@ -53,6 +55,7 @@ class Compared:
     growth: float = 1e6
     stride: int = 1
     limit: float = math.inf
+    rounded: tuple[float, float] = (0.0, 0.0)
 
     def take(self, rows: Any) -> Compared:
         """Return some of the rows."""
@@ -66,6 +69,12 @@ class Compared:
         """Return the case of other attitudes and rates, from the first row on."""
         changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None and self.start == self.t[0]}
         return replace(self, scene=self.scene.rename(self.scene.name, **changes), data=(R, w))
+
+    def rescale(self, scale: float) -> Compared:
+        """Return the rows with rates relative to another scale, rad/s. Round-off in double precision is relative to a row."""
+        factors = np.array([1.0, self.scale / scale])
+        allowed = np.where(self.allowed <= FLOOR, FLOOR, self.allowed * factors)
+        return replace(self, scale=scale, allowed=allowed, noise=np.where(self.noise <= 1e-13, 1e-13, self.noise * factors))
 
     @cached_property
     def exact(self) -> tuple[Array, Array]:
@@ -96,7 +105,7 @@ class Compared:
             out[..., :9] = (R - self.data[0]).reshape(*w.shape[:-1], 9) / np.sqrt(2)
         if self.data[1] is not None:
             out[..., 9:] = (w - self.data[1]) / self.scale
-        return np.clip(np.nan_to_num(out, nan=1e3), -1e3, 1e3)
+        return np.clip(np.nan_to_num(out, nan=HUGE), -HUGE, HUGE)
 
     def errors(self, R: Array, w: Array) -> Array:
         """Return the sizes (2, n) of differences: angles between attitudes, rad, and differences of rates."""
@@ -109,7 +118,7 @@ class Compared:
         """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
         n = error.shape[1]
         mean = np.sqrt((error**2).mean(axis=1))
-        noisy = self.noise * SIGMAS > 0.5 * self.allowed
+        noisy = (self.noise * SIGMAS > 0.5 * self.allowed) & (self.rounded < self.allowed)
         most = np.where(noisy, 1.3 * np.sqrt(3) * (1 + 3 / np.sqrt(n)) * self.noise, self.allowed)
         return bool((error.max(axis=1) <= self.allowed).all() and (mean <= most).all())
 

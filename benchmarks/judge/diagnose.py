@@ -16,7 +16,7 @@ from conservative.attitude import Array
 from conservative.needs import Need
 
 from . import mistakes
-from .compared import FLOOR, LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
+from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
 from .explanation import PROVEN, Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
 from .motion import Equations, closed, truth
@@ -83,14 +83,11 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
 def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
-    if w is None or not case.scale > 3 * largest > 0:
+    size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
+    if not size.max() > 3 * largest > 0:
         return case
-    size = np.linalg.norm(w, axis=1)
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
-    scale = float(size[: len(case.t)].max())
-    factors = np.array([1.0, case.scale / scale])
-    allowed = np.where(case.allowed <= FLOOR, FLOOR, case.allowed * factors)
-    return replace(case, scale=scale, allowed=allowed, noise=np.maximum(case.noise * factors, 1e-13))
+    return case.rescale(float(size[: len(case.t)].max()))
 
 
 def _separate(case: Compared, named: list[Explanation]) -> list[str]:

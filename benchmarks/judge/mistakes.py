@@ -206,21 +206,40 @@ def _tableau(
 
 
 def _turned_tableau(
-    f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], A: Sequence[Sequence[float]], b: Sequence[float]
+    f: Slope,
+    t: Any,
+    y: Array,
+    h: float,
+    past: Sequence[Array],
+    A: Sequence[Sequence[float]],
+    b: Sequence[float],
+    corrected: bool,
 ) -> Array:
-    """Return the state of a Runge-Kutta method whose stages and step turn the body by sums of rates, as MuJoCo's RK4 does."""
-    slopes, rates = list[Array](), list[Array]()
+    """Return the state of a Runge-Kutta method whose stages turn the body by sums of rates, or of those of rotation vectors."""
+    slopes, turns = list[Array](), list[Array]()
 
-    def state(weights: Sequence[float]) -> Array:
+    def state(weights: Sequence[float]) -> tuple[Array, Array]:
         new = y + h * sum((a * k for a, k in zip(weights, slopes, strict=True)), np.zeros_like(y))
-        new[:4] = _rotate(y[:4], h * sum((a * w for a, w in zip(weights, rates, strict=True)), np.zeros_like(y[4:])))
-        return new
+        turn = h * sum((a * w for a, w in zip(weights, turns, strict=True)), np.zeros_like(y[4:]))
+        new[:4] = _rotate(y[:4], turn)
+        return new, turn
 
     for row in ((), *A):
-        stage, at = state(row), t + h * sum(row)
+        (stage, turn), at = state(row), t + h * sum(row)
         slopes.append(f(at, stage))
-        rates.append(f.rates(at, stage))
-    return state(b)
+        w = f.rates(at, stage)
+        turns.append(_vector_rates(turn, w) if corrected else w)
+    return state(b)[0]
+
+
+def _vector_rates(turn: Array, w: Array) -> Array:
+    """Return the derivatives of rotation vectors (3, ...) for rates in body axes."""
+    angle = np.sqrt((turn * turn).sum(axis=0))
+    small = angle < 1e-2
+    half = np.where(small, 1.0, angle / 2)
+    factor = np.where(small, 1 / 12 + angle**2 / 720, (1 - half / np.tan(half)) / np.where(small, 1.0, angle**2))
+    across = cross(turn, w)
+    return w + across / 2 + factor * cross(turn, across)
 
 
 def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: float) -> Array:
@@ -346,9 +365,12 @@ STEPS: dict[str, Step] = {
     "RK3 (Heun)": Step(3, 0, partial(_tableau, A=((1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))),
     "RK3 (SSP)": Step(3, 0, partial(_tableau, A=((1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))),
     "RK4": Step(4, 0, partial(_tableau, A=RK4[0], b=RK4[1])),
-    f"the explicit midpoint rule (RK2){TURNED}": Step(2, 0, partial(_turned_tableau, A=((0.5,),), b=(0.0, 1.0))),
-    f"Heun's method{TURNED}": Step(2, 0, partial(_turned_tableau, A=((1.0,),), b=(0.5, 0.5))),
-    f"RK4{TURNED}": Step(2, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1])),
+    f"the explicit midpoint rule (RK2){TURNED}": Step(
+        2, 0, partial(_turned_tableau, A=((0.5,),), b=(0.0, 1.0), corrected=False)
+    ),
+    f"Heun's method{TURNED}": Step(2, 0, partial(_turned_tableau, A=((1.0,),), b=(0.5, 0.5), corrected=False)),
+    f"RK4{TURNED}": Step(2, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=False)),
+    "RK4 on rotation vectors (Munthe-Kaas)": Step(4, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=True)),
 }
 
 

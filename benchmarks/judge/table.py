@@ -283,7 +283,9 @@ def _quantum(values: Array) -> float:
             break
     else:
         unit[:] = 0.0
-    if (np.abs(x.astype(np.float32) - x) <= unit / 2 + near).all():  # single precision, also if printed with nine digits
+    with np.errstate(over="ignore"):
+        single = x.astype(np.float32)
+    if (np.abs(single - x) <= unit / 2 + near).all():  # single precision, also if printed with nine digits
         half = max(half, largest * 2.0**-24)
     return max(half, largest * 2.0**-53)
 
@@ -684,7 +686,9 @@ def _hint(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layout: Lay
     groups: dict[str, list[str]] = {}
     for name in rest:
         groups.setdefault(re.sub(r"[xyz0-9]", "*", _split(name)[0]), []).append(name)
-    likely = sorted((group for group in groups.values() if len(group) == 3), key=lambda group: "g" not in group[0].lower())
+    likely = sorted(
+        (sorted(group) for group in groups.values() if len(group) == 3), key=lambda group: "g" not in group[0].lower()
+    )
     if all(name.isdigit() for name in names):
         return "the columns by number, such as --columns time=1,w=2:3:4 --units rad, or time=1,q=2:3:4:5"
     w = [name for name in names if name in chosen.get("rates", ())] or [*(likely or [rest])[0], "X", "Y", "Z"][:3]

@@ -167,7 +167,7 @@ def _compare(case: Compared, recording: Recording, from_row: bool) -> _Compariso
 def _late(case: Compared) -> bool:
     """Return whether errors that pass as noise lie along the motion, as those of times do: noise has all directions."""
     (R, w), n = case.exact, len(case.t)
-    if n < 14 or (case.noise * SIGMAS <= 0.5 * case.allowed).all():
+    if n < 14 or (case.error.max(axis=1) <= np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))).all():
         return False
     turned = (R @ hat(w)).reshape(n, 9) / np.sqrt(2) * (case.data[0] is not None)
     moved = np.gradient(w, case.t, axis=0) / case.scale * (case.data[1] is not None)
@@ -237,13 +237,29 @@ def _read(scene: Scene, recording: Recording, from_row: bool, error: float | Non
         notes.append(f"The first row is compared with the motion of the scene at {first:g} s.")
     chunk = next(recording.stream())
     noise, resolved = estimate_noise(chunk[0][:ROWS_OF_NOISE], take_rows(chunk[1], slice(0, ROWS_OF_NOISE)))
-    scale = float(np.linalg.norm(scene.w_WB_B0[None] if w is None else w, axis=1).max())
+    if from_row:
+        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None}
+        if len(changes) == 1 and timed and 0 < first <= scene.t_end:
+            Rs, ws = truth(scene, 0.0, np.array([0.0, first]))
+            changes = {"R_WB0": Rs[1], "w_WB_B0": ws[1]} | changes
+        scene = scene.rename(scene.name, **changes)
+    start = float(t[0]) if from_row else 0.0
+    rates = np.linalg.norm(scene.w_WB_B0[None] if w is None else w, axis=1)
+    scale = largest = float(rates.max())
+    if largest > 10 * np.linalg.norm(scene.w_WB_B0) > 0:  # a motion that diverges is compared at the scale of the exact one
+        scale = min(largest, float(np.linalg.norm(np.vstack([truth(scene, start, t)[1], scene.w_WB_B0]), axis=1).max()))
     if scale == 0 and w is None and R is not None:
         turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
         scale = float((np.linalg.norm(turned, axis=1) / np.diff(t)).max())
     scale = scale or 1.0
     time, *digits = recording.digits
-    acceleration = 0.0 if w is None else float((np.linalg.norm(np.diff(w, axis=0), axis=1) / np.diff(t)).max())
+    acceleration = (
+        0.0
+        if w is None
+        else float((np.linalg.norm(np.diff(w, axis=0), axis=1) / np.diff(t))[rates[1:] <= 10 * scale].max(initial=0.0))
+    )
+    if digits[1] <= 2.0**-52 * largest:  # double precision is relative to each row
+        digits[1] = min(digits[1], 2.0**-53 * scale)
     rounded = np.array([digits[0] + time * scale, (digits[1] + time * acceleration) / scale])
     noise = np.where(resolved & (noise / np.array([1, scale]) <= MOST_NOISE), noise / np.array([1, scale]), 0.0)
     allowed = np.maximum(FLOOR, np.maximum(UNITS_OF_DIGITS * rounded, SIGMAS * noise))
@@ -252,14 +268,16 @@ def _read(scene: Scene, recording: Recording, from_row: bool, error: float | Non
     inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any())
     free = [*range(3)] * (R is not None) + [*range(3, 6)] * (w is not None)
     case = Compared(
-        scene, t, recording.data, float(t[0]) if from_row else 0.0, scale, allowed, noise_of_fit, tuple(free) if inexact else ()
+        scene,
+        t,
+        recording.data,
+        start,
+        scale,
+        allowed,
+        noise_of_fit,
+        tuple(free) if inexact else (),
+        rounded=tuple((rounded if error is None else allowed).tolist()),
     )
-    if from_row:
-        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None}
-        if len(changes) == 1 and timed and 0 < first <= scene.t_end:
-            Rs, ws = truth(scene, 0.0, np.array([0.0, first]))
-            changes = {"R_WB0": Rs[1], "w_WB_B0": ws[1]} | changes
-        case = replace(case, scene=scene.rename(scene.name, **changes))
     if not recording.order_known and R is not None:
         other = case.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
         case, order = min((case, "wxyz"), (other, "xyzw"), key=lambda each: float(each[0].error.mean()))

@@ -65,6 +65,10 @@ class Slope:
         self.gyroscopic, self.field = np.array([[each.gyroscopic, each.field] for each in equations]).T[:, :, None]
         self.fixed = None if equations[0].fixed is None else np.array([each.fixed for each in equations], dtype=float)
 
+    def rates(self, t: Any, y: Array) -> Array:
+        """Return the rates (3, n) of states, in their units."""
+        return y[4:]
+
     def __call__(self, t: Any, y: Array) -> Array:
         q, w, t = y[:4], (y[4:] / self.unit).T, t * self.unit
         R = from_quaternion((q / np.sqrt((q * q).sum(axis=0))).T)

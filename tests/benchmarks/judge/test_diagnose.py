@@ -108,3 +108,15 @@ def test_a_method_is_named_up_to_where_it_diverges():
     R, w = stepped(scene, name, 1, np.arange(40) * 0.02)
     assert np.linalg.norm(w, axis=1).max() > 3 * np.linalg.norm(w[0])
     assert diagnosed(scene, R, w, np.arange(40) * 0.02).name.startswith(name)
+
+
+@pytest.mark.parametrize(
+    ("engine", "expected"),
+    [
+        ("mujoco:RK4", "RK4 on rotation vectors (Munthe-Kaas)"),
+        ("mujoco:Euler", "semi-implicit Euler with an explicit gyroscopic term and the exponential map"),
+    ],
+)
+def test_the_integrators_of_mujoco_are_named(engine, expected):
+    trajectory = registry.method(engine).solve(HEAVY, cv.Grid(0.05, 120))
+    assert diagnosed(HEAVY, trajectory.R_WB, trajectory.w_WB_B, trajectory.t).name == expected
