@@ -669,7 +669,7 @@ def _given(path: Path, names: list[str], text: str) -> dict[str, list[str]]:
 
 
 def _understood(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layout: Layout) -> str:
-    """Return what each column was understood as."""
+    """Return the meaning found for each column."""
     kinds = {name: kind for kind, members in chosen.items() for name in members}
     return "; ".join(f"{name}: {kinds.get(name) or layout.unused.get(name) or 'not known'}" for name in names)[:600]
 

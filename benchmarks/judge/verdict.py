@@ -193,7 +193,7 @@ def _single_rows(found: _Comparison) -> Explanation:
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
-    """Return what would decide about errors that a mistake or something harmless could have made; "" if they are wrong."""
+    """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
     single = max(recording.digits[1:]) > 1e-9
     if errors.max() <= (1e-4 if single else ACCURATE) and errors.max() > case.allowed.min():
         return (

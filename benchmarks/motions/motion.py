@@ -51,7 +51,7 @@ class Motion:
 
     @property
     def needs(self) -> list[str]:
-        """What a program has to have besides free rotation."""
+        """The parts that a program needs besides free rotation."""
         return sorted({kind for key, kind in KINDS.items() if getattr(self, key) is not None})
 
     @property
@@ -89,7 +89,7 @@ class Motion:
 
 
 SAMPLE = ("R_WB", "quaternion_wxyz", "w_WB_B", "w_WB_W", "energy", "momentum_W")
-"""What is known of a sample, in SI units."""
+"""The quantities of a sample, in SI units."""
 
 
 def load() -> list[Motion]:

@@ -237,7 +237,7 @@ MISTAKES: dict[str, Mistake] = {
     ),
     "smallest moments": Mistake("Moments below 1e-6 kg m^2 are replaced by it", partial(_of_scene, _coarse)),
 }  # fmt: skip
-"""What a failing program may have done, by name."""
+"""The mistakes that are compared with a failing program, by name."""
 
 
 class Measured(NamedTuple):

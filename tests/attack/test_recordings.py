@@ -46,7 +46,7 @@ FALSE = ("right called wrong", "wrong called right", "false proof")
 
 
 def outcome(seed, folder):
-    """Return what was planted in the file of a seed, what the judge says, and its complaint."""
+    """Return the planted mistake, the answer of the judge, and the complaint about it, for the file of a seed."""
     diagnose.LIMIT = 600.0  # s, so that the answers do not depend on the load of the machine
     began = time.process_time()
     made = plant(seed)
@@ -67,7 +67,7 @@ def outcome(seed, folder):
 
 
 def complaint(row):
-    """Return what is wrong about the answer to a file, or ""."""
+    """Return the complaint about the answer to a file, or ""."""
     true = {row["mistake"], *row["same"]}
     if row["expected"] == "right" and row["verdict"] == "wrong":
         return "right called wrong"

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 
 import numpy as np
 import pytest
@@ -278,3 +279,49 @@ def test_times_that_jitter_are_no_noise():
     assert max(found["diagnosis"].left) < 1e-8  # measured: 4e-14
     turned = R @ Rotation.from_rotvec(0.005 * random.normal(size=(len(T), 3))).as_matrix()
     assert verdict(T, turned, W + 0.005 * random.normal(size=W.shape))["verdict"] == "right"
+
+
+def test_a_quaternion_that_is_not_of_norm_1_is_found_between_the_rows_that_are_kept(tmp_path):
+    """Of 9,001 rows every fourth is kept for fits. Attitudes of any norm are repaired, so only the norm is wrong."""
+    t = np.linspace(0, 10, 9001)
+    q = Rotation.from_matrix(free_body(SCENE.body, np.eye(3), W0, t)[0]).as_quat(scalar_first=True)
+    q[5001] *= 1.1
+    np.savetxt(tmp_path / "run.csv", np.column_stack([t, q]), "%.17g", ",", header="t,q_w,q_x,q_y,q_z", comments="")
+    found = judge(SCENE, read(tmp_path / "run.csv", Options()))[0]
+    assert (found["verdict"], found["diagnosis"]) == ("wrong", None)
+    assert f"{t[5001]:g} s" in found["shape"]
+
+
+NOISE = 1e-3 * np.linalg.norm(W, axis=1).max()
+
+
+def notes_on_moments(scene, w):
+    found = verdict(T, None, w + NOISE * np.random.default_rng(2).normal(size=w.shape), scene)
+    return found["verdict"], [note for note in found["notes"] if "moments" in note], found["diagnosis"]
+
+
+def ratios(sentence):
+    """The ratios and their intervals."""
+    return np.array(re.findall(r"([\d.]+) ± ([\d.e-]+)", sentence), dtype=float).T
+
+
+def test_a_noisy_recording_has_the_ratios_of_moments_that_fit_it():
+    right, (note,), _ = notes_on_moments(SCENE, W)
+    found, off = ratios(note)
+    assert right == "right"
+    assert (np.abs(found - [3, 3.5]) <= 2 * off).all()  # measured: 0.6 and 0.8 of an interval
+    assert (off < 0.05).all()  # measured: 0.003 and 0.003
+    other = SCENE.rename("other", body=cv.RigidBody([2e-3, 6e-3, 6.5e-3]))
+    wrong, notes, diagnosis = notes_on_moments(other, W)
+    assert (wrong, notes, diagnosis.name) == ("wrong", [], "other moments")
+    found, off = ratios(diagnosis.sentence.partition("(of the body")[0])
+    assert (np.abs(found - [3, 3.5]) <= 2 * off).all()
+    rotor = SCENE.rename("rotor", body=cv.RigidBody(J, [1e-5, 0, 0]))
+    assert notes_on_moments(rotor, W)[1] == []  # a motion with a rotor depends on more than ratios
+
+
+def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_permit_it():
+    jitter = 1e-3 * np.random.default_rng(3).normal(size=len(T))
+    moved, rates = free_body(SCENE.body, np.eye(3), W0, np.maximum(T + np.append(0, jitter[1:]), 0))
+    assert verdict(T, moved, rates)["verdict"] == "wrong"
+    assert verdict(T, moved, rates, error=0.05)["verdict"] == "right"  # measured: an error of 0.006
