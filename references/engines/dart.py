@@ -9,7 +9,7 @@ World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://da
 
 import numpy as np
 
-from .shared import stepped
+from .shared import halves, stepped, way_of
 
 ENGINE = {
     "package": "dartpy",
@@ -17,6 +17,7 @@ ENGINE = {
     "oldest": "6.19",
     "title": "semi-implicit Euler",
     "fields": ("UniformGravity",),
+    "ways": ("frame", "child", "world", "time"),
     "card": {
         "as_installed": ("",),
         "usual_dt": 0.001,
@@ -33,7 +34,13 @@ def prepare(given):
     world.setTimeStep(given.dt)
     skeleton = dart.dynamics.Skeleton("skeleton")
     joint, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
-    body.setInertia(dart.dynamics.Inertia(given.mass, given.com, given.inertia_com))
+    parts = [body, *(skeleton.createWeldJointAndBodyNodePair(body)[1] for _ in halves(given)[1:])]
+    for part, (mass, inertia) in zip(parts, halves(given), strict=True):
+        part.setInertia(dart.dynamics.Inertia(mass, given.com, inertia))
+    if way_of(given) == "world":
+        far = dart.dynamics.Skeleton("far")
+        far.createFreeJointAndBodyNodePair()
+        world.addSkeleton(far)
     world.addSkeleton(skeleton)
     if given.free:
         place = dart.math.Isometry3()
@@ -41,12 +48,17 @@ def prepare(given):
         joint.setPositions(dart.dynamics.FreeJoint.convertToPositions(place))
     else:
         joint.setPositions(dart.dynamics.BallJoint.convertToPositions(given.R0))
-    joint.setVelocities(np.concatenate([given.w0, np.zeros(3 * given.free)]))  # spatial velocity in body axes
+    if given.free:  # its coordinates are no rates in body axes unless the attitude is the identity
+        joint.setRelativeSpatialVelocity(np.concatenate([given.w0, np.zeros(3)]), body)
+    else:
+        joint.setVelocities(given.w0)
     start = joint.getPositions().copy(), joint.getVelocities().copy()
     inertial = dart.dynamics.Frame.World()
 
     def begin():
         world.reset()
+        if way_of(given) == "time":
+            world.setTime(1000.0)
         joint.setPositions(start[0])
         joint.setVelocities(start[1])
 

@@ -28,7 +28,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from .shared import FIELDS, field_torque, pack_field
+from .shared import FIELDS, field_torque, halves, pack_field, way_of, write_urdf
 
 ENGINE = {
     "package": "drake",
@@ -42,6 +42,7 @@ ENGINE = {
     },
     "tolerance": "accuracy",
     "fields": FIELDS,
+    "ways": ("frame", "offset", "file", "child", "world", "time"),
     "card": {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
         "suite": ("discrete", "runge_kutta5"),
@@ -61,13 +62,14 @@ def prepare(given):
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
     start = _start(drake, plant, body, inner, given)
-    times = given.steps * given.dt
+    begin = 1000.0 if way_of(given) == "time" else 0.0
+    times = begin + given.steps * given.dt
 
     def run():
         R, (w, p, v) = np.full((len(times), 3, 3), np.nan), np.full((3, len(times), 3), np.nan)
         reason = ""
         try:
-            context.SetTime(0.0)
+            context.SetTime(begin)
             start()
             simulator.Initialize()
             for sample, time in enumerate(times.tolist()):
@@ -110,9 +112,15 @@ def _build(drake, given):
     discrete = given.integrator == "discrete"
     builder = drake.DiagramBuilder()
     plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
-    inertia = drake.RotationalInertia(xx, yy, zz, xy, xz, yz)
-    body = plant.AddRigidBody("body", drake.SpatialInertia.MakeFromCentralInertia(given.mass, given.com, inertia))
+    if way_of(given) == "world":
+        plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(3.0, 2.0))
+    if way_of(given) == "file":
+        drake.Parser(plant).AddModelsFromString(write_urdf(given), "urdf")
+        body = plant.GetBodyByName("body")
+    else:
+        body, *child = (_add_body(drake, plant, given, *part, name) for part, name in zip(halves(given), ("body", "child")))  # noqa: B905
+        if child:
+            plant.WeldFrames(body.body_frame(), child[0].body_frame())
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -given.gravity])
     if not given.free:
         plant.AddJoint(drake.BallRpyJoint("support", plant.world_frame(), body.body_frame()))
@@ -129,6 +137,12 @@ def _build(drake, given):
     if not discrete:
         _choose(drake, simulator, given)
     return plant, body, simulator
+
+
+def _add_body(drake, plant, given, mass, inertia, name):
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tolist()
+    rotational = drake.RotationalInertia(xx, yy, zz, xy, xz, yz)
+    return plant.AddRigidBody(name, drake.SpatialInertia.MakeFromCentralInertia(mass, given.com, rotational))
 
 
 def _field_system(drake, field):

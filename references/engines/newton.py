@@ -27,7 +27,7 @@ from functools import partial
 
 import numpy as np
 
-from .shared import record_warp
+from .shared import halves, record_warp, way_of, write_urdf
 
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
@@ -41,6 +41,7 @@ ENGINE = {
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,
     "precision": "f32",
+    "ways": ("frame", "file", "child", "world"),
     "fields": ("UniformGravity",),
     "free_only": {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
@@ -103,11 +104,15 @@ def prepare(given):
 
 
 def _model(newton, warp, given):
-    builder = newton.ModelBuilder(gravity=(0.0, 0.0, -given.gravity))
+    builder = newton.ModelBuilder()
+    builder.gravity = -given.gravity if isinstance(builder.gravity, float) else (0.0, 0.0, -given.gravity)  # until 1.0
     if given.solver == "Kamino":
         newton.solvers.SolverKamino.register_custom_attributes(builder)
     body = _add_body(builder, warp, given)
     lever = given.R0 @ given.com
+    if way_of(given) == "world":
+        far = warp.transform((1000.0, 200.0, 30.0), (0.0, 0.0, 0.0, 1.0))
+        builder.add_body(xform=far, mass=3.0, inertia=warp.mat33(*(3.0 * np.eye(3)).ravel().tolist()))
     builder.body_qd[body] = warp.spatial_vector(*np.cross(given.w0_W, lever).tolist(), *given.w0_W.tolist())
     if given.solver == "VBD":
         builder.color()
@@ -123,11 +128,19 @@ def _add_body(builder, warp, given):
         "inertia": warp.mat33(*given.inertia_com.ravel().tolist()),
         "mass": given.mass,
     }
-    if given.free:
+    if given.free and way_of(given) == "file":
+        builder.add_urdf(write_urdf(given), floating=True)
+        builder.body_q[0] = options["xform"]
+        return 0
+    if given.free and way_of(given) != "child":
         return builder.add_body(**options)
-    body = builder.add_link(**options)
-    joint = builder.add_joint_ball(-1, body, armature=0.0, friction=0.0, damping=0.0)
-    builder.add_articulation([joint])
+    (mass, inertia), *child = halves(given)
+    body = builder.add_link(**options | {"mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())})
+    joints = [builder.add_joint_free(body) if given.free else builder.add_joint_ball(-1, body, armature=0.0, friction=0.0, damping=0.0)]
+    for mass, inertia in child:
+        part = builder.add_link(**options | {"mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())})
+        joints.append(builder.add_joint_fixed(body, part))
+    builder.add_articulation(joints)
     return body
 
 

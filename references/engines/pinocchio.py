@@ -18,7 +18,7 @@ aba, integrate: https://docs.ros.org/en/kinetic/api/pinocchio/html/
 
 import numpy as np
 
-from .shared import FIELDS, compile_torque, pack_field
+from .shared import FIELDS, compile_torque, halves, pack_field, way_of, write_urdf
 
 ENGINE = {
     "package": "pin",
@@ -27,6 +27,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK4": 4},
     "prefix": "aba+",
     "fields": FIELDS,
+    "ways": ("frame", "offset", "file", "child", "joints"),
     "card": {
         "variants": ("Euler", "RK4"),
         "report": ("",),
@@ -98,9 +99,14 @@ def _march(step, given):
 def _start(given):
     """Return the initial coordinates and velocities: Pinocchio has the scalar last; velocities are in body axes."""
     q, v = np.roll(given.q0, -1), given.w0
-    if hasattr(given, "p_WB0"):
-        return np.concatenate([given.p_WB0, q]), np.concatenate([given.R0.T @ given.v_WB0, v])
+    if _flies(given):
+        p0, v0 = getattr(given, "p_WB0", np.zeros(3)), getattr(given, "v_WB0", np.zeros(3))
+        return np.concatenate([p0, q]), np.concatenate([given.R0.T @ v0, v])
     return q, v
+
+
+def _flies(given):
+    return hasattr(given, "p_WB0") or (given.free and way_of(given) == "joints")
 
 
 def _stepper(pin, given):
@@ -109,11 +115,14 @@ def _stepper(pin, given):
     RK4 is k_i = dt (v, aba) at q exp(u_i), with u_3 and the last u corrected by a commutator. The signs are correct for a group
     that acts from the right, q' = q v, with v in body axes.
     """
-    model = pin.Model()
-    kind = pin.JointModelFreeFlyer() if hasattr(given, "p_WB0") else pin.JointModelSpherical()
-    joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
-    # The inertia about the centre of mass, in the axes of the joint.
-    model.appendBodyToJoint(joint, pin.Inertia(given.mass, given.com, given.inertia_com), pin.SE3.Identity())
+    kind = pin.JointModelFreeFlyer() if _flies(given) else pin.JointModelSpherical()
+    if way_of(given) == "file":
+        model = pin.buildModelFromXML(write_urdf(given), kind)
+    else:
+        model = pin.Model()
+        joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
+        for mass, inertia in halves(given):  # about the centre of mass, in the axes of the joint
+            model.appendBodyToJoint(joint, pin.Inertia(mass, given.com, inertia), pin.SE3.Identity())
     model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
     aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
     field, torque, bracket = pack_field(given), compile_torque(), _cross_motions if model.nv == 6 else _cross

@@ -138,15 +138,43 @@ def mujoco_moments(given):
     return np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
 
 
+def way_of(given):
+    """Return how a body is described, see the pairs of `conservative twins`; "" is the usual way."""
+    return getattr(given, "way", "")
+
+
+def halves(given):
+    """Return the masses and the inertias (3, 3), kg m^2, of the parts of which a body with a fixed child consists; (m,), (J,)."""
+    share = (0.25, 0.75) if way_of(given) == "child" else (1.0,)
+    return [(part * given.mass, part * given.inertia_com) for part in share]
+
+
+def write_urdf(given):
+    """Return the body as a URDF file, which has no joint to the world."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    place = " ".join(map(repr, given.com.tolist()))
+    inertia = f'ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"'
+    inertial = f'<origin xyz="{place}"/><mass value="{float(given.mass)!r}"/><inertia {inertia}/>'
+    return f'<robot name="body"><link name="body"><inertial>{inertial}</inertial></link></robot>'
+
+
 def write_mjcf(given, option="", shape=""):
     """Return the body as an MJCF file, on a free joint or on a ball joint at the fixed point."""
     inertial = {"mass": np.array([given.mass]), "pos": given.com, "quat": given.q_com, "diaginertia": mujoco_moments(given)}
     attributes = " ".join(f'{name}="{" ".join(map(repr, values.tolist()))}"' for name, values in inertial.items())
+    way, kind = way_of(given), "free" if given.free else "ball"
+    zero = 'damping="0" armature="0" frictionloss="0"' if way == "damping" else ""
+    joint = f'<joint type="{kind}" {zero}/>'
+    if way == "joints" and given.free:
+        joint = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")) + '<joint type="ball"/>'
+    inertia = f"<inertial {attributes}/>"
+    inertia = f"<body>{inertia}</body>" if way == "child" else inertia
+    far = '<body pos="1000 200 30"><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="3 4 5"/></body>' if way == "world" else ""
     return f"""
         <mujoco>
           {option}
           <worldbody>
-            <body><joint type="{"free" if given.free else "ball"}"/><inertial {attributes}/>{shape}</body>
+            {far}<body name="body">{joint}{inertia}{shape}</body>
           </worldbody>
         </mujoco>"""
 

@@ -168,10 +168,15 @@ def worker_of(environment: Environment, precision: str = "f64") -> Worker:
     """
     key = environment.folder, precision, os.getpid()
     if key not in _workers:
-        cache = environment.folder / "home" / ".cache" / "jax"
-        jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64")), "JAX_COMPILATION_CACHE_DIR": str(cache)}
-        _workers.setdefault(key, environment.start_worker(jax))  # another thread may have been faster
+        _workers.setdefault(key, new_worker(environment, precision))  # another thread may have been faster
     return _workers[key]
+
+
+def new_worker(environment: Environment, precision: str = "f64") -> Worker:
+    """Return a worker of an environment that nobody else uses."""
+    cache = environment.folder / "home" / ".cache" / "jax"
+    jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64")), "JAX_COMPILATION_CACHE_DIR": str(cache)}
+    return environment.start_worker(jax)
 
 
 def close_environment(folder: Path) -> None:

@@ -95,7 +95,11 @@ def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | No
 
 def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
     """Return the numbers of n scenes of one kind. Those named in `rows` have a row for each scene."""
-    every = [describe(each, grid) for each in axes]
+    return join_numbers([describe(each, grid) for each in axes])
+
+
+def join_numbers(every: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the numbers of a run of n bodies, from those of each."""
     shared = {name: value for name, value in every[0].items() if name in SHARED}
     rows = {name: np.array([each[name] for each in every]) for name in every[0] if name not in SHARED}
     return {**shared, **rows, "rows": list(rows)}

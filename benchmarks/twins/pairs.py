@@ -1,0 +1,215 @@
+"""Pairs: a description of a body and its start, a second description of the same motion, and the map between both.
+
+Symbols: W is the world, F the axes of the description, G those of its twin, whose motion is mapped back to F and W.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, rotation_about, to_quaternion
+from conservative.body import RigidBody
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.scene import Scene
+from conservative.references.engine import principal_axes
+from conservative.references.environments.plain_numbers import describe
+from conservative.grid import Grid
+
+Samples = tuple[Array, Array]
+"""Attitudes (s, 3, 3), F to W, and rates (s, 3), rad/s, axes F."""
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A body, its start and its steps, as an engine is given them.
+
+    Attributes
+    ----------
+    mass, com, inertia
+        Mass, kg; centre of mass (3,), m; inertia (3, 3) about it, kg m^2, axes F.
+    R0, w0
+        Attitude (3, 3), F to W, and rates (3,), rad/s, axes F, at the start.
+    gravity
+        Downward acceleration, m/s^2. Without it the body is free, otherwise it turns about the origin of F.
+    dt, n_steps, every
+        Time step, s; number of steps; steps between samples.
+    sign
+        Sign of the quaternion of `R0`.
+    way
+        How the engine is told about the body; "" is the usual way of its adapter, others are in its `ways`.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+    R0: Array
+    w0: Array
+    gravity: float = 0.0
+    dt: float = 0.01
+    n_steps: int = 100
+    every: int = 50
+    sign: float = 1.0
+    way: str = ""
+
+    @property
+    def grid(self) -> Grid:
+        return Grid(self.dt, self.n_steps, self.every)
+
+    @property
+    def about_origin(self) -> Array:
+        """Inertia (3, 3) about the origin of F, kg m^2: Steiner's theorem."""
+        return self.inertia + self.mass * (self.com @ self.com * np.eye(3) - np.outer(self.com, self.com))
+
+    @property
+    def scene(self) -> Scene:
+        """The same motion as a scene. The attitude of a free body does not depend on its mass and its centre."""
+        field = UniformGravity(self.mass * self.gravity, self.com) if self.gravity else None
+        J = self.about_origin if self.gravity else self.inertia
+        return Scene("twin", RigidBody(J), self.R0, self.w0, self.dt * self.n_steps, field)
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The numbers of a `prepare` request, see PROTOCOL.md."""
+        J, w0_W, x0 = self.about_origin, self.R0 @ self.w0, self.R0 @ self.com
+        principal = np.diag(self.inertia).copy(), np.eye(3)
+        if np.count_nonzero(self.inertia - np.diag(principal[0])):
+            principal = RigidBody(self.inertia).moments, RigidBody(self.inertia).R_BP
+        # Engines that read principal moments about the origin get no numbers for axes that are not principal.
+        moments = np.diag(J).copy() if np.allclose(J, np.diag(np.diag(J)), 0, 1e-9 * J.max()) else np.full(3, np.nan)
+        return {
+            **describe(principal_axes(Scene("twin", RigidBody((1, 1, 1)), np.eye(3), self.w0, 1.0)), self.grid),
+            **{"moments": moments, "inertia_com": self.inertia, "moments_com": principal[0], "q_com": to_quaternion(principal[1])},
+            **{"mass": self.mass, "com": self.com, "q0": self.sign * to_quaternion(self.R0), "R0": self.R0, "w0": self.w0},
+            **{"w0_W": w0_W, "x0": x0, "v0": np.cross(w0_W, x0), "gravity": self.gravity, "free": not self.gravity},
+            **({"way": self.way} if self.way else {}),
+            **({} if self.gravity or not self.com.any() else {"p_WB0": np.zeros(3), "v_WB0": np.zeros(3)}),
+        }
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A kind of second description.
+
+    Attributes
+    ----------
+    name
+        Name of the pair.
+    twin
+        Function that returns the second description.
+    back
+        Function that maps samples of the twin to those of the description; by default they are the same.
+    run
+        How the twin runs: "" by a new model, or one of `machine.RUNS`.
+    exact
+        True if equal arithmetic gives equal bits, so that any other difference is larger than an engine should make.
+    way
+        The way in which the engine must be able to describe a body; a method of this package has only "frame".
+    sizes
+        Factors by which the twin is scaled, each tried; the motion of an engine without thresholds does not change.
+    bodies
+        Names of the bodies that have such twins, in `BODIES`.
+    """
+
+    name: str
+    twin: Callable[..., Description] = lambda one: one
+    back: Callable[..., Samples] = lambda samples, *_: samples
+    run: str = ""
+    exact: bool = False
+    way: str = ""
+    sizes: tuple[float, ...] = ()
+    bodies: tuple[str, ...] = ("body", "top")
+
+
+TURN = rotation_about((0, 0, 1), 2.1)  # about the vertical, so that it does not change the weight
+OTHER = rotation_about((0.3, -0.5, 0.8), 1.3)
+CYCLE = np.roll(np.eye(3), 1, axis=0)
+MIRROR = np.diag((1.0, -1.0, 1.0))
+OFFSET = np.array((0.3, -0.2, 0.5))
+
+
+def reframe(one: Description, R_FG: Array, shift: Array | float = 0.0) -> Description:
+    """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from that of F."""
+    turned = {"com": R_FG.T @ (one.com - shift), "inertia": _symmetric(R_FG.T @ one.inertia @ R_FG)}
+    return replace(one, R0=one.R0 @ R_FG, w0=R_FG.T @ one.w0, **turned)
+
+
+def _symmetric(J: Array) -> Array:
+    return (J + J.T) / 2
+
+
+def _frame_back(R_FG: Array) -> Callable[..., Samples]:
+    return lambda samples, *_: (samples[0] @ R_FG.T, samples[1] @ R_FG.T)
+
+
+def _mirrored(one: Description) -> Description:
+    # Rates are axial vectors: a mirror turns them by -M.
+    mirrored = {"inertia": MIRROR @ one.inertia @ MIRROR, "com": MIRROR @ one.com}
+    return replace(one, R0=MIRROR @ one.R0 @ MIRROR, w0=-MIRROR @ one.w0, **mirrored)
+
+
+def _lengths(one: Description, size: float) -> Description:
+    return replace(one, com=size * one.com, inertia=size**2 * one.inertia, gravity=size * one.gravity)
+
+
+def _masses(one: Description, size: float) -> Description:
+    return replace(one, mass=size * one.mass, inertia=size * one.inertia)
+
+
+def _times(one: Description, size: float) -> Description:
+    return replace(one, w0=one.w0 / size, gravity=one.gravity / size**2, dt=one.dt * size)
+
+
+def _same_times(samples: Samples, size: float) -> Samples:
+    return samples[0], samples[1] * size
+
+
+def _without_moment(one: Description) -> Description:
+    return replace(one, inertia=one.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(one.w0))))
+
+
+OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved")
+"""Ways that are about the inertia."""
+FREE = ("body", "needle", "thin rod")
+"""Names of free bodies that are described in these ways."""
+
+PAIRS = (
+    Pair("run again", run="again", exact=True),
+    Pair("built again", exact=True),
+    Pair("in a new process", run="process", exact=True),
+    Pair("reset after another motion", run="reset", exact=True),
+    Pair("saved and continued", run="continued"),
+    Pair("n calls of one step", lambda one: replace(one, every=1), run="thinned"),
+    Pair("body 3 of 7", run="3 of 7"),
+    Pair("body 40 of 64", run="40 of 64"),
+    Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, way="quaternion"),
+    Pair("turned world", lambda one: replace(one, R0=TURN @ one.R0), lambda samples, *_: (TURN.T @ samples[0], samples[1])),
+    Pair("permuted axes", lambda one: reframe(one, CYCLE), _frame_back(CYCLE)),
+    Pair("mirrored", _mirrored, lambda samples, *_: (MIRROR @ samples[0] @ MIRROR, -samples[1] @ MIRROR)),
+    Pair("length x 2^k", _lengths, exact=True, sizes=(2.0**-14, 2.0**14)),
+    Pair("length x 10^k", _lengths, sizes=(1e-4, 1e4)),
+    Pair("mass x 2^k", _masses, exact=True, sizes=(2.0**-30, 2.0**30)),
+    Pair("mass x 10^k", _masses, sizes=(1e-9, 1e9)),
+    Pair("time x 2^k", _times, _same_times, exact=True, sizes=(2.0**-14, 2.0**14)),
+    Pair("time x 10^k", _times, _same_times, sizes=(1e-4, 1e4)),
+    Pair("another body frame", lambda one: reframe(one, OTHER), _frame_back(OTHER), way="frame", bodies=(*FREE, "top")),
+    Pair("offset frame", lambda one: reframe(one, np.eye(3), OFFSET), way="offset", bodies=FREE),
+    Pair("moment of 0 about the axis of rotation", _without_moment, way="zero", bodies=("rod about its axis",)),
+    *(
+        Pair(name, lambda one, way=way: replace(one, way=way), way=way, bodies=(*FREE, "top") if way in OF_INERTIA else ("body", "top"))
+        for way, name in {
+            "file": "set by a file",
+            "setter": "set by setters",
+            "child": "inertia on a fixed child",
+            "joints": "other joints",
+            "world": "beside a far body",
+            "time": "another initial time",
+            "damping": "damping of 0 written",
+            "saved": "model saved and loaded",
+            "accelerator": "on an accelerator",
+        }.items()
+    ),
+)
