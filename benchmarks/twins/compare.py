@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from conservative.attitude import Array, angle_between, rotation_about
-from conservative.errors import IntegrationFailed, MissingEngine
+from conservative.attitude import angle_between, rotation_about
+from conservative.errors import IntegrationFailed
 from conservative.method import Method
-
 from conservative.references.worker.client import EngineError
 
 from .machine import Machine, NotAvailable, machine_of, run
@@ -53,14 +52,15 @@ class Twins:
     outcome
         "same bits", "equal", "same limit" (the difference goes away with the step: two schemes of one body), "differs",
         "refused" (with a message), "lost" (the motions of both end early), "not available", "unsupported" or "crashed".
+        Only "differs" and "crashed" are faults: see `wrong`.
     difference, allowed
         Largest difference of attitudes, rad, or of rates, relative; and the largest one that rounding explains.
     detail
-        Why a pair is not available; how a body moves that differs.
+        Why a pair is not available; how the reduced twin moves.
     threshold
-        Sentence about the size from which on the motions differ, "" without one.
-    twin, first
-        The pair that differs, reduced.
+        From which size on the motions differ; "" without one.
+    first, size
+        The description of a pair that differs, reduced, and the factor of its twin.
     """
 
     engine: str
@@ -85,7 +85,7 @@ class Twins:
 
 
 def difference(one: Samples, other: Samples) -> float:
-    """Return the largest angle between two motions, rad, or difference of rates relative to the largest rate; inf if not finite."""
+    """Return the largest angle between two motions, rad, or difference of rates over the largest rate; inf if not finite."""
     if len(one[0]) != len(other[0]):  # only the ends are the same times
         one, other = ((R[[0, -1]], w[[0, -1]]) for R, w in (one, other))
     scale = float(np.abs(one[1]).max()) or 1.0
@@ -169,7 +169,8 @@ def _apart(engine: Engine, pair: Pair, one: Description, size: float | None) -> 
     except IntegrationFailed as failure:
         return LOST if lost else Apart(math.inf, allowed, str(failure), size)
     if lost or not _kept(twin, raw):
-        return Apart(math.inf, allowed, "one of both motions is lost", size) if lost == _kept(twin, raw) else LOST
+        only = "the first motion is lost, and not that of the twin" if lost else "the motion of the twin is lost"
+        return Apart(math.inf, allowed, only, size) if lost == _kept(twin, raw) else LOST
     apart = difference(samples, pair.back(raw, *scale))
     if allowed < apart and pair.way in OF_INERTIA:
         allowed = max(allowed, engine.rounding(twin, raw))
@@ -183,39 +184,67 @@ def _finer(one: Description, times: int) -> Description:
 def compare(engine: Engine, name: str, body: str, pair: Pair, one: Description) -> Twins:
     """Return whether a body and its twin move equally in an engine."""
     told = partial(Twins, name, body, pair.name)
-    machine = engine.machine
-    if pair.way and not machine.has(pair.way):
+    if pair.way and not engine.machine.has(pair.way):
         return told("not available", detail="the adapter has no such way")
-    if reason := machine.unsupported(one):
+    if reason := engine.machine.unsupported(one):
         return told("unsupported", detail=reason)
     try:
         results = [_apart(engine, pair, one, size) for size in (pair.sizes or (None,))]
-    except NotAvailable as reason:
-        return told("not available", detail=str(reason))
-    except EngineError as refusal:  # its process goes on
-        return told("refused", detail=refusal.reason)
-    except IntegrationFailed as failure:
-        return told("crashed", detail=str(failure))
+    except NotAvailable as refusal:
+        return told("not available", detail=str(refusal))
+    except IntegrationFailed as failure:  # after an `EngineError` its process goes on
+        ended = "refused" if isinstance(failure, EngineError) else "crashed"
+        return told(ended, detail=getattr(failure, "reason", str(failure)))
     worst = max(results, key=lambda each: -1.0 if math.isnan(each.value) else each.value / (each.allowed or 1e-300))
-    if math.isnan(worst.value):
-        return told("lost")
     told = partial(told, difference=worst.value, allowed=worst.allowed)
-    if not worst.wrong:
-        return told("same bits" if worst.value == 0 else "equal")
-    wrong = partial(_differs, engine, pair, size=worst.size)
-    threshold = "" if worst.size is None else _threshold(pair, one, worst.size, wrong)
-    if (pair.sizes or not pair.exact) and not machine.adaptive and math.isfinite(worst.value):
-        with suppress(NotAvailable):
-            finer = _apart(engine, pair, _finer(one, 4), worst.size).value
-            if finer < worst.value / 2:
-                return told("same limit", detail=f"{finer:.1e} with a quarter of the step", threshold=threshold)
-    return told("differs", detail=worst.failure, threshold=threshold, first=_shrink(one, wrong), size=worst.size)
+    if worst.wrong:
+        return _explain(engine, pair, one, worst, told)
+    return told("lost" if math.isnan(worst.value) else "equal" if worst.value else "same bits")
 
 
-def _differs(engine: Engine, pair: Pair, one: Description, size: float | None) -> bool:
+def _explain(engine: Engine, pair: Pair, one: Description, apart: Apart, told: Callable[..., Twins]) -> Twins:
+    """Return the result of a pair that differs: from which size on, whether it does so with shorter steps, and the simplest."""
+    lost, size = math.isinf(apart.value), apart.size
+
+    def wrong(each: Description, size: float | None = size) -> bool:
+        with suppress(NotAvailable, IntegrationFailed):
+            seen = _apart(engine, pair, each, size)
+            return math.isinf(seen.value) if lost else seen.wrong
+        return False
+
+    def stays(each: Description) -> bool:  # with shorter steps
+        if lost or (pair.exact and not pair.sizes) or engine.machine.adaptive:
+            return True
+        with suppress(NotAvailable, IntegrationFailed):
+            coarse, fine = (_apart(engine, pair, some, size).value for some in (each, _finer(each, 4)))
+            return not fine < coarse / 2
+        return True
+
+    threshold = "" if size is None else _threshold(pair, one, size, wrong)
+    if not stays(one):
+        return told("same limit", detail="the difference falls with the step", threshold=threshold)
+    first = _shrink(one, lambda each: wrong(each) and stays(each))
+    detail = apart.failure or _words(engine, pair, first, size)
+    return told("differs", detail=detail, threshold=threshold, first=first, size=size)
+
+
+def _words(engine: Engine, pair: Pair, one: Description, size: float | None) -> str:
+    """Return how the reduced twin moves."""
+    scale = () if size is None else (size,)
     with suppress(NotAvailable, IntegrationFailed):
-        return _apart(engine, pair, one, size).wrong
-    return False
+        model, samples, _ = engine.first(one)
+        (R, w), after = pair.back(run(engine.machine, one, pair.twin(one, *scale), pair.run, model), *scale), _steps(one)
+        rates = [np.array2string(each[-1], precision=3, suppress_small=True) for each in (samples[1], w)]
+        if not angle_between(R[0], R[-1]) and angle_between(samples[0][0], samples[0][-1]):
+            return f"after {after} the twin has not turned; its rates are {rates[1]}, not {rates[0]} rad/s"
+        return (
+            f"after {after} {float(angle_between(samples[0][-1], R[-1])):.2g} rad apart, rates {rates[0]} and {rates[1]} rad/s"
+        )
+    return "one of both motions is lost"
+
+
+def _steps(one: Description) -> str:
+    return f"{one.n_steps} steps" if one.n_steps > 1 else "one step"
 
 
 def _threshold(pair: Pair, one: Description, size: float, wrong: Callable[[Description], bool]) -> str:
@@ -224,6 +253,8 @@ def _threshold(pair: Pair, one: Description, size: float, wrong: Callable[[Descr
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
         good, bad = (good, middle) if wrong(one, size=math.exp(middle)) else (middle, bad)
+    if abs(bad) < 2 * abs(math.log(size)) / 2**HALVINGS:
+        return "in all other units"
     at, up = pair.twin(one, math.exp(bad)), size > 1
     speed = f", a speed of {np.linalg.norm(np.cross(at.w0, at.com)):.2g} m/s" * bool(one.com.any())
     if pair.name.startswith("time"):
@@ -245,27 +276,36 @@ SIMPLER: tuple[Callable[[Description], Description], ...] = (
 
 
 def _shrink(one: Description, wrong: Callable[[Description], bool]) -> Description:
-    """Return the simplest body with the fewest steps that still differs."""
-    n_steps = one.n_steps
-    for count in (1, 2, 5, 10, 20, 50, 100, 1000):
-        if count >= n_steps:
-            break
-        shorter = replace(one, n_steps=count, every=count)
-        if wrong(shorter):
-            one = shorter
-            break
+    """Return the simplest body with the fewest steps, to 1 %, that still differs."""
+    few, enough = 0, one.n_steps
+    while enough - few > max(1, few // 100):
+        count = (few + enough) // 2 if few else max(1, enough // 8)
+        if wrong(replace(one, n_steps=count, every=count)):
+            enough = count
+        else:
+            few = count
+    if enough < one.n_steps:
+        one = replace(one, n_steps=enough, every=enough)
     for simpler in SIMPLER:
         if wrong(candidate := simpler(one)):
             one = candidate
     return one
 
 
-def twins_of(method: Method, tell: Callable[[str], object] = lambda _: None) -> Iterator[Twins]:
-    """Yield the result of every pair of every body, for one engine. Raise `MissingEngine`."""
+def count_twins(pairs: Sequence[Pair] = PAIRS) -> int:
+    """Return the number of results for one engine."""
+    return sum(len(pair.bodies) for pair in pairs)
+
+
+def twins_of(method: Method, tell: Callable[[str], object] = lambda _: None, pairs: Sequence[Pair] = PAIRS) -> Iterator[Twins]:
+    """Yield the result of every pair of every body, for one engine. `tell` is called with each before it runs.
+
+    Raise `MissingEngine`.
+    """
     with machine_of(method).closing() as machine:
         engine = Engine(machine)
         for body, one in BODIES.items():
-            for pair in PAIRS:
+            for pair in pairs:
                 if body not in pair.bodies:
                     continue
                 tell(f"{method.name}: {body}, {pair.name}")

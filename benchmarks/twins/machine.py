@@ -137,7 +137,9 @@ class EngineMachine(Machine):
     def many(self, bodies: Sequence[Description], number: int) -> Samples:
         if self.method not in self.method.settings_for("many"):
             raise NotAvailable("many bodies at once")
-        R, w = self._ask(join_numbers([each.numbers for each in bodies]), (len(bodies), bodies[0].grid.n_samples), self._worker)()
+        R, w = self._ask(
+            join_numbers([each.numbers for each in bodies]), (len(bodies), bodies[0].grid.n_samples), self._worker
+        )()
         return R[number], w[number]
 
     def apart(self, one: Description) -> Samples:

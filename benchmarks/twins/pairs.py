@@ -13,12 +13,14 @@ import numpy as np
 
 from conservative.attitude import Array, rotation_about, to_quaternion
 from conservative.body import RigidBody
+from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
-from conservative.scene import Scene
 from conservative.references.engine import principal_axes
 from conservative.references.environments.plain_numbers import describe
-from conservative.grid import Grid
+from conservative.scene import Scene
 
+HEAVY = "body", "top"
+"""Names of a free body and of one about a fixed point, with all pairs that are not about the inertia."""
 Samples = tuple[Array, Array]
 """Attitudes (s, 3, 3), F to W, and rates (s, 3), rad/s, axes F."""
 
@@ -82,7 +84,12 @@ class Description:
         moments = np.diag(J).copy() if np.allclose(J, np.diag(np.diag(J)), 0, 1e-9 * J.max()) else np.full(3, np.nan)
         return {
             **describe(principal_axes(Scene("twin", RigidBody((1, 1, 1)), np.eye(3), self.w0, 1.0)), self.grid),
-            **{"moments": moments, "inertia_com": self.inertia, "moments_com": principal[0], "q_com": to_quaternion(principal[1])},
+            **{
+                "moments": moments,
+                "inertia_com": self.inertia,
+                "moments_com": principal[0],
+                "q_com": to_quaternion(principal[1]),
+            },
             **{"mass": self.mass, "com": self.com, "q0": self.sign * to_quaternion(self.R0), "R0": self.R0, "w0": self.w0},
             **{"w0_W": w0_W, "x0": x0, "v0": np.cross(w0_W, x0), "gravity": self.gravity, "free": not self.gravity},
             **({"way": self.way} if self.way else {}),
@@ -110,6 +117,8 @@ class Pair:
         The way in which the engine must be able to describe a body; a method of this package has only "frame".
     sizes
         Factors by which the twin is scaled, each tried; the motion of an engine without thresholds does not change.
+    said
+        How the second motion is related to the first, a sentence.
     bodies
         Names of the bodies that have such twins, in `BODIES`.
     """
@@ -121,7 +130,8 @@ class Pair:
     exact: bool = False
     way: str = ""
     sizes: tuple[float, ...] = ()
-    bodies: tuple[str, ...] = ("body", "top")
+    said: str = "Both motions should be equal."
+    bodies: tuple[str, ...] = HEAVY
 
 
 TURN = rotation_about((0, 0, 1), 2.1)  # about the vertical, so that it does not change the weight
@@ -176,6 +186,8 @@ OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved")
 FREE = ("body", "needle", "thin rod")
 """Names of free bodies that are described in these ways."""
 
+SCALED = "The second motion is the first one in other units."
+
 PAIRS = (
     Pair("run again", run="again", exact=True),
     Pair("built again", exact=True),
@@ -186,20 +198,37 @@ PAIRS = (
     Pair("body 3 of 7", run="3 of 7"),
     Pair("body 40 of 64", run="40 of 64"),
     Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, way="quaternion"),
-    Pair("turned world", lambda one: replace(one, R0=TURN @ one.R0), lambda samples, *_: (TURN.T @ samples[0], samples[1])),
-    Pair("permuted axes", lambda one: reframe(one, CYCLE), _frame_back(CYCLE)),
-    Pair("mirrored", _mirrored, lambda samples, *_: (MIRROR @ samples[0] @ MIRROR, -samples[1] @ MIRROR)),
-    Pair("length x 2^k", _lengths, exact=True, sizes=(2.0**-14, 2.0**14)),
-    Pair("length x 10^k", _lengths, sizes=(1e-4, 1e4)),
-    Pair("mass x 2^k", _masses, exact=True, sizes=(2.0**-30, 2.0**30)),
-    Pair("mass x 10^k", _masses, sizes=(1e-9, 1e9)),
-    Pair("time x 2^k", _times, _same_times, exact=True, sizes=(2.0**-14, 2.0**14)),
-    Pair("time x 10^k", _times, _same_times, sizes=(1e-4, 1e4)),
-    Pair("another body frame", lambda one: reframe(one, OTHER), _frame_back(OTHER), way="frame", bodies=(*FREE, "top")),
+    Pair(
+        "turned world",
+        lambda one: replace(one, R0=TURN @ one.R0),
+        lambda samples, *_: (TURN.T @ samples[0], samples[1]),
+        said="The second attitude is the first one turned by 2.1 rad about the vertical; rates in the body are equal.",
+    ),
+    Pair("permuted axes", lambda one: reframe(one, CYCLE), _frame_back(CYCLE), said="The axes 1, 2, 3 are now 3, 1, 2."),
+    Pair(
+        "mirrored",
+        _mirrored,
+        lambda samples, *_: (MIRROR @ samples[0] @ MIRROR, -samples[1] @ MIRROR),
+        said="The second motion is the mirror image of the first, along the second axis.",
+    ),
+    Pair("length x 2^k", _lengths, exact=True, sizes=(2.0**-14, 2.0**14), said=SCALED),
+    Pair("length x 10^k", _lengths, sizes=(1e-4, 1e4), said=SCALED),
+    Pair("mass x 2^k", _masses, exact=True, sizes=(2.0**-30, 2.0**30), said=SCALED),
+    Pair("mass x 10^k", _masses, sizes=(1e-9, 1e9), said=SCALED),
+    Pair("time x 2^k", _times, _same_times, exact=True, sizes=(2.0**-14, 2.0**14), said=SCALED),
+    Pair("time x 10^k", _times, _same_times, sizes=(1e-4, 1e4), said=SCALED),
+    Pair(
+        "another body frame",
+        lambda one: reframe(one, OTHER),
+        _frame_back(OTHER),
+        way="frame",
+        bodies=(*FREE, "top"),
+        said="The body is the same in other axes, turned by 1.3 rad about (0.3, -0.5, 0.8).",
+    ),
     Pair("offset frame", lambda one: reframe(one, np.eye(3), OFFSET), way="offset", bodies=FREE),
     Pair("moment of 0 about the axis of rotation", _without_moment, way="zero", bodies=("rod about its axis",)),
     *(
-        Pair(name, lambda one, way=way: replace(one, way=way), way=way, bodies=(*FREE, "top") if way in OF_INERTIA else ("body", "top"))
+        Pair(name, lambda one, way=way: replace(one, way=way), way=way, bodies=(*FREE, "top") if way in OF_INERTIA else HEAVY)
         for way, name in {
             "file": "set by a file",
             "setter": "set by setters",
@@ -213,3 +242,4 @@ PAIRS = (
         }.items()
     ),
 )
+"""The pairs, in the order of tables."""

@@ -134,12 +134,11 @@ def _add_body(builder, warp, given):
         return 0
     if given.free and way_of(given) != "child":
         return builder.add_body(**options)
-    (mass, inertia), *child = halves(given)
-    body = builder.add_link(**options | {"mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())})
-    joints = [builder.add_joint_free(body) if given.free else builder.add_joint_ball(-1, body, armature=0.0, friction=0.0, damping=0.0)]
-    for mass, inertia in child:
-        part = builder.add_link(**options | {"mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())})
-        joints.append(builder.add_joint_fixed(body, part))
+    parts = [{**options, "mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())} for mass, inertia in halves(given)]
+    body = builder.add_link(**parts[0])
+    still = {"armature": 0.0, "friction": 0.0, "damping": 0.0}
+    joints = [builder.add_joint_free(body) if given.free else builder.add_joint_ball(-1, body, **still)]
+    joints += [builder.add_joint_fixed(body, builder.add_link(**part)) for part in parts[1:]]
     builder.add_articulation(joints)
     return body
 

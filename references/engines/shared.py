@@ -144,7 +144,7 @@ def way_of(given):
 
 
 def halves(given):
-    """Return the masses and the inertias (3, 3), kg m^2, of the parts of which a body with a fixed child consists; (m,), (J,)."""
+    """Return the mass and the inertia (3, 3), kg m^2, of each part of the body: two if it has a fixed child."""
     share = (0.25, 0.75) if way_of(given) == "child" else (1.0,)
     return [(part * given.mass, part * given.inertia_com) for part in share]
 
@@ -169,7 +169,11 @@ def write_mjcf(given, option="", shape=""):
         joint = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")) + '<joint type="ball"/>'
     inertia = f"<inertial {attributes}/>"
     inertia = f"<body>{inertia}</body>" if way == "child" else inertia
-    far = '<body pos="1000 200 30"><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="3 4 5"/></body>' if way == "world" else ""
+    far = (
+        '<body pos="1000 200 30"><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="3 4 5"/></body>'
+        if way == "world"
+        else ""
+    )
     return f"""
         <mujoco>
           {option}

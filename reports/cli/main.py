@@ -28,6 +28,7 @@ from .run import run
 from .study import study
 from .sweep import sweep
 from .track import track
+from .twins import twins
 from .watch import watch
 
 
@@ -105,5 +106,21 @@ def main(context: click.Context) -> None:
         click.echo(FIRST)
 
 
-for command in (report, run, watch, sweep, list_all, recommend, gate, new, engines, track, study, judge, importers, motions):
+for command in (
+    report,
+    run,
+    watch,
+    sweep,
+    list_all,
+    recommend,
+    gate,
+    new,
+    engines,
+    track,
+    study,
+    judge,
+    importers,
+    motions,
+    twins,
+):
     main.add_command(command)

@@ -67,7 +67,7 @@ class OutputCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         rest = super().parse_args(ctx, args)
-        force = ctx.params.pop("force")
+        force = ctx.meta["force"] = ctx.params.pop("force")
         taken = [Path(word) for each in self.params if not isinstance(each.type, Output) for word in _words(ctx, each)]
         for each in self.params:
             if isinstance(each.type, Output) and (path := ctx.params.get(str(each.name))) is not None:

@@ -1,0 +1,134 @@
+"""Twins: which pairs an engine moves equally, how others differ, and what a maintainer can run."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.twins import STUDY
+from conservative.benchmarks.twins.compare import Twins
+from conservative.benchmarks.twins.script import script_of
+from conservative.method import Method
+from conservative.outcome import OutcomeKind
+
+from ..document.cells import DASH, number
+from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table, filled
+from ..rows.names import of_measure, of_study
+
+TERMS = (
+    "A pair is a body and a second description of it. Their motions have to be equal: bit for bit where the arithmetic is the "
+    "same, otherwise up to what rounding explains, which is measured by starts that differ by a rounding unit. "
+    "“Same limit” means that the difference goes away with the step: the engine has two schemes for one body."
+)
+"""Explanation of the section."""
+SHORT = {"same bits": "same bits", "equal": "equal", "not available": DASH, "unsupported": DASH}
+"""Outcomes in tables."""
+
+
+def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> Document:
+    """Return the document of `compare_methods`: the outcome of each pair, and what repeats those that differ."""
+    engines = list(dict.fromkeys(method.label for method, _ in results))
+    of_engine = {label: [twins for method, twins in results if method.label == label] for label in engines}
+    wrong = [(method, twins) for method, twins in results if twins.wrong]
+    ran = [twins for _, twins in results if SHORT.get(twins.outcome) != DASH]
+    named = f"{len(engines)} engines" if len(engines) > 1 else engines[0]
+    kinds = ("same bits", "equal", "same limit", "differs", "lost", "refused", "crashed", "not available")
+    counts = [[label, *(str(sum(one.outcome == kind for one in some)) for kind in kinds)] for label, some in of_engine.items()]
+    reduced = [[method.label, twins.pair, *_reduced(twins), command(twins)] for method, twins in wrong if twins.first]
+    head = ["engine", "pair", "moments, kg m²", "mass, kg", "rates, rad/s", "dt, s", "steps", "factor", "command"]
+    other = {f"{method.label}: {one.pair}": one.detail for method, one in results if one.outcome in ("refused", "same limit")}
+    brief = filled(
+        Paragraph(f"{len(wrong)} of {len(ran)} pairs differ in {named}.", Emphasis.LEAD),
+        Items([Item(text, what, True) for what, text in _grouped(wrong).items()]),
+        Table(["engine", *kinds], counts, "Pairs by outcome"),
+        Table(head, reduced, "Pairs that differ, reduced") if reduced else None,
+    )
+    return Document(
+        "conservative twins",
+        f"Twins: {', '.join(engines)}",
+        [
+            *brief,
+            *(_table(label, some) for label, some in of_engine.items()),
+            *filled(Items([Item(text, what) for what, text in other.items()])),
+            Paragraph(TERMS),
+        ],
+        brief=brief,
+        data={
+            "made": dict(made),
+            "passed": not wrong,
+            "results": [{**_plain(twins), "script": script_of(method, twins)} for method, twins in results],
+        },
+        checks=[
+            Check(method.label, f"{twins.body}: {twins.pair}", failure=_sentence(twins) if twins.wrong else "")
+            for method, twins in results
+            if SHORT.get(twins.outcome) != DASH
+        ],
+        failures=[f"{method.label}, {twins.body}, {twins.pair}: {_sentence(twins)}" for method, twins in wrong],
+    )
+
+
+def _grouped(wrong: Sequence[tuple[Method, Twins]]) -> dict[str, str]:
+    """Return what differs and how, once for pairs that differ in the same way."""
+    groups: dict[tuple[str, str, str], list[Twins]] = {}
+    for method, twins in wrong:
+        groups.setdefault((method.label, twins.body, twins.detail), []).append(twins)
+    return {
+        f"{label}: {body}, {', '.join(dict.fromkeys(each.pair for each in some))}": _sentence(some[0])
+        for (label, body, _), some in groups.items()
+    }
+
+
+def command(twins: Twins) -> str:
+    """Return the command that repeats a pair."""
+    return f"conservative twins {twins.engine} --pairs {shlex.quote(twins.pair)}"
+
+
+def _table(label: str, results: Sequence[Twins]) -> Table:
+    bodies = list(dict.fromkeys(twins.body for twins in results))
+    cells = {(twins.pair, twins.body): _cell(twins) for twins in results}
+    pairs = dict.fromkeys(twins.pair for twins in results)
+    rows = [[pair, *(cells.get((pair, body), "") for body in bodies)] for pair in pairs]
+    return Table(["pair", *bodies], [row for row in rows if any(cell not in ("", DASH) for cell in row[1:])], label)
+
+
+def _cell(twins: Twins) -> str:
+    if twins.outcome == "differs":
+        return "DIFFERS" if np.isinf(twins.factor) else f"DIFFERS {number(twins.factor)} x"
+    return SHORT.get(twins.outcome, twins.outcome)
+
+
+def _sentence(twins: Twins) -> str:
+    size = "" if np.isinf(twins.factor) or np.isnan(twins.factor) else f"{number(twins.factor)} times what rounding explains"
+    return "; ".join(filter(None, (twins.threshold, size, twins.detail))) or twins.outcome
+
+
+def _reduced(twins: Twins) -> list[str]:
+    one = twins.first
+    assert one is not None
+    moments, rates = (", ".join(map(number, values)) for values in (np.diag(one.inertia), one.w0))
+    return [moments, number(one.mass), rates, number(one.dt), str(one.n_steps), number(twins.size) if twins.size else DASH]
+
+
+def _plain(twins: Twins) -> dict[str, object]:
+    names = ("engine", "body", "pair", "outcome", "difference", "allowed", "detail", "threshold", "size")
+    first = twins.first
+    return {name: getattr(twins, name) for name in names} | {
+        "first": first and {k: v for k, v in first.numbers.items() if np.any(v)}
+    }
+
+
+def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
+    """Return the section of a report from named rows of the study (see `names.with_names`)."""
+    rows, body = of_measure(of_study(table, STUDY.name), Measure.ALLOWED), list[Row]()
+    for name, group in rows.groupby("name", sort=False):
+        ran = group[group["outcome"] == OutcomeKind.OK]
+        failed = ran[ran["value"] > 1]
+        crashed = int((group["outcome"] == OutcomeKind.CRASHED).sum())
+        which = ", ".join(dict.fromkeys(failed["way"]))
+        body.append([str(name), str(len(ran) - len(failed)), str(len(failed)), str(crashed), which or DASH])
+    header = ["engine", "equal", "different", "crashed", "pairs that differ"]
+    return Section("Twins", [Paragraph(TERMS), Table(header, body, "Pairs of descriptions")], "twins")
