@@ -247,7 +247,7 @@ def _steps(one: Description) -> str:
     return f"{one.n_steps} steps" if one.n_steps > 1 else "one step"
 
 
-def _threshold(pair: Pair, one: Description, size: float, wrong: Callable[[Description], bool]) -> str:
+def _threshold(pair: Pair, one: Description, size: float, wrong: Callable[..., bool]) -> str:
     """Return a sentence about the size from which on a scaled body moves in another way."""
     good, bad = 0.0, math.log(size)
     for _ in range(HALVINGS):

@@ -132,7 +132,7 @@ class EngineMachine(Machine):
 
     def model(self, one: Description, worker: Worker | None = None) -> Callable[[], Samples]:
         run = self._ask(one.numbers, (one.grid.n_samples,), worker or self._worker)
-        return lambda: tuple(each[0] for each in run())  # type: ignore[return-value]
+        return lambda: tuple(each[0] for each in run())
 
     def many(self, bodies: Sequence[Description], number: int) -> Samples:
         if self.method not in self.method.settings_for("many"):

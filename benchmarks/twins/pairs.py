@@ -143,7 +143,7 @@ OFFSET = np.array((0.3, -0.2, 0.5))
 
 def reframe(one: Description, R_FG: Array, shift: Array | float = 0.0) -> Description:
     """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from that of F."""
-    turned = {"com": R_FG.T @ (one.com - shift), "inertia": _symmetric(R_FG.T @ one.inertia @ R_FG)}
+    turned: dict[str, Any] = {"com": R_FG.T @ (one.com - shift), "inertia": _symmetric(R_FG.T @ one.inertia @ R_FG)}
     return replace(one, R0=one.R0 @ R_FG, w0=R_FG.T @ one.w0, **turned)
 
 
@@ -157,7 +157,7 @@ def _frame_back(R_FG: Array) -> Callable[..., Samples]:
 
 def _mirrored(one: Description) -> Description:
     # Rates are axial vectors: a mirror turns them by -M.
-    mirrored = {"inertia": MIRROR @ one.inertia @ MIRROR, "com": MIRROR @ one.com}
+    mirrored: dict[str, Any] = {"inertia": MIRROR @ one.inertia @ MIRROR, "com": MIRROR @ one.com}
     return replace(one, R0=MIRROR @ one.R0 @ MIRROR, w0=-MIRROR @ one.w0, **mirrored)
 
 

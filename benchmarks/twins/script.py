@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from conservative.method import Method
-from conservative.references.engines.shared import write_mjcf
+from conservative.references.engines import shared
 from conservative.references.environments.adapter import AdapterMethod
 
 from .compare import Twins
@@ -69,5 +69,6 @@ def _numbers(one: Description) -> dict[str, Any]:
 
 def _mjcf(method: AdapterMethod, one: Description) -> str:
     option = f'<option gravity="0 0 {-one.gravity!r}" integrator="{method.settings["integrator"]}" timestep="{one.dt!r}"/>'
-    lines = write_mjcf(SimpleNamespace(**one.numbers), option).splitlines()
+    write: Any = shared.write_mjcf  # it runs in environments too, without types
+    lines = write(SimpleNamespace(**one.numbers), option).splitlines()
     return "\n".join(line.strip() for line in lines if line.strip())

@@ -58,19 +58,18 @@ def twins(
     from ..terminal.progress import progress
 
     methods, chosen = select_methods(split_names("engines", engines)), select_pairs(split_names("pairs", pairs))
-    for method in methods if scripts else ():
-        for pair in chosen:
-            require_replaceable(
-                scripts / script_name(method, pair.name), MARK, "scripts", click.get_current_context().meta["force"]
-            )
+    force = click.get_current_context().meta["force"]
+    for name in (script_name(method, pair.name) for method in methods for pair in chosen):
+        if scripts:
+            require_replaceable(scripts / name, MARK, "scripts", force)
     with output_files(None, (), **outputs) as write:
         made = provenance().facts
         with progress() as step:
             results = list(compare_methods(methods, step, chosen))
         document = build(results, made)
         write(document)
-        for method, pair in results if scripts else ():
-            if text := script_of(method, pair):
+        for method, found in results:
+            if scripts and (text := script_of(method, found)):
                 make_folder(scripts, "scripts")
-                write_text(scripts / script_name(method, pair.pair), text, "scripts")
+                write_text(scripts / script_name(method, found.pair), text, "scripts")
     show(document, as_json, silent=True)

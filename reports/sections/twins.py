@@ -25,8 +25,11 @@ TERMS = (
     "“Same limit” means that the difference goes away with the step: the engine has two schemes for one body."
 )
 """Explanation of the section."""
-SHORT = {"same bits": "same bits", "equal": "equal", "not available": DASH, "unsupported": DASH}
+SHORT = {"not available": DASH, "unsupported": DASH}
 """Outcomes in tables."""
+
+
+HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", "rates, rad/s", "steps, s", "factor", "command"]
 
 
 def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> Document:
@@ -38,14 +41,15 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
     named = f"{len(engines)} engines" if len(engines) > 1 else engines[0]
     kinds = ("same bits", "equal", "same limit", "differs", "lost", "refused", "crashed", "not available")
     counts = [[label, *(str(sum(one.outcome == kind for one in some)) for kind in kinds)] for label, some in of_engine.items()]
-    reduced = [[method.label, twins.pair, *_reduced(twins), command(twins)] for method, twins in wrong if twins.first]
-    head = ["engine", "pair", "moments, kg m²", "mass, kg", "rates, rad/s", "dt, s", "steps", "factor", "command"]
+    groups = _grouped(wrong)
+    firsts = [(some[0][0].label, twins, _reduced(twins)) for some in groups for _, twins in some[:1] if twins.first]
+    reduced = [[label, twins.pair, *cells, command(twins)] for label, twins, cells in firsts]
     other = {f"{method.label}: {one.pair}": one.detail for method, one in results if one.outcome in ("refused", "same limit")}
     brief = filled(
         Paragraph(f"{len(wrong)} of {len(ran)} pairs differ in {named}.", Emphasis.LEAD),
-        Items([Item(text, what, True) for what, text in _grouped(wrong).items()]),
+        Items([Item(_sentence(some[0][1]), _names(some), True) for some in groups]),
         Table(["engine", *kinds], counts, "Pairs by outcome"),
-        Table(head, reduced, "Pairs that differ, reduced") if reduced else None,
+        Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group") if reduced else None,
     )
     return Document(
         "conservative twins",
@@ -71,15 +75,18 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
     )
 
 
-def _grouped(wrong: Sequence[tuple[Method, Twins]]) -> dict[str, str]:
-    """Return what differs and how, once for pairs that differ in the same way."""
-    groups: dict[tuple[str, str, str], list[Twins]] = {}
+def _grouped(wrong: Sequence[tuple[Method, Twins]]) -> list[list[tuple[Method, Twins]]]:
+    """Return the pairs of one engine and body that differ in the same way, together."""
+    groups: dict[tuple[str, str, str], list[tuple[Method, Twins]]] = {}
     for method, twins in wrong:
-        groups.setdefault((method.label, twins.body, twins.detail), []).append(twins)
-    return {
-        f"{label}: {body}, {', '.join(dict.fromkeys(each.pair for each in some))}": _sentence(some[0])
-        for (label, body, _), some in groups.items()
-    }
+        kind = twins.detail if twins.size is None else twins.pair.partition(" x ")[0]
+        groups.setdefault((method.label, twins.body, kind), []).append((method, twins))
+    return list(groups.values())
+
+
+def _names(some: Sequence[tuple[Method, Twins]]) -> str:
+    pairs = ", ".join(dict.fromkeys(twins.pair for _, twins in some))
+    return f"{some[0][0].label}: {some[0][1].body}, {pairs}"
 
 
 def command(twins: Twins) -> str:
@@ -109,8 +116,10 @@ def _sentence(twins: Twins) -> str:
 def _reduced(twins: Twins) -> list[str]:
     one = twins.first
     assert one is not None
-    moments, rates = (", ".join(map(number, values)) for values in (np.diag(one.inertia), one.w0))
-    return [moments, number(one.mass), rates, number(one.dt), str(one.n_steps), number(twins.size) if twins.size else DASH]
+    moments, com, rates = (", ".join(map(number, values)) for values in (np.diag(one.inertia), one.com, one.w0))
+    field = f"{com}; {number(one.gravity)}" if one.gravity else DASH
+    size = number(twins.size) if twins.size else DASH
+    return [moments, number(one.mass), field, rates, f"{one.n_steps} x {number(one.dt)}", size]
 
 
 def _plain(twins: Twins) -> dict[str, object]:
