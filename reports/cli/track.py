@@ -49,6 +49,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 )
 @names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
 @names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
+@click.option("--twins", is_flag=True, help="Also show which twins began or ceased to differ; see `conservative twins`.")
 @json_option
 @click.option("--junit", type=Output('name="conservative track '), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(PAGE["track.md"]), help="Write tables and changes as Markdown.")
@@ -70,6 +71,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
 
     from ..run.provenance import provenance
     from ..sections.track import build
+    from ..sections.twins import changes as twin_changes
     from ..terminal.progress import progress
 
     def tell(what: str) -> None:
@@ -89,6 +91,9 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
             environments += (install_build(engine, against, source).environment,)
         sides = plan_versions([Version(each.version, "", each) for each in environments], settings, scenes)
         with progress() as step:
-            answer = build(compare_engine(sides, step), against is not None, made)
+            compared = compare_engine(sides, step)
+        with progress() as step:
+            found = twin_changes([(side.version.name, side.methods) for side in sides], step) if options["twins"] else None
+        answer = build(compared, against is not None, made, found)
         write(answer)
     show(answer, as_json, silent=True)

@@ -30,10 +30,11 @@ from . import (
     speed,
     summary,
     tumbling,
+    twins,
 )
 from .measured import Measured, of_scene
 
-SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time, motions)}
+SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time, motions, twins)}
 """Sections of the rows and samples of one study, by its name."""
 SCHEMA = 2
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from conservative.benchmarks.measures.convergence_order import Order
@@ -29,8 +29,16 @@ _WORDS = (
 )
 
 
-def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, str] | None = None) -> Document:
-    """Return the document of a comparison, measured as `made` says; if `gated`, a loss in the last version is a failure."""
+def build(
+    comparison: EngineComparison,
+    gated: bool = False,
+    made: Mapping[str, str] | None = None,
+    twins: Sequence[str] | None = None,
+) -> Document:
+    """Return the document of a comparison, measured as `made` says; if `gated`, a loss in the last version is a failure.
+
+    `twins` are sentences about the pairs of descriptions that began or ceased to differ; None if they were not compared.
+    """
     made, transitions = made or {}, list_transitions(comparison)
     environments = [version.environment for version in comparison.versions]
     engine, names = environments[0].engine, [version.name for version in comparison.versions]
@@ -46,6 +54,7 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         by_scene.setdefault(line.scene, []).append(line)
     tables = [_table(scene, lines) for scene, lines in by_scene.items()]
     changed = Section("Changes", [Items.of(sentences) if sentences else Paragraph(NOTHING_CHANGED)])
+    of_twins = [] if twins is None else [Section("Twins", [Items.of(twins) if twins else Paragraph(NOTHING_CHANGED)])]
     failed = [text for line in comparison.lines for text in _unfinished(line)]
     unfinished = Section("Runs that failed or show no order", filled(Items.of(failed)))
     verdict = []
@@ -60,6 +69,7 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         "engine": engine,
         "passed": not failures,
         "failures": failures,
+        **({} if twins is None else {"twins": list(twins)}),
         "versions": [{name: getattr(each, name) for name in ("version", "runtime", "packages")} for each in environments],
         "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
         "changes": [
@@ -85,12 +95,13 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         filled(
             *verdict,
             changed,
+            *of_twins,
             Section("Measurements", [Paragraph(_WORDS), *tables]),
             unfinished,
             Section("Versions", [Table(("version", "runtime", "packages"), versions, "Packages of each version")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
         ),
-        brief=filled(*tables, changed, unfinished, *verdict),
+        brief=filled(*tables, changed, *of_twins, unfinished, *verdict),
         data=data,
         checks=checks,
         failures=failures,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.twins import STUDY
+from conservative.benchmarks.studies.study import Progress
+from conservative.benchmarks.studies.twins import STUDY, compare_methods
 from conservative.benchmarks.twins.compare import Twins
 from conservative.benchmarks.twins.script import script_of
 from conservative.method import Method
@@ -128,6 +130,25 @@ def _plain(twins: Twins) -> dict[str, object]:
     return {name: getattr(twins, name) for name in names} | {
         "first": first and {k: v for k, v in first.numbers.items() if np.any(v)}
     }
+
+
+def changes(versions: Sequence[tuple[str, Sequence[Method]]], progress: Progress) -> list[str]:
+    """Return a sentence for each pair that began or ceased to differ from one version of an engine to the next.
+
+    `versions` are names and their methods, one for each setting, in the same order.
+    """
+    methods = [method for _, some in versions for method in some]
+    found = {(method.name, twins.body, twins.pair): twins for method, twins in compare_methods(methods, progress)}
+    bodies = dict.fromkeys((body, pair) for _, body, pair in found)
+    told = []
+    for (before, old), (after, new) in pairwise(versions):
+        for was, now in zip(old, new, strict=True):
+            for key in bodies:
+                first, then = found[was.name, *key], found[now.name, *key]
+                if first.wrong != then.wrong:
+                    words = _sentence(then) if then.wrong else then.outcome
+                    told.append(f"{now.setting() or 'default'}: {', '.join(key)}, {before} → {after}: {words}")
+    return told
 
 
 def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
