@@ -168,10 +168,14 @@ def _apart(engine: Engine, pair: Pair, one: Description, size: float | None) -> 
         raise
     except IntegrationFailed as failure:
         return LOST if lost else Apart(math.inf, allowed, str(failure), size)
+    if pair.way == "zero" and not lost and not np.isfinite(raw[1]).all():
+        raise EngineError("numbers that are not finite")
     if lost or not _kept(twin, raw):
         only = "the first motion is lost, and not that of the twin" if lost else "the motion of the twin is lost"
         return Apart(math.inf, allowed, only, size) if lost == _kept(twin, raw) else LOST
     apart = difference(samples, pair.back(raw, *scale))
+    if pair.same_bits:
+        return Apart(apart)
     if allowed < apart and pair.way in OF_INERTIA:
         allowed = max(allowed, engine.rounding(twin, raw))
     return Apart(apart, allowed, "", size)

@@ -112,7 +112,7 @@ class Pair:
     run
         How the twin runs: "" by a new model, or one of `machine.RUNS`.
     exact
-        True if equal arithmetic gives equal bits, so that any other difference is larger than an engine should make.
+        True if equal arithmetic gives equal bits. A difference then does not go away with the step.
     way
         The way in which the engine must be able to describe a body; a method of this package has only "frame".
     sizes
@@ -132,6 +132,11 @@ class Pair:
     sizes: tuple[float, ...] = ()
     said: str = "Both motions should be equal."
     bodies: tuple[str, ...] = HEAVY
+
+    @property
+    def same_bits(self) -> bool:
+        """Whether any difference is a fault: the same numbers are integrated again."""
+        return self.exact and not self.sizes and not self.way
 
 
 TURN = rotation_about((0, 0, 1), 2.1)  # about the vertical, so that it does not change the weight

@@ -111,7 +111,9 @@ def _cell(twins: Twins) -> str:
 
 
 def _sentence(twins: Twins) -> str:
-    size = "" if np.isinf(twins.factor) or np.isnan(twins.factor) else f"{number(twins.factor)} times what rounding explains"
+    size = f"{number(twins.factor)} times what rounding explains" if np.isfinite(twins.factor) else ""
+    if not twins.allowed and np.isfinite(twins.difference):
+        size = f"{number(twins.difference)} apart, where the same bits are expected"
     return "; ".join(filter(None, (twins.threshold, size, twins.detail))) or twins.outcome
 
 
@@ -126,10 +128,9 @@ def _reduced(twins: Twins) -> list[str]:
 
 def _plain(twins: Twins) -> dict[str, object]:
     names = ("engine", "body", "pair", "outcome", "difference", "allowed", "detail", "threshold", "size")
-    first = twins.first
-    return {name: getattr(twins, name) for name in names} | {
-        "first": first and {k: v for k, v in first.numbers.items() if np.any(v)}
-    }
+    numbers = {name: value for name, value in (twins.first.numbers if twins.first else {}).items() if np.any(value)}
+    first = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in numbers.items()}
+    return {**{name: getattr(twins, name) for name in names}, "first": first or None}
 
 
 def changes(versions: Sequence[tuple[str, Sequence[Method]]], progress: Progress) -> list[str]:
