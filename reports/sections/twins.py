@@ -13,6 +13,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.study import Progress
 from conservative.benchmarks.studies.twins import STUDY, compare_methods
 from conservative.benchmarks.twins.compare import Twins
+from conservative.benchmarks.twins.pairs import PAIRS, Pair
 from conservative.benchmarks.twins.script import script_of
 from conservative.method import Method
 from conservative.outcome import OutcomeKind
@@ -31,6 +32,7 @@ SHORT = {"not available": DASH, "unsupported": DASH}
 """Outcomes in tables."""
 
 
+NONE = "No pair could be compared: no body of the pairs is supported."
 HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", "rates, rad/s", "steps, s", "factor", "command"]
 
 
@@ -48,7 +50,7 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
     reduced = [[label, twins.pair, *cells, command(twins)] for label, twins, cells in firsts]
     other = {f"{method.label}: {one.pair}": one.detail for method, one in results if one.outcome in ("refused", "same limit")}
     brief = filled(
-        Paragraph(f"{len(wrong)} of {len(ran)} pairs differ in {named}.", Emphasis.LEAD),
+        Paragraph(f"{len(wrong)} of {len(ran)} pairs differ in {named}." if ran else NONE, Emphasis.LEAD),
         Items([Item(_sentence(some[0][1]), _names(some), True) for some in groups]),
         Table(["engine", *kinds], counts, "Pairs by outcome"),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group") if reduced else None,
@@ -65,7 +67,7 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
         brief=brief,
         data={
             "made": dict(made),
-            "passed": not wrong,
+            "passed": not wrong and bool(ran),
             "results": [{**_plain(twins), "script": script_of(method, twins)} for method, twins in results],
         },
         checks=[
@@ -73,7 +75,8 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
             for method, twins in results
             if SHORT.get(twins.outcome) != DASH
         ],
-        failures=[f"{method.label}, {twins.body}, {twins.pair}: {_sentence(twins)}" for method, twins in wrong],
+        failures=[f"{method.label}, {twins.body}, {twins.pair}: {_sentence(twins)}" for method, twins in wrong]
+        or [NONE] * (not ran),
     )
 
 
@@ -133,13 +136,13 @@ def _plain(twins: Twins) -> dict[str, object]:
     return {**{name: getattr(twins, name) for name in names}, "first": first or None}
 
 
-def changes(versions: Sequence[tuple[str, Sequence[Method]]], progress: Progress) -> list[str]:
+def changes(versions: Sequence[tuple[str, Sequence[Method]]], progress: Progress, pairs: Sequence[Pair] = PAIRS) -> list[str]:
     """Return a sentence for each pair that began or ceased to differ from one version of an engine to the next.
 
     `versions` are names and their methods, one for each setting, in the same order.
     """
     methods = [method for _, some in versions for method in some]
-    found = {(method.name, twins.body, twins.pair): twins for method, twins in compare_methods(methods, progress)}
+    found = {(method.name, twins.body, twins.pair): twins for method, twins in compare_methods(methods, progress, pairs)}
     bodies = dict.fromkeys((body, pair) for _, body, pair in found)
     told = []
     for (before, old), (after, new) in pairwise(versions):
