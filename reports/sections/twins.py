@@ -75,8 +75,7 @@ def build(results: Sequence[tuple[Method, Twins]], made: Mapping[str, str]) -> D
             for method, twins in results
             if SHORT.get(twins.outcome) != DASH
         ],
-        failures=[f"{method.label}, {twins.body}, {twins.pair}: {_sentence(twins)}" for method, twins in wrong]
-        or [NONE] * (not ran),
+        failures=[f"{method.label}, {one.body}, {one.pair}: {_sentence(one)}" for method, one in wrong] or [NONE] * (not ran),
     )
 
 
