@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 import re
+import struct
+import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,7 +20,7 @@ import vl_convert
 from conservative import registry
 from conservative.method import Method, Role
 
-from ..document import SVG_MARK
+from ..document import MARK, SVG_MARK
 
 Families = Mapping[str, str]
 """The family of each line of a picture by its name, in the order of legends."""
@@ -152,3 +154,14 @@ def specification(chart: Any) -> dict[str, Any]:
 def svg_text(chart: Any) -> str:
     """Return a picture as SVG that begins with the mark by which a command knows its own files."""
     return f"{SVG_MARK}\n{vl_convert.vegalite_to_svg(specification(chart))}"
+
+
+def picture_file(chart: Any, kind: str) -> bytes:
+    """Return the file of a picture of a kind in `PICTURES`, with the mark."""
+    if kind == ".svg":
+        return svg_text(chart).encode()
+    if kind == ".pdf":  # a comment after its end
+        return vl_convert.vegalite_to_pdf(specification(chart)) + f"\n% {MARK}\n".encode()
+    png, text = vl_convert.vegalite_to_png(specification(chart), scale=2), f"tEXtSoftware\0{MARK}".encode()
+    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
+    return png[:33] + chunk + png[33:]  # after the header

@@ -5,24 +5,66 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from conservative.errors import BadInput
 
+from ..document import MARK, PICTURES
 from . import completion
 
 if TYPE_CHECKING:
     from ..document.model import Document
 
-EXIT_CODES = """Exit codes:
-    0    done
-    1    a run failed, the gate did not pass, a judged file is wrong, or an engine loads another body
-    2    invalid command or input, or a missing engine or baseline
-    3    a judged file does not decide
-    130  interrupted by Ctrl-C (143: SIGTERM, 129: SIGHUP); --resume continues report and sweep
-"""
+VOCABULARY: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxyType(
+    {
+        "methods": (("--methods", "-m"), ("--method",)),
+        "engines": (("--engines",), ("--engine",)),
+        "scenes": (("--scenes",), ()),
+        "t_end": (("--t-end",), ("--duration",)),
+        "dt": (("--dt",), ()),
+        "error": (("--error",), ()),
+        "out": (("--out",), ()),
+        "picture": (("--picture",), ()),
+    }
+)
+"""What several commands ask for: its names, and those of the last release, which work with a note until the next one."""
+FAILED = "a run failed"
+EXIT_CODES = {
+    0: "done",
+    2: "invalid command or input, or a missing engine or baseline",
+    130: "interrupted by Ctrl-C (143: SIGTERM, 129: SIGHUP)",
+}
+"""Exit codes of every command; see `Command`."""
+
+
+class Command(click.Command):
+    """A command that takes the old names of options, and whose help lists its own exit codes.
+
+    `codes` are exit codes and their meanings, in addition to `EXIT_CODES`.
+    """
+
+    def __init__(self, *args: Any, codes: Mapping[int, str] | None = None, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.codes = EXIT_CODES | dict(codes or {})
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        names = {str(each.name) for each in self.params}
+        new = {old: long for name, ((long, *_), olds) in VOCABULARY.items() if name in names for old in olds}
+        for i, word in enumerate(args[: args.index("--") if "--" in args else None]):
+            name, *value = word.split("=", 1)
+            if name in new:
+                click.echo(f"{name} is now {new[name]}; the old name works until the next release.", err=True)
+                args = [*args[:i], "=".join([new[name], *value]), *args[i + 1 :]]
+        return super().parse_args(ctx, args)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_epilog(ctx, formatter)
+        goes_on = "; --resume continues" * any(each.name == "resume" for each in self.params)
+        with formatter.section("Exit codes"):
+            formatter.write_dl([(str(code), self.codes[code] + goes_on * (code == 130)) for code in sorted(self.codes)])
 
 
 class FilePath(click.Path):
@@ -40,8 +82,8 @@ class Output(FilePath):
     Parameters
     ----------
     marks
-        Text within the first `HEAD` characters of every such file; of a folder, the names of its files with their texts. A file
-        without its text was not written by this option.
+        Text within the first or last `HEAD` bytes of every such file; of a folder, the names of its files with their texts. A
+        file without its text was not written by this option.
     """
 
     def __init__(self, marks: str | Mapping[str, str]) -> None:
@@ -54,7 +96,20 @@ class Output(FilePath):
         return super().convert(value, param, ctx)
 
 
-class OutputCommand(click.Command):
+class Picture(Output):
+    """A file of a picture: SVG, PNG or PDF by its ending."""
+
+    def __init__(self) -> None:
+        super().__init__(MARK)
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = super().convert(value, param, ctx)
+        if path.suffix not in PICTURES:
+            raise BadInput("picture", repr(str(path)), f"a file that ends in {', '.join(PICTURES)}")
+        return path
+
+
+class OutputCommand(Command):
     """A command with options of type `Output`, and with --force.
 
     A file that the same option did not write is replaced only with --force. An input of the command, or the file of another
@@ -78,28 +133,31 @@ class OutputCommand(click.Command):
 
 
 HEAD = 4096
-"""Number of characters of a file that are searched for a mark."""
+"""Number of bytes at the beginning and the end of a file that are searched for a mark."""
 
 
 def require_replaceable(file: Path, mark: str, option: str, force: bool = False, inputs: Iterable[Path] = ()) -> None:
     """Raise `BadInput` for an option whose file must not be replaced: one without its mark, unless `force`, or an input.
 
-    A file that does not exist, is empty, or is a pipe or a device passes. The mark is within the first `HEAD` characters.
+    A file that does not exist, is empty, or is a pipe or a device passes. The mark is within the first or last `HEAD` bytes.
     """
     try:
         if not file.is_file() or not file.stat().st_size:
             return
     except OSError:  # such as a name that is too long: writing the file reports it
         return
-    head, shared = "", False
+    head, shared = b"", False
     for other in inputs:
         with suppress(OSError, ValueError):  # a word that is not the name of a file
             shared = shared or file.samefile(other)
     if shared:
         raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
-    with suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
+    with suppress(OSError), file.open("rb") as stream:
         head = stream.read(HEAD)
-    if not force and mark not in head:
+        if len(head) == HEAD:  # PDF has the mark at the end
+            stream.seek(max(HEAD, file.stat().st_size - HEAD))
+            head += stream.read()
+    if not force and mark.encode() not in head:
         allowed = "a new file, an earlier result of the same option, or --force to replace the file"
         raise BadInput(option, f"{str(file)!r}, which this option did not write", allowed)
 
@@ -125,13 +183,34 @@ class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the 
         self.fail(f"got {value!r}; expected an integer of 1 or more, such as 1000 or 1e6", param, ctx)
 
 
+def option(name: str, help: str, **kind: Any) -> Callable[[Any], Any]:
+    """Return the option of a name in `VOCABULARY`, or another."""
+    names, _ = VOCABULARY.get(name, ((f"--{name}",), ()))
+    return click.option(*names, name, help=help, **kind)
+
+
 def names_option(name: str, help: str, metavar: str = "A,B", complete: Any = None) -> Callable[[Any], Any]:
     """Return an option that takes several names, separated by commas, and may be repeated."""
-    return click.option(f"--{name}", multiple=True, metavar=metavar, shell_complete=complete, help=help)
+    return option(name, help, multiple=True, metavar=metavar, shell_complete=complete)
 
 
+def methods_option(help: str) -> Callable[[Any], Any]:
+    """Return the option for methods."""
+    return names_option("methods", help, "M,N", completion.methods)
+
+
+def error_option(help: str, **kind: Any) -> Callable[[Any], Any]:
+    """Return the option for an attitude error."""
+    return option("error", help, type=float, metavar="RAD", **kind)
+
+
+CHOSEN = "default: the method and step that `--error 1e-6` chooses"
+target_option = error_option(
+    "Target attitude error, rad. Chooses the method and the step; not with --methods.  [default: 1e-6]"
+)
 scene_argument = click.argument("scene", shell_complete=completion.scenes)
-t_end_option = click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+t_end_option = option("t_end", "Duration, s.  [default: the scene's]", type=float, metavar="S")
+picture_option = option("picture", "Write a picture (.svg, .png or .pdf).", type=Picture(), metavar="FILE")
 scheduler_option = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 skip_missing_option = click.option(
@@ -170,7 +249,7 @@ def output_files(out: Path | None, names: Iterable[str], **options: Path | None)
     ------
     Callable
         Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
-        given to it as functions without arguments, such as `csv=...`.
+        given to it as functions without arguments, such as `csv=...`, which return a text or bytes.
     """
     from conservative.files import make_folder, text_file
 
@@ -183,12 +262,20 @@ def output_files(out: Path | None, names: Iterable[str], **options: Path | None)
     with ExitStack() as stack:
         streams = {name: stack.enter_context(text_file(*place)) for name, place in places.items()}
 
-        def write(document: Document, **others: Callable[[], str]) -> None:
+        def write(document: Document, **others: Callable[[], str | bytes]) -> None:
             for name, stream in streams.items():
                 kind = name.rpartition(".")[2]
-                stream.write(others[kind]() if kind in others else text(document, kind))
+                made = others[kind]() if kind in others else text(document, kind)
+                stream.buffer.write(made.encode() if isinstance(made, str) else made)
 
         yield write
+
+
+def picture_file(chart: Any, path: Path | None) -> bytes:
+    """Return the file of a chart in the format of its name, by default SVG."""
+    from ..charts import style  # slow to import
+
+    return style.picture_file(style.apply_style(chart), ".svg" if path is None else path.suffix)
 
 
 def show(document: Document, as_json: bool, silent: bool = False) -> None:
@@ -207,8 +294,8 @@ def show(document: Document, as_json: bool, silent: bool = False) -> None:
 
 
 def epilog(*examples: str) -> str:
-    """Return the end of a --help. A backspace on its own line keeps click from joining the following lines."""
-    return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])
+    """Return the examples of a --help. A backspace on its own line keeps click from joining the following lines."""
+    return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples)])
 
 
 def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:

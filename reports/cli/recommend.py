@@ -10,7 +10,22 @@ from conservative.errors import require_extra
 
 from ..document import SVG_MARK
 from . import completion
-from .options import Output, OutputCommand, epilog, json_option, names_option, output_files, scene_argument, show, split_names
+from .options import (
+    Output,
+    OutputCommand,
+    epilog,
+    error_option,
+    json_option,
+    names_option,
+    option,
+    output_files,
+    picture_file,
+    picture_option,
+    scene_argument,
+    show,
+    split_names,
+    t_end_option,
+)
 
 FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": SVG_MARK}
 """The files of `--out`, and how each is recognized."""
@@ -20,34 +35,34 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": SVG_MARK
     cls=OutputCommand,
     short_help="Find the method, and the step or tolerance, for a body.",
     epilog=epilog(
-        "conservative recommend my_body.toml --error 1e-6 --duration 3600",
-        "conservative recommend brick_flip --error 1e-4 --engine mujoco",
+        "conservative recommend my_body.toml --error 1e-6 --t-end 3600",
+        "conservative recommend brick_flip --error 1e-4 --engines mujoco",
         "conservative recommend lagrange_top --json --out recommended | jq .cheapest",
     ),
 )
 @scene_argument
-@click.option(
-    "--error", type=float, default=1e-6, show_default=True, help="Target: the largest attitude error over the duration, rad."
-)
-@click.option("--duration", type=float, help="Duration, s.  [default: the scene's]")
-@names_option("engine", "Engines to probe, in addition to our method.  [default: all installed]", complete=completion.methods)
+@error_option("Target: the largest attitude error over the duration, rad.", default=1e-6, show_default=True)
+@t_end_option
+@names_option("engines", "Engines to probe, in addition to our method.  [default: all installed]", "E,F", completion.methods)
 @click.option(
     "--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time of a setting per simulated second, s."
 )
 @click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
 @click.option("--verbose", "-v", is_flag=True, help="Also print the probe runs and the basis of the numbers.")
 @json_option
-@click.option("--out", type=Output(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
+@option("out", f"Write {' and '.join(FILES)} into this folder.", type=Output(FILES))
+@picture_option
 def recommend(
     scene: str,
     error: float,
-    duration: float | None,
-    engine: tuple[str, ...],
+    t_end: float | None,
+    engines: tuple[str, ...],
     cost_limit: float,
     time_limit: float,
     verbose: bool,
     as_json: bool,
     out: Path | None,
+    picture: Path | None,
 ) -> None:
     """Say which method and setting to use for SCENE, a name or a file, and what else reaches the error at what cost.
 
@@ -62,17 +77,16 @@ def recommend(
     from ..sections.recommendation import build
     from ..terminal.progress import progress
 
-    def draw() -> str:
-        from ..charts.recommendation import picture  # not needed without --out, and slow to import
-        from ..charts.style import svg_text
+    def draw(path: Path | None = None) -> bytes:
+        from ..charts import recommendation as charts  # not needed without --out, and slow to import
 
-        return svg_text(picture(recommendation))
+        return picture_file(charts.picture(recommendation), path)
 
     with progress() as step:
-        names = split_names("engine", engine) or None
-        question = ask(registry.scene(scene), error, duration, names, cost_limit, time_limit)
-        with output_files(out, FILES) as write:
+        names = split_names("engines", engines) or None
+        question = ask(registry.scene(scene), error, t_end, names, cost_limit, time_limit)
+        with output_files(out, FILES, picture=picture) as write:
             recommendation = answer(question, step)
             document = build(recommendation, scene, verbose)
-            write(document, svg=draw)
+            write(document, svg=draw, picture=lambda: draw(picture))
     show(document, as_json)

@@ -6,35 +6,54 @@ from pathlib import Path
 
 import click
 
-from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
-from . import completion
-from .options import Output, OutputCommand, epilog, json_option, scene_argument, show, t_end_option
+from .options import (
+    FAILED,
+    Output,
+    OutputCommand,
+    epilog,
+    json_option,
+    methods_option,
+    option,
+    output_files,
+    picture_file,
+    picture_option,
+    scene_argument,
+    show,
+    split_names,
+    t_end_option,
+    target_option,
+)
+
+SAMPLES = "t (s),R_WB_11,"
+FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
+"""The files of `--out`, and how each is recognized."""
 
 
 @click.command(
     cls=OutputCommand,
     short_help="Integrate a scene once.",
+    codes={1: FAILED},
     epilog=epilog(
-        "conservative run brick_flip --method reduced --dt 0.01",
-        "conservative run brick_flip -m reduced -m mujoco:RK4        a table of both",
+        "conservative run my_body.toml --error 1e-9 --csv run.csv",
+        "conservative run brick_flip -m reduced,mujoco:RK4           a table of both",
         "conservative run lagrange_top -m mujoco:RK4 --dt 0.001 --t-end 2 --json",
-        "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
+        "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --out flip",
     ),
 )
 @scene_argument
-@click.option(
-    "--method",
-    "-m",
-    "methods",
-    multiple=True,
-    shell_complete=completion.methods,
-    help="Method, or method:settings, such as taylor:order=12 (see `conservative list`). A name alone stands for the "
-    "default variant; `report --methods` runs all variants. Repeat the option for a table.  "
-    f"[default: {DEFAULT_METHOD}, or the first method that supports the scene's potential]",
+@methods_option(
+    "Methods with settings, such as taylor:order=12 (see `conservative list`); several make a table. A name alone stands for "
+    "the default variant; `report --methods` runs all variants.  [default: chosen for --error; with --dt the paper's, reduced]"
 )
-@click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
+@target_option
+@option(
+    "dt",
+    "Step size, s; of adaptive methods and with --error the sampling interval.  [default: the scene's]",
+    type=float,
+    metavar="S",
+)
 @t_end_option
 @json_option
 @click.option(
@@ -42,33 +61,46 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
     default=None,
     help="Errors against the reference solution, at 200 samples.  [default: unless it takes long]",
 )
-@click.option(
-    "--csv", type=Output("t (s),R_WB_11,"), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample."
-)
+@click.option("--csv", type=Output(SAMPLES), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample.")
 @click.option("--parquet", type=Output("PAR1"), help="Write the same as a Parquet file.")
+@option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
+@picture_option
 def run(
     scene: str,
     methods: tuple[str, ...],
+    error: float | None,
     dt: float | None,
     t_end: float | None,
     truth: bool | None,
     as_json: bool,
-    csv: Path | None,
-    parquet: Path | None,
+    out: Path | None,
+    **files: Path | None,
 ) -> None:
     """Integrate SCENE once and print its errors, drifts and final state; with several methods, a table.
 
-    Every step is stored. Longer runs store a million evenly spaced samples. If the run fails, the files contain the samples
-    before the failure, and the exit code is 1.
+    Without --methods and --dt, the method and the step are chosen for an attitude error of 1e-6 rad. With --methods or --dt,
+    every step is stored, of longer runs a million evenly spaced ones. If the run fails, the files contain the samples before
+    the failure, and the exit code is 1.
     """
-    if parquet is not None:
+    if files["parquet"] is not None:
         require_extra("conservative run --parquet", "parquet", "pyarrow")
-    from ..run.single_run import run_methods
+    if files["picture"] is not None:
+        require_extra("conservative run --picture", "report")
+    from ..run import single_run as work
     from ..sections.run import build
     from ..terminal.progress import progress, show_waiting
 
-    if len(methods) > 1 and (csv is not None or parquet is not None):
-        raise click.UsageError("--csv and --parquet hold the samples of one method; give --method once.")
-    with progress() if len(methods) > 1 else show_waiting(": ".join([scene, *methods])) as step:
-        summaries = run_methods(scene, methods, dt, t_end, truth, step, csv, parquet)
-    show(build(summaries), as_json)
+    names = split_names("methods", methods)
+    if len(names) > 1 and (out is not None or any(files.values())):
+        raise click.UsageError("Files hold the samples of one method; name one.")
+    waiting = progress() if len(names) > 1 else show_waiting(": ".join([scene, *names]))
+    with output_files(out, FILES, **files) as write, waiting as step:
+        summaries, trajectory = work.run_methods(scene, names, dt, t_end, truth, step, error)
+        document = build(summaries)
+        write(
+            document,
+            csv=lambda: work.csv_text(trajectory),
+            parquet=lambda: work.parquet_bytes(trajectory),
+            picture=lambda: picture_file(trajectory.plot(), files["picture"]),
+        )
+    show(document, as_json)

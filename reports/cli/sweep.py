@@ -10,26 +10,32 @@ import click
 
 from conservative.errors import BadInput, require_extra
 
-from ..document import SVG_MARK
 from . import completion
 from .options import (
+    FAILED,
     Count,
     FilePath,
-    Output,
     OutputCommand,
     epilog,
     json_option,
+    methods_option,
+    option,
+    picture_file,
+    picture_option,
     scene_argument,
     scheduler_option,
     show,
     split_list,
+    split_names,
     t_end_option,
+    target_option,
 )
 
 
 @click.command(
     cls=OutputCommand,
     short_help="Integrate many random initial states of one scene.",
+    codes={1: FAILED},
     epilog=epilog(
         "conservative sweep my_body.toml --starts 100000 --spread attitude=5deg,rate=2% --picture sweep.svg",
         "conservative sweep lagrange_top --spread inertia=1% --spread potential.weight=2% --dt 0.001 --json",
@@ -49,16 +55,9 @@ from .options import (
     "attitude=any and rate=any: uniformly distributed attitudes and directions.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")
-@click.option(
-    "--method",
-    "-m",
-    shell_complete=completion.methods,
-    help="Method, or method:settings.  [default: as for `conservative run`]",
-)
-@click.option("--dt", type=float, help="Step size, s.  [default: the scene's]")
-@click.option(
-    "--error", type=float, help="Target attitude error, rad. Chooses the method and the step size; not with --method or --dt."
-)
+@methods_option("Method, or method:settings; one.  [default: chosen for --error; with --dt as for `conservative run`]")
+@option("dt", "Step size, s.  [default: chosen for --error; with --methods the scene's]", type=float, metavar="S")
+@target_option
 @t_end_option
 @click.option(
     "--samples",
@@ -68,17 +67,13 @@ from .options import (
     metavar="M",
     help="Largest number of samples per body, including the initial and the final state; 96 bytes each.",
 )
-@click.option("--out", type=FilePath(), help="Write the samples to a new folder (Zarr).")
+@option("out", "Write the samples to a new folder (Zarr).", type=FilePath())
 @click.option(
     "--resume",
     is_flag=True,
     help="Continue an interrupted sweep in the folder --out, with the same options. Damaged blocks are computed again.",
 )
-@click.option(
-    "--picture",
-    type=Output(SVG_MARK),
-    help="Write a picture of the spread of attitudes and the distribution of drifts (SVG).",
-)
+@picture_option
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads.  [default: one per processor]")
 @scheduler_option
 @json_option
@@ -86,6 +81,7 @@ def sweep(
     scene: str,
     starts: int,
     spread: tuple[str, ...],
+    methods: tuple[str, ...],
     out: Path | None,
     picture: Path | None,
     scheduler: str | None,
@@ -93,6 +89,8 @@ def sweep(
     **options: Any,
 ) -> None:
     """Integrate random variations of SCENE, and show the spread of attitudes, the drifts and the failures.
+
+    Without --methods and --dt, both are chosen for an attitude error of 1e-6 rad.
 
     Deviations are normally distributed. --spread gives the standard deviation of each component: of a rotation vector that
     turns the initial attitude, of the initial rate, of the second moments of mass, and of parameters of the potential. A
@@ -102,26 +100,27 @@ def sweep(
     from conservative.files import text_file
     from conservative.integration.cluster import open_client
 
-    from ..charts.style import apply_style, svg_text
     from ..run import sweep as work
     from ..sections.sweep import build
     from ..terminal.progress import progress
 
     if picture is not None and picture == out:
         raise BadInput("picture", repr(str(picture)), "another name than --out")
+    if len(names := split_names("methods", methods)) > 1:
+        raise BadInput("methods", ", ".join(names), "one method")
     varied = work.read_spread(split_list("spread", spread))
     with ExitStack() as stack:
         # first, as a place that cannot be written is an error before any work
         drawing = stack.enter_context(text_file(picture, "picture")) if picture else None
         client = stack.enter_context(open_client(scheduler)) if scheduler is not None else None
-        planned = work.plan(scene, starts, varied, path=out, client=client, **options)
+        planned = work.plan(scene, starts, varied, method=names, path=out, client=client, **options)
         if out is not None:
             click.echo(f"Writing {planned.size} to {out}: {starts:,} bodies, {planned.samples} samples each", err=True)
         with progress() as step:
             ensemble, times = work.run_sweep(planned, step)
             step(1.0, "summary and picture")
             if drawing is not None:
-                drawing.write(svg_text(apply_style(ensemble.plot())))
+                drawing.buffer.write(picture_file(ensemble.plot(), picture))
             summary = work.summarize(planned, ensemble, times)
     summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
     show(build(summary), as_json)

@@ -6,16 +6,28 @@ from pathlib import Path
 
 import click
 
-from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import BadInput
 
-from . import completion
-from .options import Output, OutputCommand, epilog, json_option, scene_argument, show, split_names, t_end_option
+from .options import (
+    FAILED,
+    Output,
+    OutputCommand,
+    epilog,
+    json_option,
+    methods_option,
+    option,
+    scene_argument,
+    show,
+    split_names,
+    t_end_option,
+    target_option,
+)
 
 
 @click.command(
     cls=OutputCommand,
     short_help="Show motions side by side, as a page or a video.",
+    codes={1: f"{FAILED}, and no other reached its end"},
     epilog=epilog(
         "conservative watch brick_flip -m mujoco:Euler,reduced,exact",
         "conservative watch lagrange_top -m mujoco:RK4,taylor --dt 0.01 --out top.html",
@@ -23,17 +35,17 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
     ),
 )
 @scene_argument
-@click.option(
-    "--method",
-    "-m",
-    "methods",
-    multiple=True,
-    metavar="M,N",
-    shell_complete=completion.methods,
-    help="Methods, one panel each; the reference solutions `exact` and `precise` are also the outline in the other panels.  "
-    f"[default: {DEFAULT_METHOD}, or the first method that supports the scene]",
+@methods_option(
+    "Methods, one panel each; the reference solutions `exact` and `precise` are also the outline in the other panels.  "
+    "[default: chosen for --error; with --dt the paper's, reduced]"
 )
-@click.option("--dt", type=float, help="Step size, s.  [default: the step that an engine's users take, or the scene's]")
+@target_option
+@option(
+    "dt",
+    "Step size, s; with --error the sampling interval.  [default: the step that an engine's users take, or the scene's]",
+    type=float,
+    metavar="S",
+)
 @t_end_option
 @json_option
 @click.option(
@@ -43,40 +55,60 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
     show_default=True,
     help="File that ends in .html, .gif or .mp4. The last two need the extra `video`.",
 )
-def watch(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, out: Path) -> None:
+def watch(
+    scene: str,
+    methods: tuple[str, ...],
+    error: float | None,
+    dt: float | None,
+    t_end: float | None,
+    as_json: bool,
+    out: Path,
+) -> None:
     """Integrate SCENE with each method and show the motions side by side, on one clock.
 
-    The body is its inertia box, the arrow its angular momentum. The numbers are the largest drifts and attitude error so far.
+    The body is its inertia box, the arrow its angular momentum. The numbers are the largest drifts and attitude error so far. A
+    motion that ends early, or is wrong by more than 0.1 rad, is named. Without --methods and --dt, the motion is accurate to
+    1e-6 rad.
     """
     from conservative import registry
     from conservative.files import text_file
-    from conservative.integration.one import read_method
     from conservative.method import Role
-    from conservative.trajectory import Trajectory
 
     from ..animation import KINDS, Animation
-    from ..document.model import Document, Paragraph
-    from ..run.single_run import bounded_grid, run_on, summarize
+    from ..document.model import Block, Document, Items, Paragraph
+    from ..run import single_run as work
     from ..terminal.progress import progress
 
     if out.suffix not in KINDS:
         raise BadInput("out", repr(str(out)), f"a file that ends in {', '.join(KINDS)}")
-    body = registry.scene(scene)
-    names = split_names("method", methods) or [read_method(None, body).name]
-    chosen = [registry.method(name) for name in names]
-    longest = body.t_end if t_end is None else t_end
-    steps = [min(method.card.usual_dt or body.dt, longest) if dt is None else dt for method in chosen]
-    grids = [bounded_grid(body, method, step, t_end) for method, step in zip(chosen, steps, strict=True)]
-    truth = next((number for number, method in enumerate(chosen) if method.role == Role.TRUTH), None)
-    runs: list[Trajectory] = []
+    body, names = registry.scene(scene), split_names("methods", methods)
+    target = work.read_error(error, dt, names)
+    planned = work.plan_runs(body, names, dt, t_end, usual=True) if target is None else []
+    shown = [each for each in planned if not each.refusal]
+    data = [each.refused(body) for each in planned if each.refusal]
+    runs, labels = [], []
     with text_file(out, "out") as stream, progress() as tell:
-        for method, grid in zip(chosen, grids, strict=True):
-            tell(0.5 * len(runs) / len(chosen), method.name)
-            runs.append(run_on(body, method, grid))
-        labels = [f"{name}, dt = {grid.dt:.3g} s" for name, grid in zip(names, grids, strict=True)]
-        drawn = Animation(runs, labels, truth).render(out.suffix, lambda share: tell(0.5 + share / 2, "drawing"))
+        tell(0.0, "choosing a method" if target else shown[0].typed)
+        if target is not None:
+            runs = [work.run_chosen(body, target, dt, t_end)]
+        for each in shown:
+            tell(0.4 * len(runs) / len(shown), each.typed)
+            runs.append((work.run_on(body, each.method, each.grid), each.grid))
+        for number, (run, grid) in enumerate(runs):
+            tell(0.4 + 0.2 * number / len(runs), "errors")
+            found = work.find_errors(run, grid, None, None, t_end)
+            if target is None:
+                each = shown[number]
+                data.append(work.summarize(run, each.method, grid.dt, each.typed) | {"error": found})
+            else:
+                data.append(work.summarize_chosen(run) | {"error": found})
+            labels.append(f"{data[-1]['typed']}, dt = {data[-1]['dt']:.3g} s")
+        truth = next((number for number, each in enumerate(shown) if each.method.role == Role.TRUTH), None)
+        motions = [run for run, _ in runs]
+        drawn = Animation(motions, labels, truth).render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing"))
         stream.buffer.write(drawn)
-    data = [summarize(run, method, grid.dt) for run, method, grid in zip(runs, chosen, grids, strict=True)]
-    failures = [f"{run.label} on {body.name}: {run.outcome}" for run in runs if not run.ok]
+    notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != "ok"]
+    failures = [] if any(run.ok for run in motions) else [f"{run.label} on {body.name}: {run.outcome}" for run in motions]
     text = Paragraph(f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html"))
-    show(Document("conservative watch", body.name, [text], data={"out": str(out), "runs": data}, failures=failures), as_json)
+    blocks: list[Block] = [text, *([Items.of(notes)] if notes else [])]
+    show(Document("conservative watch", body.name, blocks, data={"out": str(out), "runs": data}, failures=failures), as_json)

@@ -6,8 +6,11 @@ from importlib import import_module
 
 from .model import Document
 
-SVG_MARK = "<!-- Written by conservative -->"
+MARK = "Written by conservative"
+SVG_MARK = f"<!-- {MARK} -->"
 """The first line of pictures in files of their own."""
+PICTURES = (".svg", ".png", ".pdf")
+"""Endings of files that contain a picture."""
 
 
 def text(document: Document, kind: str) -> str:

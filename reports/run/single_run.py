@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import shlex
+import warnings
 from collections.abc import Sequence
-from contextlib import ExitStack
-from dataclasses import asdict, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -16,13 +16,13 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import angle_between, orthonormality
-from conservative.errors import BadInput, MissingEngine
-from conservative.files import text_file
+from conservative.errors import AccuracyNotReached, BadInput, MissingEngine
 from conservative.grid import Grid, grid_for
-from conservative.integration.one import interrupt_of, read_method, require_support, warn_of_loads
+from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_loads
 from conservative.invariants import sizes
 from conservative.method import Method
 from conservative.methods.search import candidates
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.presentation import header
 from conservative.presentation import samples as samples_of
 from conservative.references.exact.method import Exact
@@ -46,8 +46,55 @@ TURNS = 1000.0
 """Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
 LARGE = 0.1
 """Attitude error, rad, above which a run is called inaccurate and another method or step is looked for."""
+TARGET = 1e-6
+"""Attitude error, rad, for which commands choose the method and the step if neither is given."""
 PARTS, MOST_TRIED = (1, 10, 100), 10**6
 """Parts into which steps are divided in the search for an accurate run, and the largest number of steps of a run there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A run of a method that is `typed` in a command, and the reason why it does not support the scene, or ""."""
+
+    typed: str
+    method: Method
+    grid: Grid
+    refusal: str = ""
+
+    def refused(self, scene: Scene) -> dict[str, Any]:
+        """Return the summary of a run that was not made."""
+        named = {"scene": scene.name, "method": self.method.name, "typed": self.typed, "label": self.method.label}
+        return named | {"outcome": Outcome(OutcomeKind.UNSUPPORTED, self.refusal), "error": {"reason": "not supported"}}
+
+
+def read_error(error: float | None, dt: float | None, names: Sequence[str]) -> float | None:
+    """Return the attitude error, rad, for which a command chooses the method and the step, or None if it does not.
+
+    Without an error, a step and names of methods it is `TARGET`. Raise `BadInput` for an error and a method.
+    """
+    if error is not None and names:
+        raise BadInput("methods", ", ".join(names), "none together with --error, which chooses the method")
+    return TARGET if error is None and dt is None and not names else error
+
+
+def plan_runs(scene: Scene, names: Sequence[str], dt: float | None, t_end: float | None, usual: bool = False) -> list[Planned]:
+    """Return the runs of the named methods on a scene, by default of the first one that supports it.
+
+    `usual` stands for the step that an engine's users take, where no dt, s, is given. A method that does not support the scene
+    raises `Unsupported` unless there are others.
+    """
+    chosen = [(name, registry.method(name)) for name in names]
+    if not chosen:
+        method = read_method(None, scene)
+        chosen = [(method.name, method)]
+    longest = scene.t_end if t_end is None else t_end
+    planned = []
+    for name, method in chosen:
+        step = min(method.card.usual_dt or scene.dt, longest) if usual and dt is None else dt
+        planned.append(Planned(name, method, bounded_grid(scene, step, t_end), method.unsupported(scene) or ""))
+    if all(each.refusal for each in planned):
+        require_support(planned[0].method, scene)
+    return planned
 
 
 def run_methods(
@@ -57,47 +104,70 @@ def run_methods(
     t_end: float | None,
     truth: bool | None,
     step: Step,
-    csv_file: Path | None = None,
-    parquet_file: Path | None = None,
-) -> list[dict[str, Any]]:
-    """Return the summary of each method on a scene, by default of the one that `integrate` uses, with its errors.
+    target: float | None = None,
+) -> tuple[list[dict[str, Any]], Trajectory]:
+    """Return the summary of each method on a scene, with its errors, and the trajectory of the last one.
 
-    The errors are those of `find_errors`. Of several methods, `wall_time`, s, is that of the fastest run after a short first
-    one, which compiles. The samples of the last method go to the files, with every digit.
+    `target` is the attitude error, rad, for which method and step are chosen (`read_error`). The errors are those of
+    `find_errors`. Of several methods, `wall_time`, s, is that of the fastest run after a short first one, which compiles; a
+    method that does not support the scene has the outcome "unsupported".
 
     Raises
     ------
     BadInput
-        A name, a setting, dt, t_end or a file cannot be used, or a method does not support the scene; raised before the first
-        run.
+        A name, a setting, dt, t_end or the target cannot be used, or no method supports the scene; raised before the first run.
     MissingEngine
         The engine of a method is not installed.
     """
-    scene = registry.scene(scene_name)
-    methods = [read_method(name, scene) for name in method_names or (None,)]
-    runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in methods]
-    for method in methods:
-        _ = method.label  # raises `MissingEngine`
-    summaries = []
-    with ExitStack() as stack:
-        stream = stack.enter_context(text_file(csv_file, "csv")) if csv_file else None
-        binary = stack.enter_context(text_file(parquet_file, "parquet")).buffer if parquet_file else None
-        for number, (method, grid) in enumerate(runs):
-            step(number / len(runs), method.name)
-            timed = {}
-            if len(runs) == 1:
-                trajectory = run_on(scene, method, grid)
-            else:
-                trajectory, timed["wall_time"] = time_run(scene, method, grid)
-            errors = find_errors(trajectory, grid, truth, scene_name, t_end)
-            summaries.append(summarize(trajectory, method, grid.dt) | {"error": errors, **timed})
-        if stream is not None:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(header(trajectory))
-            writer.writerows(samples_of(trajectory).tolist())
-        if binary is not None:
-            binary.write(trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False))
-    return summaries
+    scene, target = registry.scene(scene_name), read_error(target, dt, method_names)
+    if target is not None:
+        trajectory, grid = run_chosen(scene, target, dt, t_end)
+        errors = find_errors(trajectory, grid, truth, scene_name, t_end)
+        return [summarize_chosen(trajectory) | {"error": errors}], trajectory
+    planned, summaries = plan_runs(scene, method_names, dt, t_end), []
+    for each in planned:
+        _ = each.method.label  # raises `MissingEngine`
+    for number, each in enumerate(planned):
+        step(number / len(planned), each.typed)
+        if each.refusal:
+            summaries.append(each.refused(scene))
+            continue
+        timed = {}
+        if len(planned) == 1:
+            trajectory = run_on(scene, each.method, each.grid)
+        else:
+            trajectory, timed["wall_time"] = time_run(scene, each.method, each.grid)
+        errors = find_errors(trajectory, each.grid, truth, scene_name, t_end)
+        summaries.append(summarize(trajectory, each.method, each.grid.dt, each.typed) | {"error": errors, **timed})
+    return summaries, trajectory
+
+
+def csv_text(trajectory: Trajectory) -> str:
+    """Return the samples as CSV, with every digit."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header(trajectory))
+    writer.writerows(samples_of(trajectory).tolist())
+    return stream.getvalue()
+
+
+def parquet_bytes(trajectory: Trajectory) -> bytes:
+    """Return the samples as a Parquet file."""
+    made: bytes = trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False)
+    return made
+
+
+def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None) -> tuple[Trajectory, Grid]:
+    """Return the trajectory of `integrate(error=)` with samples every dt, s, by default the scene's step, and their grid.
+
+    The summary states a target that is not reached, so there is no warning.
+    """
+    steps = bounded_grid(scene, dt, t_end)
+    end, n = scene.t_end if t_end is None else t_end, math.ceil(steps.n_steps / steps.every)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyNotReached)
+        trajectory = integrate(scene, t_end=end, error=error, t_eval=n + 1, on_failure="return")
+    return trajectory, Grid(end / n, n)
 
 
 def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
@@ -121,13 +191,13 @@ def time_run(scene: Scene, method: Method, grid: Grid) -> tuple[Trajectory, floa
 
 
 def find_errors(
-    trajectory: Trajectory, grid: Grid, wanted: bool | None, scene_name: str, t_end: float | None
+    trajectory: Trajectory, grid: Grid, wanted: bool | None, scene_name: str | None, t_end: float | None
 ) -> dict[str, Any]:
     """Return the largest errors against the reference solution, or the reason why there are none.
 
     At most `COMPARED` samples are compared. `attitude` is in rad and `rate` in rad/s. `wanted` None leaves out long runs
     without closed form (`TURNS`). If the attitude error is above `LARGE`, `better` is the result of `find_better`.
-    `scene_name` and `t_end` are those of the command.
+    `scene_name` and `t_end` are those of the command; without a name there is no search.
     """
     scene = trajectory.scene
     if wanted is False:
@@ -147,8 +217,9 @@ def find_errors(
     attitude = angle_between(truth.R_WB, trajectory.R_WB[compared])
     rate = np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[compared], axis=1)
     errors = {"attitude": float(attitude.max()), "rate": float(rate.max()), "samples": len(compared), "truth": truth.label}
-    better = {} if attitude.max() <= LARGE else {"better": find_better(truth, grid, stride, scene_name, t_end)}
-    return errors | better
+    if scene_name is None or attitude.max() <= LARGE:
+        return errors
+    return errors | {"better": find_better(truth, grid, stride, scene_name, t_end)}
 
 
 def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_end: float | None) -> dict[str, Any] | None:
@@ -181,32 +252,48 @@ def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_e
 
 
 def status_of(summary: dict[str, Any]) -> str:
-    """Return the status of a run in words: its outcome, or that it is inaccurate."""
-    attitude = summary["error"].get("attitude", 0.0)
-    if summary["outcome"].ok and not attitude <= LARGE:
+    """Return the status of a run in words: its outcome, or that it is inaccurate or may be."""
+    if not summary["outcome"].ok:
+        return str(summary["outcome"])
+    choice = summary.get("choice")
+    attitude = summary["error"].get("attitude", choice["estimate"] if choice else None)
+    if attitude is None:
+        return "ok, but its attitude error is not known"
+    if not attitude <= LARGE:
         return f"inaccurate: the attitude error is {attitude:.1e} rad"
-    return str(summary["outcome"])
+    if choice and not choice["reached"] and not summary["error"].get("attitude", math.inf) <= choice["error"]:
+        return f"less accurate than asked for: the attitude error is {attitude:.1e} rad"
+    return "ok"
 
 
-def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
-    """Return the grid. Invalid arguments raise here, before a file is opened."""
+def bounded_grid(scene: Scene, dt: float | None, t_end: float | None) -> Grid:
+    """Return the grid, by default with the scene's step. Invalid arguments raise here, before a file is opened."""
     dt = scene.dt if dt is None else dt
     try:
         grid = grid_for(scene, dt, t_end, STEPS)  # few samples: their number is determined below
     except OverflowError:  # more steps than a float can count
         grid = Grid(dt or 0.0, STEPS + 1)
-    require_support(method, scene)
     if grid.n_steps > STEPS:
         raise BadInput("dt", f"{grid.dt:g}, for more than {STEPS:.0e} steps", "a longer step, or a shorter run (--t-end)")
     return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
 
 
-def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:
-    """Return the description of a run, its outcome, its drifts and its final state."""
+def summarize_chosen(trajectory: Trajectory) -> dict[str, Any]:
+    """Return the description of a run whose method was chosen for an error."""
+    choice = trajectory.choice
+    assert choice is not None  # of `integrate(error=)`
+    asked = {"error": choice.error, "estimate": choice.estimate, "reached": choice.reached}
+    return summarize(trajectory, choice.method, choice.dt) | {"choice": asked}
+
+
+def summarize(trajectory: Trajectory, method: Method, dt: float, typed: str = "") -> dict[str, Any]:
+    """Return the description of a run, its outcome, its drifts and its final state; `typed` is the method in the command."""
     scene = trajectory.scene
     return {
         "scene": scene.name,
         "method": method.name,
+        "typed": typed or method.name,
+        "choice": None,
         "label": trajectory.label,
         "dt": dt,
         "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,

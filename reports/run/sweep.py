@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -20,12 +20,15 @@ from conservative.integration.blocks import LOAD_BYTES, SAMPLE_BYTES
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
+from conservative.integration.one import read_method
 from conservative.integration.spread import spread
 from conservative.integration.store import find_ensemble
+from conservative.methods.trials import trials_of
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
 from ..terminal.progress import Step
+from .single_run import LARGE, read_error
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
@@ -92,9 +95,13 @@ def plan(
     seed: int,
     samples: int,
     dt: float | None,
+    error: float | None,
+    method: Sequence[str],
     **settings: Any,
 ) -> Sweep:
     """Return the sweep. `varied` is a result of `read_spread`, and the settings are those of `integrate_many`.
+
+    `method` has one name or none. Without a method and a step dt, s, both are chosen for an error, rad (`read_error`).
 
     Raises
     ------
@@ -102,6 +109,9 @@ def plan(
         A name, a number, a spread or the folder cannot be used; messages name options.
     """
     scene, out, steps = registry.scene(scene_name), settings["path"], None
+    if error is not None and dt is not None:
+        raise BadInput("dt", describe(dt), "none together with --error, which chooses the step")
+    settings |= {"error": read_error(error, dt, method), "method": method[0] if method else None}
     if settings["resume"] and out is None:
         raise BadInput("resume", "no folder", "--out, the folder of a sweep that was interrupted")
     if settings["error"] is None:
@@ -109,8 +119,6 @@ def plan(
         steps, every = grid.n_steps, math.ceil(grid.n_steps / (samples - 1))
         settings |= {"dt": grid.dt, "sample_every": every}
         samples = Grid(grid.dt, steps, every).n_samples
-    elif dt is not None:
-        raise BadInput("dt", describe(dt), "none together with --error, which chooses the step")
     else:
         end = settings["t_end"]
         end = scene.t_end if end is None else positive_number("t_end", end, "a finite duration above 0, s")
@@ -194,7 +202,10 @@ def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:
     quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, samples), samples).tolist()
     names = [f"p{100 * share:g}" for share in QUANTILES]
     error = None
-    if choice is not None:
+    if choice is None:
+        estimate = _estimate(sweep.scene, str(sweep.settings.get("method") or ""), ensemble.grid)
+        error = {"asked": None, "estimate": estimate, "reached": estimate <= LARGE, "bodies": 1}
+    else:
         reached, bodies = choice.reached, getattr(choice, "bodies", 1)
         error = {"asked": choice.error, "estimate": choice.estimate, "reached": reached, "bodies": bodies}
     return {
@@ -218,6 +229,16 @@ def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:
         ],
         **times,
     }
+
+
+def _estimate(scene: Scene, method: str, grid: Grid) -> float:
+    """Return the estimated attitude error of the scene itself, rad, from a run with twice the step; inf if it is lost."""
+    even = Grid(grid.dt, max(2, grid.n_steps // 4 * 4), 1)
+    return (
+        trials_of(scene)
+        .estimate(read_method(method or None, scene), replace(even, every=math.ceil(even.n_steps / 1000)))[0]
+        .error
+    )
 
 
 def rate_text(value: float) -> str:

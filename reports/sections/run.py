@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+from conservative.outcome import OutcomeKind
+
 from ..document.cells import DASH
 from ..document.model import Block, Document, Facts, Items, Table
 from ..run.single_run import status_of
@@ -13,7 +15,7 @@ from ..run.single_run import status_of
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:
     """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
-    first = summaries[0]
+    first = next(each for each in summaries if each["outcome"].kind is not OutcomeKind.UNSUPPORTED)
     title = f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s"
     data = [summary | {"status": status_of(summary)} for summary in summaries]
     blocks: list[Block] = [Facts(list(_facts(first)))]
@@ -28,6 +30,8 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "scene", summary["scene"]
     yield "method", summary["label"]
     yield "status", status_of(summary)
+    if choice := summary["choice"]:
+        yield "chosen for", f"an attitude error of {choice['error']:g} rad; estimated {choice['estimate']:.1e} rad"
     if "better" in summary["error"]:
         yield "more accurate", _advice(summary["error"])
     yield "run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"
@@ -58,7 +62,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
-    drifts = list(summaries[0]["drift"])
+    drifts = list(next(each["drift"] for each in summaries if "drift" in each))
     header = [
         "method",
         "outcome",
@@ -70,13 +74,17 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
     ]
     rows = [
         [
-            summary["method"],
-            status_of(summary).partition(":")[0] if summary["outcome"].ok else str(summary["outcome"]),
-            *(DASH if math.isnan(summary["drift"][name]) else f"{summary['drift'][name]:.1e}" for name in drifts),
-            *(f"{summary['error'][name]:.1e}" if name in summary["error"] else DASH for name in ("attitude", "rate")),
-            f"{summary['counters']['steps']:,}",
-            f"{summary['wall_time']:.2g}",
+            summary["typed"],
+            status_of(summary) if not summary["outcome"].ok else status_of(summary).partition(":")[0].partition(",")[0],
+            *(_cell(summary.get("drift", {}).get(name)) for name in drifts),
+            *(_cell(summary["error"].get(name)) for name in ("attitude", "rate")),
+            f"{summary['counters']['steps']:,}" if "counters" in summary else DASH,
+            f"{summary['wall_time']:.2g}" if "wall_time" in summary else DASH,
         ]
         for summary in summaries
     ]
     return Table(header, rows, title)
+
+
+def _cell(value: float | None) -> str:
+    return DASH if value is None or math.isnan(value) else f"{value:.1e}"

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from conservative.methods.trials import ASYMPTOTIC
+
 from ..document.model import Document, Facts
 from ..run.sweep import rate_text
 
@@ -28,7 +30,12 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "spread", ", ".join(f"{name}={value}" for name, value in summary["spread"].items()) + f"; seed {summary['seed']}"
     run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
     yield "run", run
-    if error := summary["error"]:
+    error = summary["error"]
+    if error["asked"] is None:
+        size = f"{error['estimate']:.2g}" if error["estimate"] < ASYMPTOTIC else f"more than {ASYMPTOTIC:g}"
+        advice = "" if error["reached"] else "; the motions are inaccurate: use --error 1e-6 without --methods and --dt"
+        yield "error", f"{size} rad, estimated for the scene itself{advice}"
+    else:
         reached = "" if error["reached"] else ", so the target is not reached"
         estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
         yield "error", f"{estimate}; target: {error['asked']:g} rad{reached}"
