@@ -10,7 +10,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import allow_build_option, epilog, find_links_option, json_option, show
+from .options import Group, allow_build_option, epilog, find_links_option, json_option, show
 
 if TYPE_CHECKING:
     from conservative.references.environments.install import Installation
@@ -19,6 +19,7 @@ Value = TypeVar("Value")
 
 
 @click.group(
+    cls=Group,
     short_help="Install, list and remove engines.",
     epilog=epilog(
         "conservative engines install exudyn mujoco@3.6.0",
@@ -33,7 +34,11 @@ def engines() -> None:
     """
 
 
-@engines.command(short_help="Install engines.", epilog=epilog("conservative engines install drake exudyn@1.13.6"))
+@engines.command(
+    short_help="Install engines.",
+    codes={1: "an engine was installed but cannot be imported"},
+    epilog=epilog("conservative engines install drake exudyn@1.13.6"),
+)
 @click.argument("names", nargs=-1, required=True, metavar="NAME[@VERSION]...")
 @find_links_option
 @allow_build_option
@@ -82,7 +87,11 @@ def add(command: str, name: str, project: bool, as_json: bool) -> None:
     _show([register(read_program(command, name, project))], lambda program: f"{program}: added", as_json)
 
 
-@engines.command(short_help="Test a program.", epilog=epilog("conservative engines check ./my_engine"))
+@engines.command(
+    short_help="Test a program.",
+    codes={1: "the program has a mistake"},
+    epilog=epilog("conservative engines check ./my_engine"),
+)
 @click.argument("command")
 @json_option
 @click.pass_context

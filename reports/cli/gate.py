@@ -37,6 +37,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "bui
 @click.command(
     cls=OutputCommand,
     short_help="Compare benchmarks with a baseline, or two versions with each other.",
+    codes={1: "the gate did not pass"},
     epilog=epilog(
         "conservative gate --against main              compare the files in this folder with a branch; needs no baseline",
         "conservative gate --against v1.2 --methods my_method --html gate.html",

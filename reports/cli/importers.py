@@ -14,6 +14,7 @@ from .options import FilePath, Output, OutputCommand, epilog, json_option, names
 @click.command(
     cls=OutputCommand,
     short_help="Compare the body that an engine loads with its file.",
+    codes={1: "an engine loads another body, refuses a valid file, or accepts a body that cannot exist"},
     epilog=epilog(
         "conservative importers my_body.urdf",
         "conservative importers my_body.sdf --engines drake,pybullet --junit importers.xml",

@@ -19,6 +19,7 @@ FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv":
 @click.command(
     cls=OutputCommand,
     short_help="Compare a recorded motion with the exact one.",
+    codes={1: "the file is wrong", 3: "its rows do not decide"},
     epilog=epilog(
         "conservative judge run.csv --body my_body.toml",
         "conservative judge run.csv --body my_body.toml --quaternion xyzw --units deg --out judged",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import click
 
-from .options import epilog, json_option, show
+from .options import Command, epilog, json_option, show
 
 
 @click.command(
     "list",
+    cls=Command,
     short_help="List scenes and methods.",
     epilog=epilog(
         "conservative list",

@@ -21,7 +21,7 @@ from .judge import judge
 from .list import list_all
 from .motions import motions
 from .new import new
-from .options import epilog
+from .options import Group, epilog
 from .recommend import recommend
 from .report import report
 from .run import run
@@ -49,7 +49,7 @@ class _Stopped(click.ClickException):
             click.echo("\n" * sys.stderr.isatty() + self.message, err=True)
 
 
-class Commands(click.Group):
+class Commands(Group):
     """Commands whose user errors end as one line on stderr and an exit code, never as a traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:

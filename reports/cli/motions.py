@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
-from .options import FilePath, epilog, json_option, require_replaceable
+from .options import Command, FilePath, epilog, json_option, option, require_replaceable
 
 
 @click.command(
+    cls=Command,
     short_help="Write exact motions as files, for the tests of an engine.",
     epilog=epilog("conservative motions --out motions"),
 )
-@click.option("--out", required=True, type=FilePath(), help="Folder for the files, two for each motion.")
+@option("out", "Folder for the files, two for each motion.", required=True, type=FilePath())
 @click.option("--force", is_flag=True, help="Replace files that this command did not write.")
 @json_option
 def motions(out: Path, force: bool, as_json: bool) -> None:

@@ -8,10 +8,11 @@ from typing import Any
 
 import click
 
-from .options import epilog
+from .options import Command, epilog
 
 
 @click.command(
+    cls=Command,
     short_help="Print a scene file to edit.",
     epilog=epilog(
         "conservative new > my_body.toml",

@@ -55,7 +55,7 @@ class Command(click.Command):
         new = {old: long for name, ((long, *_), olds) in VOCABULARY.items() if name in names for old in olds}
         for i, word in enumerate(args[: args.index("--") if "--" in args else None]):
             name, *value = word.split("=", 1)
-            if name in new:
+            if name in new and not ctx.resilient_parsing:  # as in completion
                 click.echo(f"{name} is now {new[name]}; the old name works until the next release.", err=True)
                 args = [*args[:i], "=".join([new[name], *value]), *args[i + 1 :]]
         return super().parse_args(ctx, args)
@@ -63,8 +63,23 @@ class Command(click.Command):
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         super().format_epilog(ctx, formatter)
         goes_on = "; --resume continues" * any(each.name == "resume" for each in self.params)
-        with formatter.section("Exit codes"):
-            formatter.write_dl([(str(code), self.codes[code] + goes_on * (code == 130)) for code in sorted(self.codes)])
+        write_codes(formatter, self.codes | {130: EXIT_CODES[130] + goes_on})
+
+
+def write_codes(formatter: click.HelpFormatter, codes: Mapping[int, str]) -> None:
+    """Write exit codes and their meanings."""
+    with formatter.section("Exit codes"):
+        formatter.write_dl([(str(code), codes[code]) for code in sorted(codes)])
+
+
+class Group(click.Group):
+    """A group of commands. Its help lists the exit codes that all of them have."""
+
+    command_class = Command
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_epilog(ctx, formatter)
+        write_codes(formatter, EXIT_CODES | {1: "see --help of the command"})
 
 
 class FilePath(click.Path):

@@ -10,10 +10,25 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import FilePath, engines_option, epilog, names_option, quick_option, skip_missing_option, split_list, split_names
+from .options import (
+    FAILED,
+    Command,
+    FilePath,
+    engines_option,
+    epilog,
+    methods_option,
+    names_option,
+    option,
+    quick_option,
+    skip_missing_option,
+    split_list,
+    split_names,
+)
 
 
 @click.command(
+    cls=Command,
+    codes={1: FAILED},
     short_help="Measure the paper's two scenes and write a report.",
     epilog=epilog(
         "conservative report",
@@ -25,12 +40,9 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     ),
 )
 @names_option("scenes", "Scenes.  [default: the paper's two]", complete=completion.scenes)
-@names_option(
-    "methods",
-    "Methods. A name without settings, such as mujoco, selects all its variants (`run --method` runs the default one).  "
-    "[default: a selection; with --full all]",
-    "M,N",
-    completion.methods,
+@methods_option(
+    "Methods. A name without settings, such as mujoco, selects all its variants (`run --methods` runs the default one).  "
+    "[default: a selection; with --full all]"
 )
 @engines_option
 @click.option(
@@ -57,12 +69,8 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
 @click.option("--png", is_flag=True, help="Write pictures as PNG as well.")
 @click.option("--json", "as_json", is_flag=True, help="Print the content of measurements.json instead of tables.")
 @click.option("--resume", is_flag=True, help="Continue an interrupted report, with the same options.")
-@click.option(
-    "--out",
-    type=FilePath(),
-    default="report",
-    show_default=True,
-    help="Folder of the report. An earlier report there is replaced.",
+@option(
+    "out", "Folder of the report. An earlier report there is replaced.", type=FilePath(), default="report", show_default=True
 )
 def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes and three random bodies.

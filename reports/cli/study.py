@@ -11,12 +11,15 @@ from conservative.errors import require_extra
 
 from . import completion
 from .options import (
+    FAILED,
     Output,
     OutputCommand,
     engines_option,
     epilog,
     json_option,
+    methods_option,
     names_option,
+    option,
     output_files,
     quick_option,
     show,
@@ -42,6 +45,7 @@ class StudyCommand(OutputCommand):
 
 @click.command(
     cls=StudyCommand,
+    codes={1: FAILED},
     short_help="Run one study: random bodies, work-precision, ...",
     epilog=epilog(
         "conservative study random --bodies 40 --seed 7",
@@ -54,7 +58,7 @@ class StudyCommand(OutputCommand):
 )
 @click.argument("name", shell_complete=completion.studies)
 @names_option("scenes", "Scenes to measure.  [default: the study's own]", complete=completion.scenes)
-@names_option("methods", "Methods.  [default: all]", "M,N", completion.methods)
+@methods_option("Methods.  [default: all]")
 @engines_option
 @click.option(
     "--bodies",
@@ -73,7 +77,7 @@ class StudyCommand(OutputCommand):
 @json_option
 @click.option("--csv", type=Output(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=Output(FILES["study.md"]), help="Write the tables as Markdown.")
-@click.option("--out", type=Output(FILES), help=f"Write {', '.join(FILES)} into this folder.")
+@option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
 def study(
     name: str,
     scenes: tuple[str, ...],

@@ -18,6 +18,7 @@ from .options import (
     find_links_option,
     json_option,
     names_option,
+    option,
     output_files,
     show,
     split_names,
@@ -30,6 +31,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 @click.command(
     cls=OutputCommand,
     short_help="Compare versions of an engine.",
+    codes={1: "with --against: an order, an invariant or the end of a run is lost"},
     epilog=epilog(
         "conservative track mujoco 3.6.0 3.7.0 4.0.0",
         "conservative track exudyn --last 3 --out exudyn_track",
@@ -53,7 +55,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 @json_option
 @click.option("--junit", type=Output('name="conservative track '), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(PAGE["track.md"]), help="Write tables and changes as Markdown.")
-@click.option("--out", type=Output(PAGE), help=f"Write {', '.join(PAGE)} into this folder.")
+@option("out", f"Write {', '.join(PAGE)} into this folder.", type=Output(PAGE))
 @find_links_option
 @allow_build_option
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:

@@ -151,7 +151,7 @@ def test_the_advice_for_an_inaccurate_run_is_a_command_that_is_accurate(scene, t
     if scene not in NAMED:
         place = tmp_path / "my body.toml"
         place.write_text(conservative("new").stdout if scene == "new" else scene)
-        options = () if scene == "new" else ("--dt", "0.05" if scene is CHAOTIC else "0.2")
+        options = ("-m", "reduced") if scene == "new" else ("--dt", "0.05" if scene is CHAOTIC else "0.2")
     summary = run_as_json(place, *options)
     assert summary["error"]["attitude"] > 0.1  # measured 0.2 and more
     assert summary["status"].startswith("inaccurate")
@@ -293,7 +293,7 @@ def test_missing_engine_is_listed_with_its_install_line(monkeypatch):
     entry = next(method for method in listed["methods"] if method["name"] == "reduced")
     assert not entry["available"]
     assert "pip install some-package" in entry["reason"]
-    done = conservative("run", "brick_flip")
+    done = conservative("run", "brick_flip", "-m", "reduced")
     assert done.exit_code == 2
     assert "pip install some-package" in done.stderr
 
@@ -317,7 +317,7 @@ def test_new_writes_a_file_that_every_command_takes_for_a_scene(tmp_path):
     written = conservative("new")
     assert written.exit_code == 0
     path.write_text(written.stdout)
-    done = conservative("run", path, "--t-end", "0.1", "--json")
+    done = conservative("run", path, "-m", "reduced", "--t-end", "0.1", "--json")
     assert done.exit_code == 0
     summary = json.loads(done.stdout)
     assert (summary["scene"], summary["outcome"]["kind"], summary["dt"]) == ("my_body", "ok", 0.002)

@@ -60,8 +60,8 @@ def test_the_last_of_several_is_completed(folder):
     ("words", "offered"),
     [
         ("l", ("plain", "list")),
-        ("run brick_flip --method re", ("plain", "reduced")),
-        ("recommend brick_flip --engine muj", ("plain", "mujoco")),
+        ("run brick_flip --methods lame,re", ("plain", "lame,reduced")),
+        ("recommend brick_flip --engines muj", ("plain", "mujoco")),
         ("report --re", ("plain", "--resume")),
         ("track exu", ("plain", "exudyn")),
         ("report --engines al", ("plain", "all")),

@@ -212,7 +212,7 @@ def test_every_part_of_a_scene_acts_on_the_bodies_of_a_sweep(name, tmp_path):
         scene = tmp_path / "loaded.toml"
         scene.write_text(LOADED)
     given, run = cv.registry.scene(str(scene)), ("--starts", "3", *SPREAD, "--out", tmp_path / "a.zarr")
-    more = ("--picture", tmp_path / "a.svg", "--t-end", 20 * given.dt, "--samples", "21", "--json")
+    more = ("--picture", tmp_path / "a.svg", "--dt", given.dt, "--t-end", 20 * given.dt, "--samples", "21", "--json")
     done = conservative(scene, *run, *more)
     assert done.exit_code == 0, done.output
     content, starts = json.loads(done.stdout), cv.spread(given, 3, attitude="5deg", rate="2%", seed=3)
