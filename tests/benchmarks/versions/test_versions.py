@@ -17,6 +17,7 @@ from conservative.reports.cli.main import main
 
 from ...environments import ROOT
 from ...environments import Environment as WheelEnvironment
+from ...pages import shell_lines
 from ...references.local_wheels import write_numpy, write_wheel
 
 pytestmark = pytest.mark.slow
@@ -238,6 +239,15 @@ def gate(example, install, tmp_path, monkeypatch):
         return done.exit_code, json.loads(done.stdout)
 
     return run
+
+
+def test_the_command_of_readme_passes_in_a_project_without_changes(example, install, monkeypatch):
+    monkeypatch.setattr(version, "environment_of", install)
+    monkeypatch.chdir(example)
+    git(example, "checkout", "--quiet", "--", ".")
+    (words,) = (words for words in shell_lines((ROOT / "README.md").read_text(encoding="utf-8")) if words[1] == "gate")
+    done = CliRunner().invoke(main, [*words[1:], *OPTIONS])
+    assert done.exit_code == 0, done.output
 
 
 def measures(answer):
