@@ -265,7 +265,7 @@ def watch(cell: Cell) -> None:
 
 def recommend(cell: Cell) -> None:
     """The cheapest setting reaches the error."""
-    found = cell.call("recommend", cell.name, "--error", "1e-4", "--engine", "scipy")
+    found = cell.call("recommend", cell.name, "--error", "1e-4", "--engines", "scipy")
     assert found["cheapest"]
     scene = cell.row.scene()
     for each in found["recommendations"]:

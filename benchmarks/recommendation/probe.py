@@ -43,6 +43,8 @@ SAMPLES = 32
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
 """Wall time, s, of a short and of a long probe; with a short step it covers less of the motion."""
 LONG_SAMPLES = 256
+FINER = 10
+"""Spacings between two samples, if a window is long enough: round steps near that interval are multiples of the spacing."""
 LEAST_SAMPLES = 4
 STEPS = 8
 """Least number of steps in a short window."""
@@ -141,6 +143,11 @@ class Conditions(Question):
         return self.samples * self.spacing
 
     @property
+    def longest_step(self) -> float:
+        """Longest step to try, s: a window has `LEAST_SAMPLES` of them, and loads are resolved."""
+        return min(self.short / LEAST_SAMPLES, self.scene.smoothness(self.duration).step if self.scene.loads else math.inf)
+
+    @property
     def target(self) -> float:
         """Error that settings are chosen for, rad."""
         return SAFETY * self.error
@@ -193,11 +200,13 @@ class Conditions(Question):
     def window(self, dt: float, cost: float, long: bool) -> Grid:
         """Return the samples of a run with steps of at most dt, s, that cost `cost` s/s: as far as the time limit allows.
 
-        A short window has samples at the spacing. A long one extends as far as there is truth to measure errors by.
+        A short window has few samples. A long one extends as far as there is truth to measure errors by.
         """
         least = max(1, round(dt / self.spacing))
         affordable = (LONG_RUN_LIMIT if long else RUN_LIMIT) / cost if cost > 0 else math.inf
         length = min(self.duration, affordable, self.truth_until if long else self.short)
+        if length >= LEAST_SAMPLES * math.lcm(least, FINER) * self.spacing:
+            least = math.lcm(least, FINER)
         sampling = least * max(1, math.ceil(length / (LONG_SAMPLES * least * self.spacing) * (1 - 1e-9)))
         n = max(LEAST_SAMPLES, math.ceil(length / (sampling * self.spacing) * (1 - 1e-9)))
         return Grid(sampling * self.spacing, n)
@@ -292,10 +301,10 @@ def prepare_conditions(asked: Question) -> Conditions:
     widest = min(length / SAMPLES, step_ladder.RADIANS / rate)
     power = math.floor(math.log10(widest))
     digit = max(digit for digit in (1, 2, 5) if digit <= widest / 10.0**power * (1 + 1e-9))
-    spacing = float(f"{digit}e{power}")
+    spacing = float(f"{digit}e{power}") / FINER
     samples = math.ceil(length / spacing * (1 - 1e-9))
-    # Runs with steps longer than the spacing end up to an eighth later.
-    truth = reference(scene, Grid(spacing, samples + samples // 8 + 1))
+    # Runs with steps longer than the spacing end up to a quarter later.
+    truth = reference(scene, Grid(spacing, samples + samples // LEAST_SAMPLES + 1))
 
     @lru_cache(maxsize=MOST_GRIDS)
     def closed_form(grid: Grid) -> Array:

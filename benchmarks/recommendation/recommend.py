@@ -4,7 +4,8 @@
 2. The reference solution is confirmed by a second one. A closed form covers the whole duration, others cover the probes.
 3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `Conditions`).
 4. Our methods are those of the automatic choice: its first choice, and if that has no truncation error, the best general
-   integrator as well. Each method is probed from coarse to fine (`refine`). A stated law extrapolates errors to the duration.
+   integrator as well. Each method is probed from coarse to fine (`refine`), and then until the error asked for lies between
+   two settings that are close (`_enclose`). A stated law extrapolates errors to the duration.
 5. The resulting settings are timed against each other in interleaved rounds.
 """
 
@@ -38,7 +39,7 @@ from ..studies.selection import tolerance_setting
 from ..studies.speed import CALL, own_loop
 from ..studies.study import HANG_LIMIT, Progress
 from ..studies.time_limit import attempt_here
-from .probe import RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
+from .probe import LEAST_SAMPLES, RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
 
 COST_LIMIT = 1.0
 """Wall time per simulated second, s/s, that a setting may cost: real time."""
@@ -56,8 +57,11 @@ TIGHTEST = -16
 """Exponent of the smallest tolerance: round-off."""
 LARGEST_TOLERANCE_CUT = 4
 """Largest cut of a tolerance from one probe to the next, powers of ten."""
-COARSEN_BELOW = 1 / 16
-"""A longer step is tried as well if the error is below this share of the requested one."""
+CLOSE = 1.5
+"""Steps are halved or doubled until the error asked for lies between two whose ratio is at most this."""
+MOST_PROBES = 2 * ATTEMPTS
+PROBE_LIMIT = 0.3
+"""Wall time, s, that the shortest probe at a setting may take."""
 
 
 def ask(
@@ -80,7 +84,7 @@ def ask(
         A named engine is not installed.
     """
     positive_number("error", error, "a finite attitude error above 0, rad")
-    end = scene.t_end if duration is None else positive_number("duration", duration, "a finite duration above 0, s")
+    end = scene.t_end if duration is None else positive_number("t_end", duration, "a finite duration above 0, s")
     for load in scene.loads:
         load.require_times(end)
     positive_number("cost_limit", cost_limit, "a finite wall time per simulated second above 0, s/s")
@@ -108,7 +112,7 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
         known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
             if registry.partition_version(name.partition(":")[0])[0] not in known:
-                raise BadInput("engine", repr(name), nearest(name, known))
+                raise BadInput("engines", repr(name), nearest(name, known))
         wanted = list(selection.methods(names))
     lines = {selection.series(method): method for method in reversed(wanted)}
     return tuple(reversed(lines.values()))
@@ -175,7 +179,7 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     refinements: dict[str, Refinement | Outcome] = {}
     for i, (method, step) in enumerate(starts):
         line = selection.series(method)
-        progress(0.2 + 0.7 * i / len(starts), f"probing {line}")
+        progress(0.2 + 0.7 * i / len(starts), f"probing steps or tolerances of {line}")
         roles[line] = method.role
         refinements[line] = _refine_from_start(conditions, method, step)
     progress(0.9, "timing")
@@ -251,7 +255,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     expect = expect_linear if longer else attrgetter("expected")
     short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], expect, long=False)
     if not longer or expect(short[-1]) > conditions.target:
-        return Refinement(tuple(short))
+        return Refinement(tuple(_enclose(conditions, short, long=False)))
     last, order = short[-1], method.order
     before: Sequence[Probe] = short
     long = []
@@ -260,14 +264,48 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
         step = min(LONGER * last.dt, short[0].dt)
         before = long = [conditions.probe(method, step, last.cost * last.dt / step, True)]
     long = [*long, conditions.probe(last.method, last.dt, last.cost, True, before)]
-    first = long[-1]
     long = _refine_until(conditions, long, attrgetter("expected"), long=True)
-    if order is not None and first.expected < COARSEN_BELOW * conditions.target:
-        # At most four times: the error must still shrink with its order there.
-        factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / order))
-        step = conditions.round_step(first.dt * factor)
-        long += [conditions.probe(method, step, first.cost * first.dt / step, True)] if step > first.dt else []
-    return Refinement(tuple(short), tuple(long))
+    return Refinement(tuple(short), tuple(_enclose(conditions, long, long=True)))
+
+
+def _enclose(conditions: Conditions, probes: list[Probe], long: bool) -> list[Probe]:
+    """Return probes with more settings, until the error asked for lies between two that are close, if one reaches it.
+
+    Steps are tried up to the longest that a window has samples for, and tolerances between those of the probes.
+    """
+    while len(probes) < MOST_PROBES:
+        good = [probe for probe in probes if probe.expected <= conditions.target]
+        if not good or (probes[0].method.order is None and tolerance_setting(probes[0].method) is None):
+            break
+        best = max(good, key=attrgetter("setting"))
+        coarser = min((probe.setting for probe in probes if probe.setting > best.setting), default=math.inf)
+        between = _step_between if tolerance_setting(best.method) is None else _tolerance_between
+        setting = between(conditions, best, coarser)
+        if setting is None:
+            break
+        method, dt = setting
+        probes.append(conditions.probe(method, dt, best.cost * best.dt / dt, long, tuple(probes)))
+    return sorted(probes, key=attrgetter("setting"), reverse=True)
+
+
+def _step_between(conditions: Conditions, best: Probe, coarser: float) -> tuple[Method, float] | None:
+    """Return the method and a round step, s, between that of the best probe and a coarser one that fails, or twice the best."""
+    longest = conditions.longest_step
+    wanted = min(2 * best.dt, longest) if math.isinf(coarser) else math.sqrt(best.dt * coarser)
+    dt = conditions.round_step(wanted)
+    if dt <= best.dt * (1 + 1e-9):
+        dt = conditions.round_step(wanted, up=True)
+    inside = best.dt * (1 + 1e-9) < dt < min(coarser * (1 - 1e-9), longest * (1 + 1e-9))
+    return (best.method, dt) if inside and coarser > CLOSE * best.dt else None
+
+
+def _tolerance_between(conditions: Conditions, best: Probe, coarser: float) -> tuple[Method, float] | None:
+    """Return the method with a power of ten between the tolerance of the best probe and a looser one that fails."""
+    name, fine = tolerance_setting(best.method), round(math.log10(best.setting))
+    power = fine + 1 if math.isinf(coarser) else (fine + round(math.log10(coarser)) + 1) // 2
+    if name is None or 10.0**power >= min(coarser, 10 * LOOSEST) * (1 - 1e-9) or power == fine:
+        return None
+    return selection.at_tolerance(best.method, name, float(f"1e{power}")), best.dt
 
 
 def _refine_until(conditions: Conditions, probes: list[Probe], expect: Callable[[Probe], float], long: bool) -> list[Probe]:
@@ -295,10 +333,15 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     growing = sum(conditions.shows_growth(probe) for probe in probes)
     if conditions.shows_growth(last) and growing < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that an order can be observed
-    dt = conditions.round_step(last.dt * factor)
-    if dt < per_step / conditions.cost_limit:
-        dt = conditions.round_step(per_step / conditions.cost_limit, up=True)
+    dt, least = conditions.round_step(last.dt * factor), per_step * _most_per_step(conditions)
+    if dt < least:
+        dt = conditions.round_step(least, up=True)
     return (last.method, dt, per_step / dt) if dt < last.dt * (1 - 1e-9) else None
+
+
+def _most_per_step(conditions: Conditions) -> float:
+    """Return the shortest step, s, divided by the wall time of a step, s, by the limits of costs and of probes."""
+    return max(1 / conditions.cost_limit, LEAST_SAMPLES * conditions.spacing / PROBE_LIMIT)
 
 
 def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
@@ -340,6 +383,8 @@ def _explain_shortfall(conditions: Conditions, refinement: Refinement, probe: Pr
         return "the motion amplifies errors without bound"
     if last[-1].cost > conditions.cost_limit / 2:
         return f"anything finer costs more than {conditions.cost_limit:g} s per simulated second"
+    if last[-1].cost * _most_per_step(conditions) > 1 / 2:
+        return f"a probe of anything finer takes longer than {PROBE_LIMIT:g} s"
     if _at_round_off(last):
         return "finer settings do not help: round-off"
     if tolerance_setting(probe.method) is not None:

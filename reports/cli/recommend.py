@@ -70,11 +70,6 @@ def recommend(
     extrapolated, and the result states how.
     """
     require_extra("conservative recommend", "report")
-    from conservative import registry
-    from conservative.benchmarks.recommendation.recommend import ask
-    from conservative.benchmarks.recommendation.recommend import recommend as answer
-
-    from ..sections.recommendation import build
     from ..terminal.progress import progress
 
     def draw(path: Path | None = None) -> bytes:
@@ -82,7 +77,13 @@ def recommend(
 
         return picture_file(charts.picture(recommendation), path)
 
-    with progress() as step:
+    with progress(f"looking for methods and settings for an attitude error of {error:g} rad on {scene}") as step:
+        from conservative import registry  # imports take a second, in which the title is shown
+        from conservative.benchmarks.recommendation.recommend import ask
+        from conservative.benchmarks.recommendation.recommend import recommend as answer
+
+        from ..sections.recommendation import build
+
         names = split_names("engines", engines) or None
         question = ask(registry.scene(scene), error, t_end, names, cost_limit, time_limit)
         with output_files(out, FILES, picture=picture) as write:

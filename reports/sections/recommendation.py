@@ -9,7 +9,7 @@ from typing import Any
 
 from conservative.benchmarks.recommendation.growth import ExpectedDrift
 from conservative.benchmarks.recommendation.probe import Probe
-from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
+from conservative.benchmarks.recommendation.recommend import PROBE_LIMIT, Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..document.model import Block, Document, Emphasis, Items, Paragraph, Section, Table
@@ -127,6 +127,7 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
         yield Table(REACHING, reaching, "Settings that reach the error, fastest first")
     if failing:
         limit = f"Methods that do not, at up to {recommendation.conditions.cost_limit:g} s of wall time per simulated second"
+        limit += f" and {PROBE_LIMIT:g} s for a probe"
         yield Table(FAILING, failing, limit)
 
 

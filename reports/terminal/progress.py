@@ -29,10 +29,12 @@ def announce(what: str) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Step]:
-    """Yield the function to call before each step."""
+def progress(title: str = "") -> Iterator[Step]:
+    """Yield the function to call before each step. Without a terminal, the title is a line after `DELAY`."""
     if not has_terminal() or find_spec("rich") is None:  # the gate runs without the extra `report`, which has rich
         said = start = monotonic()
+        timer = Timer(DELAY, announce, [title])
+        timer.daemon = True
 
         def step(share: float, what: str) -> None:
             nonlocal said
@@ -42,12 +44,17 @@ def progress() -> Iterator[Step]:
                 print(f"{share:.0%}{left}: {what}", file=sys.stderr, flush=True)
                 said = now
 
-        yield step
+        if title:
+            timer.start()
+        try:
+            yield step
+        finally:
+            timer.cancel()
         return
     from .bars import Bar
 
     with Bar() as bar:
-        task = bar.add_task("", total=1.0)
+        task = bar.add_task(title, total=1.0)
         yield lambda share, what: bar.update(task, completed=share, description=what)
 
 

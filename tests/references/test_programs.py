@@ -43,11 +43,11 @@ def test_a_program_is_an_engine_until_it_is_removed(folder):
     (method,) = select_engines(["mine"])
     assert (method.label, method.order) == ("mine==1/mine", 4)
     assert [each.name for each in list_engines(["mine"])] == ["mine"]
-    code, text = run("run", "brick_flip", "--method", "mine", "--t-end", "1", "--json")
+    code, text = run("run", "brick_flip", "--methods", "mine", "--t-end", "1", "--json")
     assert (code, json.loads(text)["outcome"]["kind"]) == (0, "ok")
     assert run("engines", "list")[1].startswith("mine: ")
     assert "mine: " in run("engines", "remove", "mine")[1]
-    assert run("run", "brick_flip", "--method", "mine")[0] == 2
+    assert run("run", "brick_flip", "--methods", "mine")[0] == 2
 
 
 def test_paths_in_the_file_of_a_project_are_relative_to_it(folder, monkeypatch):
@@ -115,7 +115,7 @@ def test_a_program_that_cannot_be_used_is_not_registered(arguments, message, fol
 
 def test_a_program_that_is_gone_is_named_with_file_and_remedy(folder):
     (folder / "conservative.toml").write_text('[engines]\nmine = "build/mine"\n')
-    code, text = run("run", "brick_flip", "--method", "mine")
+    code, text = run("run", "brick_flip", "--methods", "mine")
     problem = f"{folder}/conservative.toml: crashed (build/mine cannot be started: No such file or directory)"
     remedy = "Build it or change it as PROTOCOL.md describes, or run: conservative engines remove mine"
     assert (code, text) == (2, f"Error: mine, a program of {problem}. {remedy}\n")

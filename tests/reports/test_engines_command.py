@@ -78,12 +78,12 @@ COMMANDS = {
     "engines install": ("{}", "--find-links", "."),
     "engines remove": ("{}",),
     "importers": ("--engines", "{}"),
-    "recommend": ("brick_flip", "--error", "1e-3", "--engine", "{}"),
+    "recommend": ("brick_flip", "--error", "1e-3", "--engines", "{}"),
     "report": ("--quick", "--methods", "reduced", "--engines", "{}"),
-    "run": ("brick_flip", "--method", "{}"),
+    "run": ("brick_flip", "--methods", "{}"),
     "study": ("motion", "--methods", "{}"),
-    "sweep": ("brick_flip", "--spread", "rate=1%", "--starts", "2", "--method", "{}"),
-    "watch": ("brick_flip", "--method", "{}", "--out", "motion.html"),
+    "sweep": ("brick_flip", "--spread", "rate=1%", "--starts", "2", "--methods", "{}"),
+    "watch": ("brick_flip", "--methods", "{}", "--out", "motion.html"),
 }
 """Commands that take an engine with a version, and their arguments."""
 MORE = [("study", ("engines_at_one_step", "--engines", "{}")), ("report", ("--quick", "--methods", "{}:RK4"))]
@@ -96,7 +96,7 @@ def names_of_commands():
     for start, group in groups.items():
         for name in group.list_commands(None):
             parameters = getattr(group.get_command(None, name), "params", ())
-            if {each.name for each in parameters} & {"method", "methods", "engine", "engines", "names", "command"}:
+            if {each.name for each in parameters} & {"methods", "engines", "engine", "names", "command"}:
                 yield start + name
 
 
