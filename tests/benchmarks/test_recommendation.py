@@ -116,15 +116,15 @@ def satellite():
 
 
 def test_the_error_asked_for_lies_between_two_probes_that_are_close():
-    """Of a satellite, steps twice as long were not tried, and steps that lose the attitude and steps at round-off were."""
+    """On a satellite the first step, 160 s, loses the attitude, and the next one, 20 s, is at round-off."""
     scene = satellite()
-    answer = recommend(ask(scene, 1e-6, 5400.0, ("heyoka:frame=lean", "mujoco:Euler")))
+    answer = recommend(ask(scene, 1e-4, 5400.0, ("heyoka:frame=lean", "mujoco:Euler")))
     ours, heyoka, euler = answer.advice
-    for advice, ratio in ((ours, 1.6), (heyoka, 11)):  # measured 1.28, and a power of ten
+    for advice, ratio in ((ours, 1.6), (heyoka, 11)):  # measured 1.25, and a power of ten
         coarser = min((p for p in advice.probes if p.setting > advice.best.setting), key=lambda p: p.setting)
         assert coarser.setting < ratio * advice.best.setting
-        assert advice.best.expected <= 0.5e-6 < coarser.expected < 0.01  # measured 7e-8 and 9e-7, 2e-9 and 6e-7
-    assert true_error(scene, ours.best, 5400.0, Heyoka(1e-16)) < 1e-6  # measured 1e-7
+        assert advice.best.expected <= 0.5e-4 < coarser.expected < 0.01  # measured 4e-5 and 6e-4, 3e-6 and 5e-5
+    assert true_error(scene, ours.best, 5400.0, Heyoka(1e-16)) < 1e-4  # measured 3e-5
     assert max(probe.length / probe.dt for probe in euler.probes) < 3e6  # measured 1e5: 0.3 s
     assert "takes longer than" in euler.reason
 
