@@ -41,7 +41,9 @@ _AXES: tuple[Sequence[str], ...] = ("xyz", "123", "012", ("roll", "pitch", "yaw"
 _MATRIX = tuple([row + column for row in digits for column in digits] for digits in ("123", "012"))
 _LONG = r"(.*(?:gyro(?:scope)?(?:adc)?|angular(?:velocity|rates?)|ang(?:vel|rate)|bodyrates?|rotationrates?|omega)[a-z]*?|"
 _RATES = _LONG + r"w|wwbb|wrss|wbn|wb|wbi|gyr|rates?|(?=[pqr]$))"
-_QUATERNION = r"(.*(?:quat(?:ernion)?q?|orientation|rotation|attitude)|q|qwb|qib|qbi|qbn|qnb|qbl|qrs|epbn|rot|att)"
+_ORDER = "(?:wxyz|xyzw)"
+_LETTERS = "q|qwb|qib|qbi|qbn|qnb|qbl|qrs|epbn|rot|att"
+_QUATERNION = rf"((?:.*(?:quat(?:ernion)?q?|orientation|rotation|attitude)|{_LETTERS}){_ORDER}?)"
 COLUMNS: dict[str, tuple[str, Sequence[Sequence[str]]]] = {
     "time": (r"(.*?)(times?(?:stamps?)?|secondselapsed|elapsed(?:secs)?|seconds|secs?|t|headerstamp|stamp)", ()),
     "rates": (rf"{_RATES}([xyz0123pqr]|roll|pitch|yaw)", (*_AXES, "pqr")),
@@ -89,7 +91,8 @@ class Options:
     """How the columns are to be read; None where header and numbers decide.
 
     `quaternion`, "wxyz" or "xyzw", is the order of numbered columns. `euler`, such as zyx, is the sequence of angles about axes
-    that turn along. `world` is True for rates in world axes, and `units`, "deg" or "rad", are those of columns that name none.
+    that turn along. `world` is True for rates in world axes, and `units`, "deg" or "rad", are those of columns that name
+    none; "deg/s" or "rad/s" are those of rates only.
     `columns`, such as `time=1,w=2:3:4`, names columns by their names or numbers from 1.
     """
 
@@ -122,7 +125,7 @@ class Layout:
     def numbered(self) -> bool:
         """Whether the quaternion's columns are numbered, so that their order is open. MuJoCo's qpos are scalar first."""
         keys = [_split(name)[0] for name in self.used.get("quaternion", ())]
-        return bool(keys) and keys[0][-1] not in "wxyz" and not keys[0].startswith("qpos")
+        return bool(keys) and keys[0][-1] not in "wxyz" and not re.match(f"qpos|.*{_ORDER}.$", keys[0])
 
     @property
     def places(self) -> list[int]:
@@ -493,8 +496,8 @@ def _choose(path: Path, layout: Layout, options: Options) -> Layout:
         usual: str | None = "s" if kind == "time" else "rad"
         texts = [_split(name)[1] for name in chosen[kind]]
         if None in texts and kind in ("rates", "angles", "rotation vector"):
-            usual = options.units
-            layout.notes += ["unit"] * (options.units is not None)
+            usual = None if "/" in (options.units or "") and kind != "rates" else options.units
+            layout.notes += ["unit"] * (usual is not None)
         plain = kind not in ("time", "rates", "angles", "rotation vector")  # a unit behind a quaternion is no unit
         sizes = [math.nan if (unit := text or usual) is None else 1.0 if plain else UNITS.get(unit, 0.0) for text in texts]
         if 0.0 in sizes:
@@ -633,7 +636,9 @@ def _by_name(path: Path, names: list[str], options: Options) -> dict[str, list[s
             short = SHORT.get(kind, kind)
             offered = " or ".join(f"--columns {short}={':'.join(members)}" for members in full.values())
             raise BadInput("run", f"{path} with several sets of {kind}: {'; '.join(map(', '.join, full.values()))}", offered)
-        chosen |= {kind: next(iter(full.values()))} if full else {}
+        for prefix, members in full.items():
+            numbered = prefix.endswith("xyzw") and not _split(members[0])[0].endswith("w")
+            chosen[kind] = [*members[-1:], *members[:-1]] if numbered else members
     place = {split[name]: name for name in names}
     for joint, skip in (
         ("qvel", 3),

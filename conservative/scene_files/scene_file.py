@@ -221,13 +221,18 @@ def _attitude(table: TomlTable, key: str) -> Array:
     given = {"axis" if form == "angle" else form for form in forms.values}
     if len(given) != 1:
         got = " and ".join(forms.values) or "an empty table"
-        raise table.bad(key, got, "a matrix, or one of: quaternion_wxyz; rotation_vector; axis and angle")
+        raise table.bad(key, got, "a matrix, or one of: quaternion_wxyz; quaternion_xyzw; rotation_vector; axis and angle")
     return forms.call(_ATTITUDES[given.pop()])
 
 
 def _quaternion(quaternion_wxyz: ArrayLike) -> Array:
     allowed = "four finite numbers (4,), scalar first, not all 0"
     return from_quaternion(unit_vector("quaternion_wxyz", quaternion_wxyz, allowed, size=4))
+
+
+def _quaternion_xyzw(quaternion_xyzw: ArrayLike) -> Array:
+    allowed = "four finite numbers (4,), scalar last, not all 0"
+    return from_quaternion(np.roll(unit_vector("quaternion_xyzw", quaternion_xyzw, allowed, size=4), 1))
 
 
 def _vector(rotation_vector: ArrayLike) -> Array:
@@ -244,6 +249,7 @@ def _axis_angle(axis: ArrayLike, angle: float) -> Array:
 
 _ATTITUDES: dict[str, Callable[..., Array]] = {
     "quaternion_wxyz": _quaternion,
+    "quaternion_xyzw": _quaternion_xyzw,
     "rotation_vector": _vector,
     "axis": _axis_angle,
 }

@@ -8,9 +8,23 @@ from typing import Any
 
 import click
 
+from conservative.errors import require_extra
+
 from ..document import SVG_MARK
 from . import completion
-from .options import FilePath, Output, OutputCommand, epilog, json_option, output_files, show
+from .options import (
+    FilePath,
+    Output,
+    OutputCommand,
+    epilog,
+    error_option,
+    json_option,
+    option,
+    output_files,
+    picture_file,
+    picture_option,
+    show,
+)
 
 FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv": "t,quantity,value", "judge.svg": SVG_MARK}
 """The files of `--out`, and how each begins."""
@@ -34,13 +48,18 @@ FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv":
 @click.option("--quaternion", type=click.Choice(["wxyz", "xyzw"]), help="Order of numbered columns.  [default: what fits]")
 @click.option("--euler", metavar="ZYX", help="Sequence of Euler angles: zyx for yaw, pitch, roll.")
 @click.option("--rates", type=click.Choice(["body", "world"]), default="body", show_default=True, help="Axes of the rates.")
-@click.option("--units", type=click.Choice(["deg", "rad"]), help="Unit of angles and rates whose columns name none.")
+@click.option(
+    "--units",
+    type=click.Choice(["deg", "rad", "deg/s", "rad/s"]),
+    help="Unit of angles and rates whose columns name none; with /s of rates only.",
+)
 @click.option(
     "--start", type=click.Choice(["row", "scene"]), default="row", show_default=True, help="First row, or the scene's t = 0."
 )
-@click.option("--error", type=float, help="Allowed error: rad, or relative to the largest rate.  [default: digits and noise]")
+@error_option("Allowed error: rad, or relative to the largest rate.  [default: digits and noise]")
 @json_option
-@click.option("--out", type=Output(FILES), help=f"Write {', '.join(FILES)} into this folder.")
+@option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
+@picture_option
 def judge(
     run: Path,
     body: str,
@@ -49,6 +68,7 @@ def judge(
     error: float | None,
     as_json: bool,
     out: Path | None,
+    picture: Path | None,
     **reading: Any,
 ) -> None:
     """Compare the motion in the file RUN with the exact motion of a body, and name what explains the difference.
@@ -56,6 +76,8 @@ def judge(
     RUN is a table (CSV, STK attitudes, JSON lines or Parquet) of times with attitudes, rates or both. The exit code is 0 if it
     is right, 1 if it is wrong, and 3 if its rows do not decide.
     """
+    if picture is not None:
+        require_extra("conservative judge --picture", "report")
     from conservative import registry
     from conservative.benchmarks.judge import table, verdict
 
@@ -64,11 +86,15 @@ def judge(
 
     drawn = find_spec("pandas") is not None and find_spec("altair") is not None
     files = [name for name in FILES if drawn or not name.endswith("svg")]
-    with output_files(out, files) as write, show_waiting(f"judging {run.name}", line=True) as step:
+    with output_files(out, files, picture=picture) as write, show_waiting(f"judging {run.name}", line=True) as step:
         recording = table.read(run, table.Options(world=rates == "world", **reading))
         summary, rows = verdict.judge(registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what))
         document = build(summary, run.name)
-        write(document, csv=lambda: table_text(rows), svg=lambda: picture(summary, rows, run.name))
+
+        def draw(path: Path | None = None) -> bytes:
+            return drawing(summary, rows, run.name, path)
+
+        write(document, csv=lambda: table_text(rows), svg=draw, picture=lambda: draw(picture))
     show(document, as_json, silent=True)
     if summary["verdict"] == "undecided":
         raise click.exceptions.Exit(3)
@@ -79,10 +105,10 @@ def table_text(rows: list[dict[str, Any]]) -> str:
     return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in rows)
 
 
-def picture(summary: dict[str, Any], rows: list[dict[str, Any]], name: str) -> str:
-    """Return errors and drifts over time beside what is allowed, as SVG."""
+def drawing(summary: dict[str, Any], rows: list[dict[str, Any]], name: str, path: Path | None) -> bytes:
+    """Return errors and drifts over time beside what is allowed, as a picture in the format of a file, by default SVG."""
     import pandas as pd
 
-    from ..charts import figures, style
+    from ..charts import figures
 
-    return style.svg_text(figures.judged(pd.DataFrame(rows), name, summary["limits"]))
+    return picture_file(figures.judged(pd.DataFrame(rows), name, summary["limits"]), path)

@@ -94,6 +94,8 @@ def test_the_template_loads_as_it_is_and_integrates(written):
         f"R_WB = {{ axis = {AXIS.tolist()}, angle = {ANGLE} }}",
         "R_WB.quaternion_wxyz = "
         + str([3 * math.cos(ANGLE / 2), *(3 * math.sin(ANGLE / 2) * AXIS / np.linalg.norm(AXIS)).tolist()]),
+        "R_WB.quaternion_xyzw = "
+        + str([*(3 * math.sin(ANGLE / 2) * AXIS / np.linalg.norm(AXIS)).tolist(), 3 * math.cos(ANGLE / 2)]),
         "R_WB.rotation_vector = " + str((ANGLE * AXIS / np.linalg.norm(AXIS)).tolist()),
     ],
 )

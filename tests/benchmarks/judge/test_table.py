@@ -39,6 +39,14 @@ TABLES = {
         {},
     ),
     "xyzw by option": ({"time": T, **{f"q{i}": Q[:, (i + 1) % 4] for i in range(4)}, **RATES}, {"quaternion": "xyzw"}),
+    "xyzw in the name": ({"time": T, **{f"quaternion_xyzw_{i}": Q[:, (i + 1) % 4] for i in range(4)}, **RATES}, {}),
+    "wxyz in the name": ({"time": T, **{f"quaternion_wxyz.{i + 1}": Q[:, i] for i in range(4)}, **RATES}, {}),
+    "xyzw, and letters": ({"time": T, **{f"quaternion_xyzw_{part}": Q[:, i] for i, part in enumerate("wxyz")}, **RATES}, {}),
+    "unit of rates by option": (
+        {"t": T, "p": np.degrees(W[:, 0]), "q": np.degrees(W[:, 1]), "r": np.degrees(W[:, 2])}
+        | {name: np.radians(EULER[:, i]) for i, name in enumerate(("yaw", "pitch", "roll"))},
+        {"units": "deg/s", "euler": "zyx"},
+    ),
     "milliseconds, deg": (
         {"time_ms": 1e3 * T, "Gyro_deg_s_X": np.degrees(W[:, 0]), "Gyro_deg_s_Y": np.degrees(W[:, 1])}
         | {
