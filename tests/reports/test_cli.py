@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from conservative import registry
 from conservative.reports.cli.main import main
@@ -69,6 +70,76 @@ def test_several_methods_are_a_table():
     lines = conservative(*arguments).stdout.splitlines()
     assert any(line.split()[:2] == ["reduced:order=4", "ok"] for line in lines)
     assert any(line.split()[:2] == ["reduced", "ok"] for line in lines)
+
+
+def test_methods_are_shown_as_they_were_typed_and_the_others_beside_one_that_does_not_support_the_scene(tmp_path):
+    done = conservative("run", "brick_flip", "-m", "lame,mujoco:RK4", "-m", "reduced")
+    shown = {line.split()[0]: line.split()[1] for line in done.stdout.splitlines()[3:] if len(line.split()) > 6}
+    assert (done.exit_code, shown) == (1, {"lame": "unsupported", "mujoco:RK4": "ok", "reduced": "ok"})
+    assert "symmetric about one axis" in done.stderr
+    watched = conservative("watch", "brick_flip", "-m", "lame,mujoco:RK4", "--out", tmp_path / "motion.html", "--json")
+    runs = json.loads(watched.stdout)["runs"]
+    assert (watched.exit_code, [each["typed"] for each in runs]) == (0, ["mujoco:RK4", "lame"])
+    alone = conservative("run", "brick_flip", "-m", "lame")
+    assert (alone.exit_code, one_line(alone.stderr)) == (2, True)
+
+
+@pytest.mark.parametrize("scene", ["brick_flip", "lagrange_top", "unstable_spin", "tumbling_satellite"])
+def test_without_a_method_and_a_step_a_run_is_accurate(scene):
+    summary = run_as_json(scene)
+    assert (summary["status"], summary["choice"]["error"], summary["choice"]["reached"]) == ("ok", 1e-6, True)
+    assert summary["error"]["attitude"] < 1e-6  # measured 1e-13 to 1e-7
+    assert summary["error"]["samples"] > 60
+    finer = run_as_json(scene, "--error", "1e-9", "--dt", f"{summary['t_end'] / 100}")
+    assert finer["error"]["attitude"] < 1e-9  # measured 1e-13 to 1e-10
+    assert (finer["choice"]["error"], finer["error"]["samples"]) == (1e-9, 101)
+    assert conservative("run", scene, "--error", "1e-9", "-m", "reduced").exit_code == 2
+
+
+LOST = ("lagrange_top", "-m", "reduced", "--t-end", "0.6")
+"""A run whose attitude error is 3 rad."""
+
+
+def test_a_lost_motion_is_never_ok_without_a_sentence(tmp_path):
+    """In any command that makes it, also without a reference solution."""
+    assert run_as_json(*LOST)["status"].startswith("inaccurate: the attitude error is 3")
+    assert run_as_json(*LOST, "--no-truth")["status"] == "ok, but its attitude error is not known"
+    watched = conservative("watch", *LOST, "--out", tmp_path / "motion.html")
+    assert "reduced: inaccurate: the attitude error is 3" in watched.stdout
+    swept = conservative("sweep", *LOST, "--starts", "2", "--spread", "rate=1%")
+    assert "the motions are inaccurate" in swept.stdout
+    right = conservative("sweep", "lagrange_top", "--dt", "0.0001", "--t-end", "0.01", "--starts", "2", "--spread", "rate=1%")
+    assert "inaccurate" not in right.stdout
+    assert run_as_json("lagrange_top", "--no-truth")["status"] == "ok"  # its error is estimated
+
+
+def test_a_chaotic_motion_that_no_step_reaches_is_not_ok(tmp_path):
+    (tmp_path / "chaotic.toml").write_text(CHAOTIC)
+    summary = run_as_json(tmp_path / "chaotic.toml", "--error", "1e-12", "--no-truth")
+    assert not summary["choice"]["reached"]
+    assert summary["status"].startswith(("less accurate than asked for", "inaccurate"))
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_a_run_has_a_picture_and_a_folder(ending, tmp_path):
+    picture, folder = tmp_path / f"picture.{ending}", tmp_path / "out"
+    for _ in range(2):  # its own files are replaced
+        done = conservative("run", "brick_flip", "--t-end", "0.1", "--picture", picture, "--out", folder, "--json")
+        assert done.exit_code == 0, done.output
+    assert picture.read_bytes().startswith({"svg": b"<!-- Written", "png": b"\x89PNG", "pdf": b"%PDF"}[ending])
+    if ending == "png":
+        with Image.open(picture) as image:
+            assert image.info["Software"] == "Written by conservative"
+            image.load()  # its checksums are right
+    assert json.loads((folder / "run.json").read_text()) == json.loads(done.stdout)
+    assert len((folder / "run.csv").read_text().splitlines()) == 12
+    picture.write_bytes(b"mine")
+    assert conservative("run", "brick_flip", "--picture", picture).exit_code == 2
+
+
+def test_a_sweep_takes_one_method():
+    done = conservative("sweep", "brick_flip", "--spread", "rate=1%", "-m", "gauss", "-m", "reduced")
+    assert (done.exit_code, "methods: got gauss, reduced; expected one method" in done.stderr) == (2, True)
 
 
 def test_a_table_shows_the_methods_that_fail_and_exits_with_1():
