@@ -2,7 +2,7 @@
 
        cc -O3 -o rigid_step references/for_engine_authors/program.c -lm
        conservative engines add ./rigid_step
-       conservative run brick_flip --method rigid_step */
+       conservative run brick_flip -m rigid_step */
 
 #define _POSIX_C_SOURCE 200809L
 #include <stdio.h>

@@ -23,7 +23,7 @@ Value = TypeVar("Value")
     short_help="Install, list and remove engines.",
     epilog=epilog(
         "conservative engines install exudyn mujoco@3.6.0",
-        "conservative run brick_flip --method exudyn:RK44",
+        "conservative run brick_flip -m exudyn:RK44",
         "conservative engines list",
     ),
 )
