@@ -138,7 +138,8 @@ def measure(point: Point) -> tuple[dict[str, float], dict[str, float]]:
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
-    last_digit = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
+    number = {"f64": np.float64, "f32": np.float32}[getattr(point.method, "precision", "f64")]
+    last_digit = np.array([1.0, -1.0, 1.0]) * float(np.spacing(number(np.abs(scene.w_WB_B0).max())))
     for units in (0, *NUDGES):
         trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)
         counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}

@@ -17,8 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from conservative import Grid, registry
+from conservative import Grid, RigidBody, Scene, registry
+from conservative.errors import Unsupported
 from conservative.method import Method, Role
+from conservative.potentials.uniform_gravity import UniformGravity
 
 Answer = dict[str, Any]
 Array = np.ndarray[Any, Any]
@@ -28,8 +30,8 @@ _scene = lru_cache(maxsize=64)(registry.scene)
 
 
 def prepare(given: SimpleNamespace) -> Callable[[], Any]:
-    """Return the run of a task, "solve" or "time"."""
-    return {"solve": solve, "time": keep_running}[given.task](given)
+    """Return the run of a task, "solve", "probe" or "time"."""
+    return {"solve": solve, "probe": probe, "time": keep_running}[given.task](given)
 
 
 def list_methods(names: list[str], project: str = "") -> Answer:
@@ -60,7 +62,8 @@ def list_methods(names: list[str], project: str = "") -> Answer:
 
     def describe(method: Method) -> Answer:
         engine = method.label if method.role == Role.ENGINE and families[method.family] else ""
-        return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
+        numbers = {"order": method.order, "precision": getattr(method, "precision", "f64")}
+        return {"name": method.name, "label": method.label, "engine": engine, **numbers}
 
     return {"methods": [describe(method) for method in methods]}
 
@@ -93,7 +96,13 @@ def describe_scene(scene: str, probes: Array) -> Answer:
 def describe_pair(scene: str, method: str) -> Answer:
     """Describe why a method does not support a scene (empty if it does), and its longest step there in seconds."""
     built, chosen = _scene(scene), registry.method(method)
-    return {"unsupported": chosen.unsupported(built) or "", "longest_step": float(chosen.longest_step(built))}
+    reason = chosen.unsupported(built) or ""
+    try:
+        if not reason:  # an engine may refuse a scene only when it gets it
+            chosen.prepare(built, Grid(built.dt, 1, 1))
+    except Unsupported as error:
+        reason = str(error.__context__ or error)
+    return {"unsupported": reason, "longest_step": float(chosen.longest_step(built))}
 
 
 def solve(given: SimpleNamespace) -> Callable[[], Answer]:
@@ -109,6 +118,22 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
         failure = [outcome.kind.value, outcome.reason, outcome.step, outcome.time, outcome.residual]
         states = {"t": trajectory.t, "R_WB": trajectory.R_WB, "w_WB_B": trajectory.w_WB_B}
         return {**states, "counts": counts, "failure": [] if outcome.ok else failure}
+
+    return solve_once
+
+
+def probe(given: SimpleNamespace) -> Callable[[], Answer]:
+    """Integrate a body of principal `moments` about a fixed point, with a `weight` at `com`, and do not check the result."""
+    field = UniformGravity(given.weight, given.com) if given.weight else None
+    scene = Scene("probe", RigidBody(given.moments), given.R_WB0, given.w_WB_B0, 1.0, potential=field)
+    try:
+        run = registry.method(given.method).prepare(scene, Grid(given.dt, given.n_steps, given.every))
+    except Unsupported as error:
+        raise NotImplementedError(str(error)) from None
+
+    def solve_once() -> Answer:
+        trajectory = run()
+        return {"t": trajectory.t, "R_WB": trajectory.R_WB, "w_WB_B": trajectory.w_WB_B, "counts": {}, "failure": []}
 
     return solve_once
 

@@ -28,18 +28,23 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
-from ..gate.baseline import COUNTS, update_baseline
+from ..gate.baseline import COUNTS, ORDER, update_baseline
 from ..gate.compare import Verdict, Violation
 from ..gate.results import Results, Row, Status, find_runaway
+from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
 from ..suite import points
 from . import inside
+from .causes import find_causes
 from .comparison import Comparison, Line, compare
 from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Version
 
-TIME = "time of a step"
+TIME, MOTION = "time of a step", "another motion"
+ATTITUDE = Measure.ATTITUDE_MAX.text
+LOST, FAR = 0.1, 2.0
+"""Attitude errors, rad, above which a motion is lost, so that a shorter time is no gain, and above which errors say nothing."""
 _ADAPTER = str(Path(inside.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
@@ -54,6 +59,7 @@ class ProjectSide:
 
     def __init__(self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None) -> None:
         self.version, self._names, self._truths = version, list(names), truths or remember_truths()
+        self._causes: dict[str, tuple[str, str]] = {}
         kernels = version.environment.folder / "home" / "kernels"
         self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
 
@@ -67,7 +73,7 @@ class ProjectSide:
 
     @cached_property
     def settings(self) -> list[dict[str, Any]]:
-        """Name, label, order and engine (the label of a foreign method, else "") of each setting."""
+        """Name, label, order, precision and engine (the label of a foreign method, else "") of each setting."""
         return list(self.ask("list_methods", names=self._names, project=self.version.environment.engine)["methods"])
 
     def measure(self, scene: str) -> Iterator[tuple[str, Row]]:
@@ -83,7 +89,9 @@ class ProjectSide:
             return
         for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
             if here == there:
-                yield name, self._measure(scene, setting, row)
+                row = self._measure(scene, setting, row)
+                cause = "" if row.status is Status.SKIPPED else self._find_causes(setting)[not registry.scene(scene).free]
+                yield name, replace(row, cause=cause)
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
                 yield name, replace(row, definition=there, reason="another motion")
 
@@ -92,8 +100,7 @@ class ProjectSide:
             pair = self.ask("describe_pair", scene=name, method=setting["name"])
             if pair["unsupported"]:
                 return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
-            names = setting["name"], setting["label"], setting["order"]
-            method = Remote(*names, side=self, scene_name=name, longest=pair["longest_step"])
+            method = self._remote(setting, name, pair["longest_step"])
             point = points.Point(registry.scene(name), method, self._truths)
             first = method.solve(point.scene, point.grid)
             if not first.ok:
@@ -101,6 +108,19 @@ class ProjectSide:
             return judge_values(row, *points.measure(point))
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
+
+    def _remote(self, setting: Mapping[str, Any], scene: str = "", longest: float = math.inf) -> Remote:
+        names = setting["name"], setting["label"], setting["order"]
+        return Remote(*names, side=self, scene_name=scene, longest=longest, precision=setting["precision"])
+
+    def _find_causes(self, setting: Mapping[str, Any]) -> tuple[str, str]:
+        """Return the mistakes of a setting on free and on heavy bodies; "" for none, and if it does not answer."""
+        if setting["name"] not in self._causes:
+            try:
+                self._causes[setting["name"]] = find_causes(self._remote(setting).probe)
+            except IntegrationFailed:  # a row of a scene says so
+                self._causes[setting["name"]] = "", ""
+        return self._causes[setting["name"]]
 
     def run(self, task: str, read: Callable[[Answer], Any], **values: Any) -> WorkerRun[Any]:
         """Return the run of a task of `inside`; `read` converts its answers."""
@@ -115,11 +135,12 @@ class ProjectSide:
 
 @dataclass(frozen=True, kw_only=True)
 class Remote(StandIn):
-    """A method of a version, on the scene with the name `scene_name` and with its longest step there, s."""
+    """A method of a version, on the scene with the name `scene_name`, with its longest step there, s, and its precision."""
 
     side: ProjectSide = field(compare=False, repr=False)
     scene_name: str
     longest: float
+    precision: str = "f64"
 
     family: ClassVar[str] = "remote"
     role: ClassVar[Role] = Role.OURS
@@ -131,6 +152,17 @@ class Remote(StandIn):
         """Return the run. It is prepared at its first call, so that a failure to prepare is a failure of the run."""
         values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
         return self.side.run("solve", partial(self.read, scene), scene=self.scene_name, method=self.name, **values)
+
+    def probe(self, scene: Scene, grid: Grid) -> Trajectory:
+        """Return the trajectory of one of the bodies of `engines check`. It is not checked."""
+        field: Any = scene.potential
+        weight, com = (0.0, np.zeros(3)) if field is None else (field.weight, field.com_B)
+        body = {"moments": scene.body.moments, "R_WB0": scene.R_WB0, "w_WB_B0": scene.w_WB_B0, "weight": weight, "com": com}
+        steps = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every}
+        found = self.side.run("probe", partial(self.read, scene), method=self.name, **body, **steps)()
+        if found.failure is not None:
+            raise found.failure
+        return found
 
     def read(self, scene: Scene, answer: Answer) -> Trajectory:
         """Return the trajectory of a scene from the states of the version."""
@@ -167,7 +199,8 @@ def compare_projects(
     processes: int = PROCESSES,
     tell: Progress = lambda share, what: None,
 ) -> ProjectComparison:
-    """Return the comparison of an earlier and a later version of a project, with a number of processes of each for times.
+    """Return the comparison of an earlier and a later version of a project, with a number of processes of each for times,
+    or 0 for none.
 
     Scenes and methods are registered names; by default the scenes of the suite, and all methods with the role `Role.OURS`.
 
@@ -189,8 +222,9 @@ def compare_projects(
             (line.scene, line.setting)
             for line in made.lines
             if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
+            and not _moves(*line.results)  # type: ignore[arg-type]  # neither is None
         ]
-        times = compare_times(was, now, good, processes, tell)
+        times = compare_times(was, now, good, processes, tell) if processes else {}
         lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
         return replace(made, lines=tuple(lines))
 
@@ -202,20 +236,49 @@ def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]
 
 
 def judge(comparison: ProjectComparison) -> Verdict:
-    """Return the verdict on the last step of a comparison: the gate's on values, and rows that are slower."""
+    """Return the verdict on the last step of a comparison: motions of another kind, the gate's on values, and slower rows."""
     (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
+    both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
+    before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
     verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
-    slower = []
+    moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
+    others = {(each.scene, each.method) for each in moved.values()}
+    violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]
     for line in comparison.lines:
         if (time := line.times) and time.failed:
             last = time.again or time.first
             longer = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
             most = f"at most {1 + SLOWER:g} times as long"
-            slower.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
-    notes = (*(note for step in steps for note in _notes(*step)), *_packages(base, head))
-    return Verdict((*verdict.violations, *slower), notes, len(comparison.lines))
+            violations.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
+    notes = (*(note for step in steps for note in _notes(*step)), *_of_settings(steps), *_packages(base, head))
+    return Verdict((*violations,), notes, len(comparison.lines))
+
+
+def error_of(row: Row) -> float:
+    """Return the largest attitude error of a row, rad; 0 for a row without it."""
+    return row.values.get(ATTITUDE, 0.0)
+
+
+def _conserved(row: Row) -> dict[str, float]:
+    """Return the values of a row that mean something although its attitude is lost."""
+    return {name: value for name, value in row.values.items() if not name.endswith("error max") and name != ORDER}
+
+
+def _moves(was: Row, now: Row) -> bool:
+    """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
+    if was.status is not Status.PASSED or now.status is Status.SKIPPED or was.definition != now.definition:
+        return False
+    return (now.cause not in ("", was.cause)) or error_of(was) <= LOST < FAR < error_of(now)
+
+
+def _moved(was: Row, now: Row) -> Violation:
+    """Return the violation by another motion, with its cause."""
+    size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
+    cause = now.cause if now.cause not in ("", was.cause) else "no mistake that `engines check` knows explains it"
+    texts = f"{error_of(was):.3g} rad from that of the scene", f"{size}. {cause}"
+    return Violation(MOTION, now.scene, now.method, *texts, "the motion of before")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
@@ -228,8 +291,30 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
             yield f"{name}: {when} without values: {row.reason}"
     if time and time.again and not time.failed:
         yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
-    if time and not math.isnan(time.first.high) and time.first.high < 1 / (1 + SLOWER):
+    if faster(line) and time:
         yield f"{name}: faster, {time.first.value:.3f} of the time"
+    if was and now and was.values and error_of(now) > LOST:
+        yield f"{name}: the attitude is lost, {error_of(now):.2g} rad, was {error_of(was):.2g} rad"
+
+
+def faster(line: ProjectLine) -> bool:
+    """Return whether a row is faster than before. A motion that is lost is not."""
+    now = line.results[-1]
+    lost = now is None or error_of(now) > LOST
+    return line.times is not None and not lost and line.times.first.high < 1 / (1 + SLOWER)
+
+
+def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) -> Iterator[str]:
+    """Yield the notes on settings: mistakes of both versions, or of the earlier one, and scenes that they do not support."""
+    scenes: dict[str, list[str]] = {}
+    for line, was, now in steps:
+        for text in dict.fromkeys(row.reason for row in (was, now) if row and row.status is Status.SKIPPED):
+            scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
+        if was and was.cause:
+            still = "in both versions" if now and now.cause == was.cause else "not any more"
+            scenes.setdefault(f"{line.setting}: {was.cause} ({still})", []).append(line.scene)
+    for text, names in scenes.items():
+        yield f"{text}: {', '.join(dict.fromkeys(names))}"
 
 
 def _packages(base: Version, head: Version) -> Iterator[str]:

@@ -118,6 +118,13 @@ def find_mistakes(scene: Scene, answers: dict[Grid, States]) -> tuple[str, ...]:
     return min(costs, key=lambda mistakes: costs[mistakes])
 
 
+def examine(scene: Scene, answers: dict[Grid, States]) -> tuple[list[float], tuple[str, ...], bool]:
+    """Return the error of each run, the mistakes that explain them, and whether the errors fall with dt."""
+    errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
+    mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
+    return errors, mistakes, errors[-1] <= 100 * FLOOR or 2 * errors[-1] < errors[1] < 1
+
+
 def check(program: Program) -> Iterator[tuple[bool, str]]:
     """Yield whether each part of the test was passed, and its result as a sentence that names what to change."""
     part, remedy = "hello", "build it or change it as PROTOCOL.md describes"
@@ -142,10 +149,9 @@ def check(program: Program) -> Iterator[tuple[bool, str]]:
                 if not np.array_equal(again.values, answers[grid].values, equal_nan=True):
                     yield False, f"{scene.name}: a second run has other samples: start from `q0` and `w0`"
                     return
-                errors = [_distance(scene, grid, _read(answers[grid])) for grid in GRIDS]
+                errors, mistakes, falls = examine(scene, answers)
                 text = f"error {errors[1]:.1e} at dt = {GRIDS[1].dt} s, {errors[-1]:.1e} at {grid.dt} s"
-                mistakes = find_mistakes(scene, answers) if errors[-1] > FLOOR else ()
-                if errors[-1] > 100 * FLOOR and not 2 * errors[-1] < errors[1] < 1:
+                if not falls:
                     mistakes = mistakes or (f"{text}: it does not fall with dt, and no known mistake explains it",)
                 yield from ((False, f"{scene.name}: {mistake}") for mistake in mistakes)
                 if mistakes:
