@@ -59,9 +59,14 @@ def list_programs() -> dict[str, Program]:
     with suppress(OSError):  # the working directory was removed
         files.append(project_file())
     for file in filter(Path.is_file, files):
-        try:
-            table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
-            programs |= {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
-        except (OSError, ValueError, AttributeError) as error:
-            raise BadInput(str(file), str(error), 'a table [engines] of texts, such as my_engine = "build/my_engine"') from None
+        programs |= read_programs(file)
     return programs
+
+
+def read_programs(file: Path) -> dict[str, Program]:
+    """Return the programs in a file by name. Raise `BadInput` as `list_programs`."""
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
+        return {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
+    except (OSError, ValueError, AttributeError) as error:
+        raise BadInput(str(file), str(error), 'a table [engines] of texts, such as my_engine = "build/my_engine"') from None

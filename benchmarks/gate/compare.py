@@ -26,7 +26,8 @@ class Violation:
     @property
     def finding(self) -> str:
         """The violation in one line, without the command that accepts it."""
-        return f"{self.measure}, {self.scene}, {self.method}: was {self.was}, is {self.now}, allowed {self.allowed}"
+        limit = f", allowed {self.allowed}" * bool(self.allowed)
+        return f"{self.measure}, {self.scene}, {self.method}: was {self.was}, is {self.now}{limit}"
 
     def __str__(self) -> str:
         return f"{self.finding}; {ACCEPT}"

@@ -131,33 +131,35 @@ def points() -> Iterator[Point]:
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 
-def measure(point: Point) -> tuple[dict[str, float], dict[str, float]]:
+def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str, float]]:
     """Return the values that should not change, of a run that reaches its end, and how much round-off alone changes each.
 
-    They are errors, drifts, work and, in the paper's scenes, the observed order.
+    They are errors, drifts, work and, in the paper's scenes, the observed order. Round-off is that of the method's precision.
+    `few` is for slow methods: fewer nudges, and orders from runs that are shorter than that of the scene.
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
-    number = {"f64": np.float64, "f32": np.float32}[getattr(point.method, "precision", "f64")]
+    number: Any = {"f64": np.float64, "f32": np.float32}[getattr(point.method, "precision", "f64")]
     last_digit = np.array([1.0, -1.0, 1.0]) * float(np.spacing(number(np.abs(scene.w_WB_B0).max())))
-    for units in (0, *NUDGES):
+    for units in (0, *(NUDGES[1:-1] if few else NUDGES)):
         trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)
         counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
         found = errors.measure_errors(trajectory, exact)
         measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
     nudged = {name: [each[name] for each in measured] for name in measured[0]}
     spreads = {name: max(values) - min(values) for name, values in nudged.items()}
-    order = fit_order(point) if point.scene.name.partition(":")[0] in PAPER else {}
+    order = fit_order(point, few) if point.scene.name.partition(":")[0] in PAPER else {}
     return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
 
 
-def fit_order(point: Point) -> dict[str, float]:
+def fit_order(point: Point, few: bool = False) -> dict[str, float]:
     """Return the observed order of the attitude; empty if the method has no order or the errors show none."""
     scene, method = point.scene, point.method
     if method.order is None:
         return {}
     exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
     grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
+    grids = [grid for grid in grids if grid.n_steps <= point.grid.n_steps] if few else grids
     attempts = [attempt(Case("order", scene, method, grid)) for grid in grids]
     sizes = np.array(
         [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in attempts]

@@ -13,6 +13,8 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
+from time import monotonic
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,13 +40,17 @@ from ..suite import points
 from . import inside
 from .causes import find_causes
 from .comparison import Comparison, Line, compare
+from .prices import Price
 from .times import PROCESSES, SLOWER, TimeRow, compare_times
-from .version import Version
+from .version import Checkout, Version
 
 TIME, MOTION = "time of a step", "another motion"
 ATTITUDE = Measure.ATTITUDE_MAX.text
-LOST, FAR = 0.1, 2.0
-"""Attitude errors, rad, above which a motion is lost, so that a shorter time is no gain, and above which errors say nothing."""
+LOST, OTHER, FAR = 0.1, 1.0, 3.0
+"""Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
+than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
+SLOW = 1.0
+"""Duration of a run, s, above which a row is measured with fewer points."""
 _ADAPTER = str(Path(inside.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
@@ -54,11 +60,15 @@ ProjectComparison = Comparison[Row, TimeRow]
 class ProjectSide:
     """A version and its process, with its own folder of compiled kernels.
 
-    `names` are the compared methods, by default those that the project registers with the role `Role.OURS`.
+    `names` are the compared methods, by default those that the project registers with the role `Role.OURS`. `few` are the rows
+    that are measured with fewer points: those of the earlier version, because values of other points cannot be compared.
     """
 
-    def __init__(self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None) -> None:
+    def __init__(
+        self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None, few: set[str] | None = None
+    ) -> None:
         self.version, self._names, self._truths = version, list(names), truths or remember_truths()
+        self.few, self._decides = set[str]() if few is None else few, few is None
         self._causes: dict[str, tuple[str, str]] = {}
         kernels = version.environment.folder / "home" / "kernels"
         self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
@@ -102,10 +112,17 @@ class ProjectSide:
                 return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
             method = self._remote(setting, name, pair["longest_step"])
             point = points.Point(registry.scene(name), method, self._truths)
+            spent = monotonic()
             first = method.solve(point.scene, point.grid)
+            spent = monotonic() - spent
             if not first.ok:
                 return replace(row, status=Status.FAILED, reason=str(first.outcome))
-            return judge_values(row, *points.measure(point))
+            if self._decides and spent > SLOW:  # the first run may compile
+                spent = monotonic()
+                method.solve(point.scene, point.grid)
+                if monotonic() - spent > SLOW:
+                    self.few.add(row.id)
+            return judge_values(row, *points.measure(point, row.id in self.few))
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
@@ -212,7 +229,7 @@ def compare_projects(
     for name in scenes:
         define_scene(name)  # before any work
     truths = remember_truths()
-    with closing(ProjectSide(base, methods, truths)) as was, closing(ProjectSide(head, methods, truths)) as now:
+    with closing(ProjectSide(base, methods, truths)) as was, closing(ProjectSide(head, methods, truths, was.few)) as now:
         made: ProjectComparison = compare((was, now), scenes, tell)
         if unknown := find_unknown(methods, {line.setting for line in made.lines}):
             raise BadInput("methods", ", ".join(unknown), "methods that a version has, without engines in environments")
@@ -235,8 +252,8 @@ def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]
     return [name for name in methods if name.partition(":")[0] not in families]
 
 
-def judge(comparison: ProjectComparison) -> Verdict:
-    """Return the verdict on the last step of a comparison: motions of another kind, the gate's on values, and slower rows."""
+def judge(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
+    """Return the verdict on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
     both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
@@ -246,13 +263,26 @@ def judge(comparison: ProjectComparison) -> Verdict:
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
     others = {(each.scene, each.method) for each in moved.values()}
     violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]
+    paid, unused = list[str](), set(prices)
     for line in comparison.lines:
         if (time := line.times) and time.failed:
-            last = time.again or time.first
+            last, price = time.again or time.first, prices.get(line.setting)
+            if price and not time.reason and last.low <= price.factor:
+                paid.append(f"{line.scene}, {line.setting}: {last.value:.3g} times as long, {price}")
+                unused.discard(line.setting)
+                continue
             longer = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
-            most = f"at most {1 + SLOWER:g} times as long"
+            most = f"at most {price.factor if price else 1 + SLOWER:g} times as long"
             violations.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
-    notes = (*(note for step in steps for note in _notes(*step)), *_of_settings(steps), *_packages(base, head))
+            unused.discard(line.setting)
+    paid += [f"{name}: no row needs the longer time, {prices[name]}" for name in sorted(unused)]
+    notes = (
+        *paid,
+        *(note for step in steps for note in _notes(*step)),
+        *_of_settings(steps),
+        *_same_builds(base, head),
+        *_packages(base, head),
+    )
     return Verdict((*violations,), notes, len(comparison.lines))
 
 
@@ -270,7 +300,7 @@ def _moves(was: Row, now: Row) -> bool:
     """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
     if was.status is not Status.PASSED or now.status is Status.SKIPPED or was.definition != now.definition:
         return False
-    return (now.cause not in ("", was.cause)) or error_of(was) <= LOST < FAR < error_of(now)
+    return (now.cause not in ("", was.cause)) or error_of(was) <= LOST < OTHER < error_of(now)
 
 
 def _moved(was: Row, now: Row) -> Violation:
@@ -278,7 +308,7 @@ def _moved(was: Row, now: Row) -> Violation:
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
     cause = now.cause if now.cause not in ("", was.cause) else "no mistake that `engines check` knows explains it"
     texts = f"{error_of(was):.3g} rad from that of the scene", f"{size}. {cause}"
-    return Violation(MOTION, now.scene, now.method, *texts, "the motion of before")
+    return Violation(MOTION, now.scene, now.method, *texts, "")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
@@ -293,8 +323,8 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
         yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
     if faster(line) and time:
         yield f"{name}: faster, {time.first.value:.3f} of the time"
-    if was and now and was.values and error_of(now) > LOST:
-        yield f"{name}: the attitude is lost, {error_of(now):.2g} rad, was {error_of(was):.2g} rad"
+    if was and now and min(error_of(was), error_of(now)) > LOST:
+        yield f"{name}: the attitude is lost in both versions: was {error_of(was):.3g} rad off, is {error_of(now):.3g} rad"
 
 
 def faster(line: ProjectLine) -> bool:
@@ -315,6 +345,16 @@ def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) ->
             scenes.setdefault(f"{line.setting}: {was.cause} ({still})", []).append(line.scene)
     for text, names in scenes.items():
         yield f"{text}: {', '.join(dict.fromkeys(names))}"
+
+
+def _same_builds(base: Version, head: Version) -> Iterator[str]:
+    """Yield the programs of which both versions have the same files although their commits differ: a build may be stale."""
+    if not (isinstance(base.environment, Checkout) and isinstance(head.environment, Checkout)) or base.commit == head.commit:
+        return
+    was, now = base.environment.programs(), head.environment.programs()
+    for name in sorted(was.keys() & now.keys()):
+        if was[name] == now[name]:
+            yield f"{name}: both versions run identical files, although their commits differ. Is the build of each up to date?"
 
 
 def _packages(base: Version, head: Version) -> Iterator[str]:

@@ -34,8 +34,8 @@ CONFIDENCE = 0.99
 """Probability that the true ratio is above the lower end of an interval, and probability that it is below the upper end."""
 PROCESSES = 7
 """Processes of each version in a measurement."""
-ROUNDS = 50
-"""Samples of each run in a process."""
+ROUNDS, FEWEST = 50, 8
+"""Samples of each run in a process, and of a run that takes much longer than `LONGEST`."""
 LAYOUTS = 3
 """Runs of each version in a process, each with its data elsewhere."""
 MOST_TURNS = 6
@@ -140,7 +140,7 @@ class Clock:
 
     def __init__(self, base: Process, head: Process, tell: Progress = lambda share, what: None) -> None:
         self._sides, self._tell = (base, head), tell
-        self._work: dict[Timed, tuple[int, int]] = {}
+        self._work: dict[Timed, tuple[int, int, int]] = {}
         self.failures: dict[Timed, str] = {}
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
@@ -173,20 +173,21 @@ class Clock:
                     break
                 n = max(n + 1, math.ceil(n * min(8.0, 1.2 * LONGEST / spent)))
             n = min(n, most)
-            self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / spent / 2)))
-        steps, calls = self._work[row]
+            calls = min(MOST_CALLS, max(1, math.ceil(SAMPLE / spent / 2)))
+            self._work[row] = n, calls, max(FEWEST, round(ROUNDS * min(1.0, 2 * LONGEST / spent)))
+        steps, calls, rounds = self._work[row]
         runs = [[side.timed(*row, steps) for _ in range(LAYOUTS)] for side in self._sides]
-        was, now = _sample(runs, calls, turn)
+        was, now = _sample(runs, calls, turn, rounds)
         return was / steps, now / steps
 
 
-def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int) -> tuple[float, float]:
+def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int, rounds: int) -> tuple[float, float]:
     """Return the shortest time, s, of a call in each version; the version that begins changes from round to round."""
     shortest = [math.inf, math.inf]
     for each in runs:
         for run in each:
             run.wall_time(calls)
-    for k in range(turn, turn + ROUNDS):
+    for k in range(turn, turn + rounds):
         for layout in range(LAYOUTS):
             for side in ((0, 1), (1, 0))[(k + layout) % 2]:
                 shortest[side] = min(shortest[side], runs[side][layout].wall_time(calls) / calls)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
-from conservative.programs import project_file
+from conservative.programs import project_file, read_programs
 from conservative.references.environments.environment import Environment
 from conservative.references.environments.lock import Source
 from conservative.references.environments.projects import build_project, environment_of, keep_wheel
@@ -115,6 +115,12 @@ class Checkout(Environment):
 
     def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = 0) -> Worker:
         return python_worker({"CONSERVATIVE_PROJECT": str(self.folder)}, memory)
+
+    def programs(self) -> dict[str, tuple[str, ...]]:
+        """Return the hashes of the files in the command line of each program."""
+        programs = read_programs(self.folder / "conservative.toml").values()
+        files = {each.name: [Path(word) for word in each.words if Path(word).is_file()] for each in programs}
+        return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in every) for name, every in files.items()}
 
 
 def build_version(name: str, command: str, folder: Path) -> Version:

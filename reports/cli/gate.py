@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 FILES = ("junit", "markdown", "html")
 LIMITS = ["scene", "method", "measure", "measured", "limit"]
 OF_BASELINE = ("results", "baseline", "update")
-OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "build", "find_links", "allow_build", *FILES)
+OF_VERSIONS = (
+    *("project", "scenes", "methods", "requirements", "accept_slower", "processes", "build", "find_links", "allow_build"),
+    *FILES,
+)
 
 
 @click.command(
@@ -69,6 +72,12 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "bui
     multiple=True,
     metavar="PACKAGE|WHEEL",
     help="With --against: more packages for both environments.",
+)
+@click.option(
+    "--accept-slower",
+    multiple=True,
+    metavar="NAME=6x[: REASON]",
+    help="With --against: accept that a method takes up to so many times as long. For CI, a line in conservative.toml.",
 )
 @click.option(
     "--processes", type=click.IntRange(2), metavar="N", help="With --against: number of processes per version.  [default: 7]"
@@ -149,6 +158,7 @@ def _judge(options: dict[str, Any]) -> Document:
 
 def _compare(options: dict[str, Any]) -> Document:
     """Install both versions and compare them."""
+    from conservative.benchmarks.versions.prices import read_prices
     from conservative.benchmarks.versions.project import compare_projects
     from conservative.benchmarks.versions.version import Version, build_version, install_version
     from conservative.programs import list_programs, project_file
@@ -164,6 +174,7 @@ def _compare(options: dict[str, Any]) -> Document:
     programs = [each.name for each in list_programs().values() if each.file == project_file()]
     if options["build"] and not programs:
         raise BadInput("build", "no program", "one in the project: conservative engines add ./my_engine --project")
+    prices = read_prices(options["accept_slower"], project_file())
     project = Path(head) if Path(head).is_dir() else Path()
     asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}
     if options["build"]:
@@ -180,4 +191,4 @@ def _compare(options: dict[str, Any]) -> Document:
     with TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         base, latest = prepare(options["against"]), prepare(head)
         with progress() as step:
-            return build(compare_projects(base, latest, tell=step, **asked), made)
+            return build(compare_projects(base, latest, tell=step, **asked), made, prices)

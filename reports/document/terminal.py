@@ -12,6 +12,9 @@ import click
 
 from .model import Block, Document, Emphasis, Facts, Items, Paragraph, Section, Table
 
+IN_CI = 100
+"""Columns of a log of continuous integration, which sets `CI`."""
+
 
 def show(document: Document) -> None:
     """Print the part of a document for the terminal."""
@@ -41,9 +44,9 @@ def print_blocks(blocks: Iterable[Block]) -> None:
 
 def _wrapped(text: str) -> str:
     """Return a text in lines of the width of the terminal; a file or a pipe gets long lines."""
-    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+    if not sys.stdout.isatty() and not {"COLUMNS", "CI"} & os.environ.keys():
         return text
-    width = shutil.get_terminal_size().columns
+    width = shutil.get_terminal_size((IN_CI, 1)).columns
     lines = (textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False) for line in text.splitlines())
     return "\n".join("\n".join(wrapped) for wrapped in lines) + "\n" * text.endswith("\n")
 
@@ -57,7 +60,7 @@ def print_table(content: Table) -> None:
 
     console = Console(soft_wrap=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
-        console = Console(width=10_000)  # a file or a pipe has room for every column
+        console = Console(width=IN_CI if "CI" in os.environ else 10_000)  # a file or a pipe has room for every column
     rows = [list(map(str, row)) for row in content.rows]
     widths = fit_columns([content.header, *rows], console.width)
     table = RichTable(title=escape(content.caption), box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")

@@ -10,7 +10,8 @@ from typing import Any
 from conservative.benchmarks.gate.compare import Violation
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, judge
+from conservative.benchmarks.versions.prices import Price
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, faster, judge
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
 from ..document.cells import DASH, number, numeric
@@ -54,20 +55,27 @@ EXPLANATION = (
 class Standing(StrEnum):
     """The result of a row, in the order of the table."""
 
+    MOTION = "another motion"
     SLOWER = "slower"
     WORSE = "worse"
+    PAID = "slower, accepted"
     FASTER = "faster"
     NEW = "new"
     SAME = "same"
     NOTHING = "not compared"
 
 
-_GRADES = {Standing.SLOWER: Grade.BAD, Standing.WORSE: Grade.BAD, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE}
+_GRADES = {
+    **dict.fromkeys((Standing.MOTION, Standing.SLOWER, Standing.WORSE), Grade.BAD),
+    **{Standing.PAID: Grade.FAIR, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE},
+}
 
 
-def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) -> Document:
-    """Return the document of a comparison; `made` names how and where it was measured."""
-    versions, judged, made = comparison.versions, judge(comparison), made or {}
+def build(
+    comparison: ProjectComparison, made: Mapping[str, str] | None = None, prices: Mapping[str, Price] | None = None
+) -> Document:
+    """Return the document of a comparison; `made` names how and where it was measured, `prices` longer times by method."""
+    versions, judged, made = comparison.versions, judge(comparison, prices or {}), made or {}
     findings = [each.finding for each in judged.violations]
     timed = sum(line.times is not None for line in comparison.lines)
     rows, violations = len(comparison.lines), len(findings)
@@ -113,8 +121,9 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
 
 def table(comparison: ProjectComparison, violations: Sequence[Violation]) -> Table:
     """Return the rows: failed ones first, then those with the largest change of time."""
-    worse = {(each.scene, each.method) for each in violations}
-    standings = [(_standing(line, (line.scene, line.setting) in worse), line) for line in comparison.lines]
+    failed = [(each.scene, each.method, each.measure) for each in violations]
+    measures = [[name for *row, name in failed if row == [line.scene, line.setting]] for line in comparison.lines]
+    standings = [(_standing(line, worse), line) for line, worse in zip(comparison.lines, measures, strict=True)]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:
         ratio = _ratio(entry[1])
@@ -148,21 +157,22 @@ def _ratio(line: ProjectLine) -> Ratio | None:
     return None if ratio is None or math.isnan(ratio.value) else ratio
 
 
-def _standing(line: ProjectLine, failed: bool) -> Standing:
+def _standing(line: ProjectLine, failed: Sequence[str]) -> Standing:
     if failed:
-        return Standing.SLOWER if line.times and line.times.failed else Standing.WORSE
+        return Standing.MOTION if MOTION in failed else Standing.SLOWER if TIME in failed else Standing.WORSE
     if line.results[0] is None:
         return Standing.NEW
     if line.times is None:
         return Standing.NOTHING
-    return Standing.FASTER if line.times.first.high < 1 / (1 + SLOWER) else Standing.SAME
+    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
 
 
 def _record(line: ProjectLine) -> dict[str, Any]:
     record: dict[str, Any] = {"scene": line.scene, "method": line.setting, "was": None, "is": None, "time": None}
     for when, row in zip(("was", "is"), line.results, strict=True):
         if row is not None:
-            record[when] = {"status": row.status, "reason": row.reason, "values": row.values, "spreads": row.spreads}
+            values = {"values": row.values, "spreads": row.spreads}
+            record[when] = {"status": row.status, "reason": row.reason, "cause": row.cause, **values}
     if (time := line.times) is not None:
         again = {} if time.again is None else {"again": time.again}
         ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}

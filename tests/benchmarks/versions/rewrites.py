@@ -1,6 +1,7 @@
-"""Changes of a program in C that are equal in exact arithmetic: other orders of sums and factors, other flags of the compiler.
+"""Changes of a program in C: some that are equal in exact arithmetic, and physical mistakes.
 
-Each has a few of the rewrites below, chosen at random by its number; the first have one each.
+An equal change has a few of the rewrites below, and other flags of the compiler, chosen at random by its number; the first
+changes have one rewrite each.
 """
 
 import random
@@ -56,6 +57,26 @@ REWRITES = {
         "for (i = 0; i < 4; i++) y[i] = y[i] + (h + h) * k[1][i] * (real)0.5;",
     ),
 }  # fmt: skip
+W0, MOMENTS, SHOWN = 'number(line, "w0", i - 4)', 'number(line, "moments", 0)', "(double)y[skip + i]"
+WEIGHT, DT = 'weight = number(line, "mass", 0)', 'h = number(line, "dt", 0)'
+GYROSCOPIC = ("(J2 - J3) * v * z", "(J3 - J1) * z * x", "(J1 - J2) * x * v")
+MISTAKES = {
+    "no gyroscopic torque": dict.fromkeys(GYROSCOPIC, "0"),
+    "gyroscopic term has the other sign": {term: f"-{term}" for term in GYROSCOPIC},
+    "Gravity points up": {WEIGHT: WEIGHT.replace("=", "= -")},
+    "ignores gravity": {WEIGHT: WEIGHT.replace("=", "= 0 *")},
+    "inertia is inverted": {"/ J1": "* J1", "/ J2": "* J2", "/ J3": "* J3"},
+    "about the centre of mass": {f'"moments", {i}': f'"moments_com", {i}' for i in range(3)},
+    "in ms": {DT: f"{DT} / 1000"},
+    "`w0` in world axes": {W0: W0.replace("w0", "w0_W")},
+    "reads rates in deg/s": {W0: f"{W0} * acos(-1) / 180"},
+    "answer in rad/s": {SHOWN: f"{SHOWN} * (skip ? 180 / acos(-1) : 1)"},
+    "transposed": {SHOWN: f"{SHOWN} * (skip || !i ? 1 : -1)"},
+    "scalar comes first": {SHOWN: "(double)y[skip ? skip + i : (i + 1) % 4]"},
+    "half a step late": {"for (n = 0;": "h /= -2, step(y), h *= -2; for (n = 0;"},
+    "damped": {"n = sqrt(": "for (i = 4; i < 7; i++) y[i] = y[i] * (1 - h / 20); n = sqrt("},
+}
+"""Physical mistakes: a part of the sentence that names each, and the replaced texts."""
 FLAGS = ("-O0", "-O3 -ffast-math", "-O2 -mfma -ffp-contract=fast", "-O1")
 
 

@@ -1,13 +1,15 @@
 """Violations and notes of two versions, from rows with chosen values."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.versions import project
-from conservative.benchmarks.versions.project import TIME, ProjectSide, define_scene, judge, judge_values
+from conservative.benchmarks.versions.prices import Price, read_prices
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, define_scene, faster, judge, judge_values
 from conservative.errors import BadInput
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
@@ -35,7 +37,7 @@ def test_equal_rows_pass_without_notes():
 
 
 def test_no_measure_of_a_real_row_is_ignored():
-    values, spreads = points.measure(points.Point(scene("lagrange_top:t_end=0.5"), method("reduced")))
+    values, spreads = points.measure(points.Point(scene("lagrange_top:t_end=0.1"), method("reduced")))
     assert {"rate error max", "vertical momentum drift max", "iterations", "observed order"} <= values.keys()
     was = judge_values(row(), values, spreads)
     for name, value in values.items():
@@ -67,6 +69,75 @@ def test_a_row_that_fails_now_or_is_gone_fails():
     assert violations(row(), failed) == {"row"}
     assert violations(row(), None) == {"row"}
     assert compare(row(), failed).notes == ("brick_flip, reduced: is without values: diverged at 1 s",)
+
+
+def test_another_motion_is_one_violation_with_its_cause():
+    lost = row(attitude_error_max=3.1, rate_error_max=5.0, energy_drift_max=0.5)
+    (each,) = compare(row(), replace(lost, cause="no torque")).violations
+    assert (each.measure, each.allowed) == (MOTION, "")
+    assert "no torque" in each.finding
+    assert violations(row(), lost) == {MOTION}  # without a cause
+    assert violations(row(), replace(row(), cause="late")) == {MOTION}  # which the scene does not show
+    failed = replace(row("diverged", status=Status.FAILED), cause="no torque")
+    assert violations(row(), failed) == {MOTION}
+    assert violations(row(), row(attitude_error_max=0.5)) == {"attitude error max"}  # an error may have grown
+
+
+def test_a_motion_that_is_lost_in_both_versions_is_never_faster():
+    was, now = row(attitude_error_max=3.13877), row(attitude_error_max=3.14159, rate_error_max=9.0, observed_order=0.1)
+    line = comparison((was, now, timed((0.1, 0.09, 0.11)))).lines[0]
+    assert not faster(line)
+    assert faster(replace(line, results=(row(), row())))
+    assert violations(was, now) == set()  # half a turn says nothing
+    assert violations(was, replace(now, values={**now.values, "energy drift max": 0.1})) == {"energy drift max"}
+    assert violations(was, now, timed(SLOW, SLOW)) == {TIME}
+    known = replace(was, cause="no torque")
+    assert violations(was, replace(now, cause="no torque")) == {MOTION}
+    assert violations(known, replace(now, cause="no torque")) == set()
+    assert any("no torque" in note for note in compare(known, replace(now, cause="no torque")).notes)
+
+
+def test_a_longer_time_can_have_a_price(tmp_path):
+    file = tmp_path / "conservative.toml"
+    file.write_text('[engines]\na = "x"\n[accept-slower]\nreduced = "1.2x: more digits"\n')
+    prices = read_prices(["other = 6x", "reduced=1.09x"], file)
+    assert prices == {"reduced": Price(1.09, ""), "other": Price(6.0, "")}
+    prices = read_prices([], file)
+    slow = comparison((row(), row(), timed(SLOW, SLOW)))
+    assert "more digits" in judge(slow, prices).notes[0]
+    assert judge(slow, prices).passed
+    assert not judge(slow, {"reduced": Price(1.07, "")}).passed
+    assert judge(comparison((row(), row(), timed(SAME))), prices).notes == (
+        f"reduced: no row needs the longer time, {prices['reduced']}",
+    )
+    broken = comparison((row(), row(), timed((math.nan,) * 3, reason="crashed")))
+    assert not judge(broken, prices).passed
+
+
+@pytest.mark.parametrize("text", ["reduced", "reduced=6", "reduced=0.5x", "=6x", "reduced=6x reason"])
+def test_a_price_that_is_none_is_refused(text, tmp_path):
+    with pytest.raises(BadInput, match="accept-slower: got "):
+        read_prices([text], tmp_path / "conservative.toml")
+    (tmp_path / "conservative.toml").write_text('[accept-slower]\nreduced = "6x"\n')  # in a file it needs a reason
+    with pytest.raises(BadInput, match="accept-slower: got "):
+        read_prices([], tmp_path / "conservative.toml")
+
+
+def test_a_scene_that_is_not_supported_is_one_note():
+    skipped = row("only free bodies", status=Status.SKIPPED)
+    result = judge(comparison((row(method="gauss"), row(method="gauss"), None), (skipped, skipped, None)))
+    assert result.passed
+    assert result.notes == ("reduced: not supported (only free bodies): brick_flip",)
+
+
+def test_a_slow_method_is_measured_with_fewer_points():
+    point = points.Point(scene("brick_flip"), method("textbook"))
+    runs = []
+    slow = replace(point, method=replace(point.method))
+    object.__setattr__(slow.method, "solve", lambda scene, grid: runs.append(grid) or point.method.solve(scene, grid))
+    values, spreads = points.measure(slow, few=True)
+    assert sum(grid.n_steps for grid in runs) <= 5 * point.grid.n_steps
+    assert values["observed order"] == pytest.approx(point.method.order, abs=0.3)
 
 
 def test_rows_that_are_new_or_failed_before_pass_with_a_note():

@@ -1,0 +1,47 @@
+"""Times that a project accepts: a factor for a method, with the reason, in the command or in its file for CI.
+
+[accept-slower]                                   # conservative.toml
+my_method = "6x: the gyroscopic torque is computed"
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from conservative.errors import BadInput
+
+TABLE = "accept-slower"
+
+
+@dataclass(frozen=True)
+class Price:
+    """A factor of the time of a step that is accepted, and the reason."""
+
+    factor: float
+    reason: str
+
+    def __str__(self) -> str:
+        return f"accepted up to {self.factor:g} times" + f": {self.reason}" * bool(self.reason)
+
+
+def read_prices(texts: Sequence[str], file: Path) -> dict[str, Price]:
+    """Return the prices by method: those of a file, which need a reason, and those of texts `NAME=6x` or `NAME=6x: reason`.
+
+    Raises `BadInput` for a text or a line that is not one.
+    """
+    prices = dict[str, Price]()
+    try:
+        lines = tomllib.loads(file.read_text(encoding="utf-8")).get(TABLE, {}) if file.is_file() else {}
+        lines = {name: str(text) for name, text in lines.items()}
+    except (OSError, ValueError, AttributeError) as error:
+        raise BadInput(str(file), str(error), f'a table [{TABLE}] of texts, such as my_method = "6x: the reason"') from None
+    for text in [*(f"{name}={text}" for name, text in lines.items()), *texts]:
+        found = re.fullmatch(r"(.+?)=\s*(\d+(?:\.\d+)?)x(?::\s*(.*\S))?\s*", text)
+        if not found or float(found[2]) <= 1 or (len(prices) < len(lines) and not found[3]):
+            raise BadInput(TABLE, repr(text), "NAME=6x, or NAME=6x: reason; in conservative.toml with the reason")
+        prices[found[1].strip()] = Price(float(found[2]), found[3] or "")
+    return prices

@@ -1,0 +1,56 @@
+"""Rounding is no violation in float and in double, and physical mistakes have their causes.
+
+`tests/attack/test_alarms.py` has all changes and mistakes. Here the programs run without the process of a version.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from conservative.benchmarks.suite import points
+from conservative.benchmarks.versions.causes import UNKNOWN, find_causes
+from conservative.benchmarks.versions.project import judge, judge_values
+from conservative.programs import Program
+from conservative.references.environments.programs import program_class
+from conservative.registry import scene
+
+from .made_up import comparison, row
+from .rewrites import MISTAKES, build, rewrite
+
+
+@pytest.fixture
+def method(tmp_path):
+    """Return a function that compiles a program with changes."""
+
+    def make(*flags, changes=None):
+        name = f"p{len(list(tmp_path.iterdir()))}"
+        return program_class(Program("mine", Path("conservative.toml"), str(build(tmp_path, name, *flags, changes=changes))))()
+
+    return make
+
+
+@pytest.mark.parametrize("number", [0, 31, 40])
+def test_rounding_is_no_violation(number, method):
+    """Number 0 is q * (1 / n) for q / n in float, which was four violations: starts were nudged by the digits of double."""
+    flags, changes = rewrite(number)
+    brick, rows = scene("brick_flip"), []
+    for each in (method(*(flag for flag in flags if flag.startswith("-D"))), method(*flags, changes=changes)):
+        values, spreads = points.measure(points.Point(brick, each))
+        rows.append(judge_values(row(), values, spreads))
+    was, now = rows
+    assert was.values != now.values
+    assert judge(comparison((was, now, None))).violations == ()
+    assert was.spreads["attitude error max"] > (1e-9 if "-DREAL=float" in flags else 1e-15)  # measured 4e-7 or more
+
+
+@pytest.mark.parametrize("name", ["no gyroscopic torque", "gyroscopic term has the other sign", "Gravity points up", "damped"])
+def test_a_mistake_has_its_cause(name, method):
+    free, heavy = find_causes(method("-DREAL=float", changes=MISTAKES[name]).solve)
+    assert name in heavy
+    assert free == ("" if name == "Gravity points up" else heavy)
+
+
+def test_a_right_motion_has_no_cause_and_an_unknown_mistake_no_name(method):
+    assert find_causes(method("-DEULER").solve) == ("", "")
+    wrong = {"k[1] = (a * x + c * z - d * v) / 2;": "k[1] = (a * x - c * z + d * v) / 2;"}
+    assert find_causes(method(changes=wrong).solve) == (UNKNOWN, UNKNOWN)
