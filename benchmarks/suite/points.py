@@ -35,6 +35,8 @@ PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4),
 """Attitudes at which energies distinguish two potentials."""
 STEPS = 6
 """Number of steps that an observed order is fitted to; high orders need all of theirs, which are short."""
+ROUND_OFF = 1.6
+"""Smallest spread of an error or a drift, in units of the precision: few nudges may round to the same number."""
 ROUNDED = 1e-13
 """Attitude errors, rad, up to this size are partly round-off, which differs between machines and compilers. No order is fitted
 to them: the order of `projected` on the Lagrange top was 7.84 or 7.78 with errors of 1e-14, and is 7.94 without."""
@@ -147,7 +149,8 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
         found = errors.measure_errors(trajectory, exact)
         measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
     nudged = {name: [each[name] for each in measured] for name in measured[0]}
-    spreads = {name: max(values) - min(values) for name, values in nudged.items()}
+    least = ROUND_OFF * float(np.finfo(number).eps)
+    spreads = {name: max(max(values) - min(values), 0.0 if name in counters else least) for name, values in nudged.items()}
     order = fit_order(point, few) if point.scene.name.partition(":")[0] in PAPER else {}
     return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
 

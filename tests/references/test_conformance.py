@@ -62,6 +62,7 @@ NAMED = {
     "no gravity": "heavy body: It ignores gravity",
     "inertia about com": "heavy body: Its inertia is about the centre of mass",
     "time in ms": "`seconds` is in s, and only of the calls",
+    "time nine times": "`seconds` is in s, and only of the calls",
     "less time": "`seconds` is the wall time of all calls together",
     "one call": "`time` has to make `calls` runs",
     "random": "free body: a second run has other samples: start from `q0` and `w0`",

@@ -50,6 +50,18 @@ def run_of(worker, dt, scene=BRICK, **settings):
     return WorkerRun(worker, {"adapter": "", "settings": settings, **describe(axes, grid)}, read_one(axes, grid, "theirs"))
 
 
+def test_a_run_of_a_process_that_ended_is_not_forgotten_in_the_next(start):
+    """Both have the number 1, and the program frees it when it is told to."""
+    worker = start(sys.executable, "-I", PROGRAMS / "engine.py")
+    old, new = (run_of(worker, 0.1) for _ in range(2))
+    assert old().ok
+    worker.close()
+    assert new().ok
+    del old
+    assert new().ok
+    assert worker.ask("list")["runs"] == [1]
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_program_without_any_package_is_an_engine(command, start):
     """Compare RK4 in another process with the closed form. A wrong unit, frame or order of numbers would show here."""

@@ -135,7 +135,7 @@ def test_a_slow_method_is_measured_with_fewer_points():
     runs = []
     slow = replace(point, method=replace(point.method))
     object.__setattr__(slow.method, "solve", lambda scene, grid: runs.append(grid) or point.method.solve(scene, grid))
-    values, spreads = points.measure(slow, few=True)
+    values, _ = points.measure(slow, few=True)
     assert sum(grid.n_steps for grid in runs) <= 5 * point.grid.n_steps
     assert values["observed order"] == pytest.approx(point.method.order, abs=0.3)
 
