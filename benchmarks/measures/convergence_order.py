@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,14 @@ BEND, CALMER = 0.05, 1.1
 
 Dropping a point of a bend lessens the scatter; dropping one of noise does not."""
 
+AGREE = 0.015
+"""Successive slopes agree if they differ by at most this, relative."""
+BENT, MOVES = 3.0, 2.0
+"""Standard errors of a curvature that is no noise, and the factor by which the slope may move beyond the finest step.
+
+RK4 on the brick has slopes 4.53, 4.44, 4.28, 4.15, 4.06, 4.03: a slow program that reaches the first three and a fast one had
+orders of 4.42 +- 0.04 and 4.08 +- 0.02."""
+
 GROWTH, NO_ROUND_OFF = 3.0, 1e-9
 """Factor and size of an error at the shortest step that has grown, and not only by round-off in double precision."""
 
@@ -35,7 +44,8 @@ class Order:
     Attributes
     ----------
     slope, stderr
-        d log(error) / d log(step) and its standard error; nan where there is no fit.
+        d log(error) / d log(step), and its standard error or, if the line is bent, how far the slope at shorter steps may be
+        from it; nan where there is no fit.
     used
         Indices of the points in the fit, into the arguments, coarsest step first.
     floor
@@ -72,6 +82,9 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
        the scatter decreases by more than `CALMER`, and at least four points remain.
 
+    4. If the points that are left bend more than their scatter, the longest sequence whose successive slopes agree is used,
+       the finest of several. If none agree, all are used.
+
     Failed runs, whose error is not finite, are skipped. Errors of zero are at the floor.
 
     Parameters
@@ -97,8 +110,10 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     if len(used) < MIN_POINTS:
         reason = f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}"
         return Order(floor=floor, reason=reason)
+    if _trend(x[used], y[used]):
+        used = _where_slopes_agree(x, y, used)
     line = fit_line(x[used], y[used])
-    return Order(line.slope, line.stderr, tuple(order[i] for i in used), floor)
+    return Order(line.slope, max(line.stderr, _trend(x[used], y[used])), tuple(order[i] for i in used), floor)
 
 
 def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
@@ -153,6 +168,26 @@ def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
             break
         used = used[1:]
     return used
+
+
+def _where_slopes_agree(x: Array, y: Array, used: list[int]) -> list[int]:
+    slopes, first, best = [_pair(x, y, pair) for pair in pairwise(used)], 0, (0, 0)
+    for last in range(1, len(slopes)):
+        if abs(slopes[last] - slopes[last - 1]) > AGREE * abs(slopes[last]):
+            first = last
+        elif last - first >= best[1] - best[0]:
+            best = first, last
+    return used[best[0] : best[1] + 2] if best[1] > best[0] else used
+
+
+def _trend(x: Array, y: Array) -> float:
+    """Return how far the order at shorter steps may be from the slope of the line, by a parabola; 0 if its bend is noise."""
+    x = x - x.mean()
+    terms = np.vander(x, 3)
+    fitted, residuals, *_ = np.linalg.lstsq(terms, y, rcond=None)
+    noise = math.sqrt(float(residuals[0]) / (len(x) - 3) * np.linalg.inv(terms.T @ terms)[0, 0]) if len(x) > 3 else 0.0
+    at_the_end = float(2 * fitted[0] * x.min() + fitted[1])
+    return MOVES * abs(at_the_end - fit_line(x, y).slope) if abs(fitted[0]) > BENT * noise else 0.0
 
 
 def _pair(x: Array, y: Array, pair: Sequence[int]) -> float:

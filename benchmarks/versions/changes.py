@@ -19,8 +19,8 @@ from ..measures.errors import CONSERVED, SMALL
 from .engine import TIME_FACTOR, EngineComparison, Observation, Range, StepTimes, ratio
 from .times import Ratio
 
-ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
-"""Orders differ if their difference exceeds the first, and this number of standard errors."""
+ORDER_STEP, ORDER_ERRORS = 0.5, 2.0
+"""Orders differ if their difference exceeds the first, and this number of their uncertainties."""
 FACTOR = 3.0
 """Smallest ratio of errors, or drifts, that differ."""
 ROUND_OFF = 1e-9

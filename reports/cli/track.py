@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -35,6 +36,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
     epilog=epilog(
         "conservative track mujoco 3.6.0 3.7.0 4.0.0",
         "conservative track exudyn --last 3 --out exudyn_track",
+        "conservative track mujoco --bump main        what a new version in requirements.txt or uv.lock changes",
         "conservative track mujoco --against dist/mujoco-4.1.0-cp311-cp311-linux_x86_64.whl --junit track.xml",
         "conservative track mujoco 4.0.0 --against ~/mujoco/python --allow-build --settings Euler,RK4",
     ),
@@ -49,6 +51,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
     help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence or an "
     "invariant, or if a run fails that succeeded before.",
 )
+@click.option("--bump", metavar="REF", help="The versions in the lock or requirements files of a git ref and of this folder.")
 @names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
 @names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
 @click.option("--twins", is_flag=True, help="Also show which twins began or ceased to differ; see `conservative twins`.")
@@ -66,8 +69,10 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
+    from conservative.benchmarks.versions.bumps import find_bump
     from conservative.benchmarks.versions.engine import compare_engine, plan_versions, require_several
     from conservative.benchmarks.versions.version import Version
+    from conservative.references.environments.environment import distribution_of
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
 
@@ -79,6 +84,11 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     def tell(what: str) -> None:
         click.echo(what, err=True)
 
+    if options["bump"] is not None:
+        bump = find_bump(distribution_of(engine).package, options["bump"], Path())
+        if bump is None:
+            return click.echo(f"No file has another version of {engine} than {options['bump']}.")
+        versions = *versions, *bump
     scenes, settings = (split_names(name, options[name]) for name in ("scenes", "settings"))
     with output_files(options["out"], PAGE, junit=options["junit"], markdown=options["markdown"]) as write:
         made = provenance().facts

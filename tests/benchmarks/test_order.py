@@ -188,6 +188,21 @@ def test_points_within_ten_of_the_floor_are_left_out(error, used):
     assert set(fitted.used) == used
 
 
+RK4 = (3.31509003e-02, 1.43802374e-03, 6.63162345e-05, 3.40866668e-06, 1.92134500e-07, 1.15091405e-08, 7.05239449e-10)
+"""Errors of RK4 on the brick: their slopes are 4.53, 4.44, 4.28, 4.15, 4.06 and 4.03."""
+
+
+def test_the_order_of_a_few_coarse_steps_and_of_all_agree_within_their_intervals():
+    """A slow program reaches four steps; its order was 4.42 +- 0.04, and that of a fast one 4.08 +- 0.02."""
+    few, every = (observed_order(STEPS[:count], RK4[:count]) for count in (4, 7))
+    assert few.slope == pytest.approx(4.42, abs=0.01)
+    assert every.slope == pytest.approx(4.04, abs=0.01)  # of the finest three, whose slopes agree
+    assert every.used == (4, 5, 6)
+    assert abs(every.slope - 4) < every.stderr  # measured 0.07
+    assert abs(few.slope - 4.06) < few.stderr  # measured 0.37
+    assert abs(few.slope - every.slope) < few.stderr + every.stderr
+
+
 X = np.linspace(-2.0, 3.0, 40)
 
 

@@ -18,7 +18,7 @@ NOTHING = "0" * 40
 def act(tmp_path):
     """Return a function that runs the step in a clone of a repository with `count` commits, and its exit code and base."""
 
-    def run(against, count=3, ends=0):
+    def run(against, count=3, ends=0, track=""):
         origin, clone, runner = (tmp_path / name for name in ("origin", "clone", "runner"))
         origin.mkdir()
         commits = []
@@ -32,14 +32,16 @@ def act(tmp_path):
         command.chmod(0o755)
         files = {name: str(runner / name) for name in ("GITHUB_OUTPUT", "GITHUB_STEP_SUMMARY")}
         given = {"AGAINST": commits[against] if isinstance(against, int) else against, "PROJECT": ".", "ARGUMENTS": "--a b"}
+        given["TRACK"] = track
         environment = {**os.environ, **files, **given, "RUNNER_TEMP": str(runner)}
         shell = ["bash", "-e", "-o", "pipefail", "-c", COMPARE]
         done = subprocess.run(shell, cwd=clone, env=environment, timeout=60, check=False)
         called = (runner / "arguments").read_text().split() if (runner / "arguments").exists() else []
         summary = (runner / "GITHUB_STEP_SUMMARY").read_text() if (runner / "GITHUB_STEP_SUMMARY").exists() else ""
+        base = called[2 + bool(track)] if called else ""
         if called:  # then the base is in the clone
-            subprocess.run(["git", "cat-file", "-e", f"{called[2]}^{{commit}}"], cwd=clone, check=True, timeout=60)
-        return done.returncode, commits.index(called[2]) - count if called else None, summary, called
+            subprocess.run(["git", "cat-file", "-e", f"{base}^{{commit}}"], cwd=clone, check=True, timeout=60)
+        return done.returncode, commits.index(base) - count if called else None, summary, called
 
     return run
 
@@ -63,3 +65,10 @@ def test_the_first_commit_of_all_has_nothing_to_compare_with(act):
 def test_a_gate_that_fails_fails_the_job_and_shows_its_table(act):
     code, _, summary, _ = act(0, ends=1)
     assert (code, summary) == (1, "table\n")
+
+
+def test_engines_are_tracked_instead_of_methods(act):
+    code, base, summary, called = act(0, track="mujoco")
+    assert (code, base, summary) == (0, -3, "table\n")
+    assert called[:3] == ["track", "mujoco", "--bump"]
+    assert called[-2:] == ["--a", "b"]
