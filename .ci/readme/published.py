@@ -72,12 +72,12 @@ def render_source(source: str) -> str:
             cells = [row["name"].replace("|", "\\|"), shown, row["measured"] or "–"]
             if row["measured"]:
                 each = compare(row["relation"], row["printed"], row["measured"])
-                sizes = ("–", "–") if each.unit is None else (f"{each.difference:.2g}", f"{each.unit:g}")
-                cells += [*sizes, row["method"], f"{result(each)}{note}"]
+                size = "–" if each.unit is None else f"{each.difference:.2g} ({each.unit:g})"
+                cells += [size, row["method"], f"{result(each)}{note}"]
             else:
-                cells += ["–", "–", "–", f"not measured{note}"]
+                cells += ["–", "–", f"not measured{note}"]
             lines.append(cells)
-    return table(["figure", "printed", "measured", "difference", "allowed", "with", "result"], lines)
+    return table(["figure", "printed", "measured", "difference (allowed)", "with", "result"], lines)
 
 
 def result(each: Comparison) -> str:

@@ -106,8 +106,16 @@ def element(
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)
-    safe = data.replace("<", "\\u003c")  # no end of the script
-    return _fill("motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=safe)
+    return frame(panels, name, duration, id, data.replace("<", "\\u003c"))  # no end of the script
+
+
+def frame(panels: Sequence[object], name: str, duration: float, id: str, data: str) -> str:
+    """Return the HTML of an animation of panels with `label`, `outcome` and names of `sizes`.
+
+    `data` is JSON. A script of the page can set the property `content` of the element instead, in the same form, and dispatch
+    an event of that name after each change. A panel with `moments` in place of `q` shows its `L` in principal axes.
+    """
+    return _fill("motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=data)
 
 
 def _fill(template: str, **values: object) -> str:

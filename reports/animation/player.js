@@ -20,6 +20,11 @@
   };
   const turned = (turns, frame) => new Quaternion().slerpQuaternions(...between(turns, frame));
   const mesh = (geometry, color) => new Mesh(geometry, new MeshLambertMaterial({ color }));
+  const stage = (...things) => {
+    const sun = new THREE.DirectionalLight(0xffffff, 1.8), sky = new THREE.HemisphereLight(0xffffff, 0xb8c0c8, 2.1);
+    sun.position.set(3, 2, 5);
+    return new THREE.Scene().add(sky, sun, ...things);
+  };
   const wire = (box, color, depthTest) => new THREE.LineSegments(new THREE.EdgesGeometry(box), new THREE.LineBasicMaterial({ color, depthTest }));
 
   function pointer(color, radius, tip) { // a rod from the fixed point with something at its end
@@ -41,9 +46,7 @@
     const points = Array.from({ length: (turns.length - 1) * FINE + 1 }, (_, k) => end.clone().applyQuaternion(turned(turns, k / FINE)).toArray());
     const line = new THREE.LineGeometry().setPositions(points.flat());
     const trace = new THREE.Line2(line, new THREE.LineMaterial({ color: colours.trace, linewidth: 2 })); // pixels
-    const sun = new THREE.DirectionalLight(0xffffff, 1.8), sky = new THREE.HemisphereLight(0xffffff, 0xb8c0c8, 2.1);
-    sun.position.set(3, 2, 5);
-    const scene = new THREE.Scene().add(sky, sun, body, arrow.group, trace, outline);
+    const scene = stage(body, arrow.group, trace, outline);
     return (frame, truth) => {
       body.quaternion.copy(turned(turns, frame));
       arrow.aim(new Vector3().lerpVectors(...between(momenta, frame)).clampLength(0, 1.25).multiplyScalar(1.45)); // a longer one would leave the panel
@@ -54,11 +57,42 @@
     };
   }
 
+  // The momentum in axes of the body lies on two surfaces: the sphere of its length, and the ellipsoid of the energy. Where one
+  // surface goes through the other is the polhode, so that both are opaque.
+  function polhode({ moments, L, colours }) {
+    const points = split(L, 3, Vector3), axes = (at) => moments.map((each) => Math.sqrt(each * moments.reduce((sum, J, i) => sum + at.getComponent(i) ** 2 / J, 0)));
+    const scale = 1.4 / Math.max(...axes(points[0])), ball = new THREE.SphereGeometry(scale, 64, 48);
+    const sphere = mesh(ball, colours.sphere), ellipsoid = mesh(ball, colours.ellipsoid), dot = mesh(new THREE.SphereGeometry(0.08), colours.arrow);
+    const rods = moments.map((_, i) => {
+      const rod = mesh(new THREE.CylinderGeometry(0.02, 0.02, 3.5), colours.faces[2 * i]);
+      rod.quaternion.setFromUnitVectors(UP, new Vector3().setComponent(i, 1));
+      return rod;
+    });
+    const line = new THREE.LineGeometry().setPositions(points.flatMap((each) => each.clone().multiplyScalar(1.01 * scale).toArray()));
+    const [near, far] = [[true, 1], [false, 0.25]].map(([depthTest, opacity]) => new THREE.Line2(line, new THREE.LineMaterial({ color: colours.trace, linewidth: 2, transparent: true, depthTest, opacity })));
+    const scene = stage(sphere, ellipsoid, dot, near, far, ...rods);
+    return (frame) => {
+      const at = new Vector3().lerpVectors(...between(points, frame));
+      sphere.scale.setScalar(at.length());
+      ellipsoid.scale.set(...axes(at));
+      dot.position.copy(at).multiplyScalar(scale);
+      line.instanceCount = Math.max(1, Math.round(Math.min(frame, points.length - 1)));
+      return scene;
+    };
+  }
+
   for (const motion of document.querySelectorAll(".motion")) {
-    const { duration, frames, truth, colours, panels } = JSON.parse(motion.querySelector(".data").textContent);
+    let duration, frames, truth, panels, poses = null, exact; // of the data of the page, or of a script that sets `content`
     const [play, slider, clock, speed] = ["play", "time", "clock", "speed"].map((name) => motion.querySelector(`.${name}`));
     const canvases = [...motion.querySelectorAll("canvas")], values = [...motion.querySelectorAll(".values")];
-    const poses = renderer && panels.map((panel) => build({ ...panel, colours })), exact = truth !== null && split(panels[truth].q, 4, Quaternion);
+    const load = () => {
+      const content = motion.content ?? JSON.parse(motion.querySelector(".data").textContent);
+      for (const pose of poses ?? []) pose(0, null).traverse(({ geometry, material }) => [geometry, material].flat().forEach((each) => each?.dispose()));
+      ({ duration, frames, truth, panels } = content);
+      poses = renderer && panels.map((panel) => (panel.moments ? polhode : build)({ ...panel, colours: content.colours }));
+      exact = truth !== null && split(panels[truth].q, 4, Quaternion);
+    };
+    load();
     motion.querySelector(".missing").hidden = Boolean(renderer);
     for (const each of canvases) each.hidden = !renderer;
     let t = 0, last = null, visible = false;
@@ -86,6 +120,11 @@
         target.getContext("2d").drawImage(canvas, 0, 0);
       }
     };
+    const turnView = (turn, tilt) => {
+      view.turn += turn;
+      view.tilt = Math.max(-1.5, Math.min(1.5, view.tilt + tilt));
+      draw();
+    };
     const step = (now) => {
       if (last === null) return;
       if (visible) {
@@ -104,11 +143,13 @@
     slider.addEventListener("input", () => { run(false); t = Number(slider.value); draw(); });
     slider.addEventListener("keydown", (event) => { if (event.key === " ") { event.preventDefault(); play.click(); } });
     motion.querySelector(".panels").addEventListener("pointermove", ({ buttons, movementX, movementY }) => {
-      if (!buttons) return;
-      view.turn -= movementX / 120;
-      view.tilt = Math.max(-1.5, Math.min(1.5, view.tilt + movementY / 120));
-      draw();
+      if (buttons) turnView(-movementX / 120, movementY / 120);
     });
+    motion.querySelector(".panels").addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: [0.15, 0], ArrowRight: [-0.15, 0], ArrowUp: [0, -0.15], ArrowDown: [0, 0.15] }[event.key];
+      if (by) { event.preventDefault(); turnView(...by); }
+    });
+    motion.addEventListener("content", () => { load(); draw(); });
     new IntersectionObserver(([entry]) => { visible = entry.isIntersecting; }).observe(motion);
     new ResizeObserver(draw).observe(motion);
     motion.dataset.drawn = renderer ? "3d" : "numbers";

@@ -9,6 +9,8 @@ page is a page of its own, so that no text exists twice.
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import posixpath
 import re
 import shutil
@@ -21,9 +23,15 @@ import conservative as cv
 from conservative.errors import require_extra
 from conservative.version import VERSION
 
+from .flip import figure
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "reports" / "documentation"
-CONTENTS = "reports/documentation/contents.md"
+CONTENTS, LANDING = "reports/documentation/contents.md", "reports/documentation/landing.md"
+LIVE = {"index": False, "reports/documentation/why_does_it_flip": True}
+"""Pages whose picture becomes the live figure, and whether it has sliders."""
+COLUMNS = 6
+"""Largest number of columns of a table; a wider one becomes several, each with the first column."""
 ROOMS = (".github", "conservative", "references", "benchmarks", "reports")
 DIVIDED = ("README.md", *(f"{room}/README.md" for room in ROOMS[1:]), "conservative/extending.md", "conservative/reference.md")
 SETTINGS = {
@@ -46,6 +54,10 @@ SETTINGS = {
     "default_role": "code",
     "highlight_language": "text",
     "autodoc_typehints": "signature",
+    "napoleon_attr_annotations": False,  # the signature has the types
+    "autodoc_type_aliases": {"Array": "Array", "ArrayLike": "ArrayLike", "Given": "ArrayLike | tuple | Callable"},
+    "html_static_path": [str(HERE / "site.css")],
+    "html_css_files": ["site.css"],
     "html_theme": "furo",
     "html_title": f"conservative {VERSION}",
     "html_show_copyright": False,
@@ -82,11 +94,11 @@ def anchors(text: str) -> set[str]:
 def sections(path: str) -> dict[str, str]:
     """Return the pages of the site that a divided page becomes, by name: one for each heading of the second level.
 
-    Their headings move up by one level. Only the first page contributes the text above them.
+    Their headings move up by one level. The text above them is left out: the landing page replaces it.
     """
     text, folder = (ROOT / path).read_text(encoding="utf-8"), posixpath.dirname(path)
     starts = [match.start() for match in HEADING.finditer(text) if match[0].startswith("## ")]
-    found = {"index": text[: starts[0]]} if path == "README.md" else {}
+    found = {}
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         title = text[start + 3 : text.index("\n", start)]
         found[posixpath.join(folder, anchor(title))] = HEADING.sub(lambda match: match[1] or match[0], text[start:end])
@@ -129,12 +141,20 @@ def written(source: Path) -> None:
     for name, text in paper.items():
         paper[name] = "# Paper\n\n" + re.sub("^#", "##", re.sub(r"\A---\n.*?^---$", "", text, flags=re.M | re.S), flags=re.M)
     del pages["README.md"]["read-on"]  # links, which the site has beside each page
+    pages[LANDING] = {"index": next(iter(pages[LANDING].values()))}
     texts = {}
     for path, parts in pages.items():
         suffix = posixpath.splitext(path)[1]
         for name, text in parts.items():
             texts[name + suffix] = text if suffix == ".ipynb" else linked(name, path, text, pages, source)
-    texts["index.md"] += (ROOT / CONTENTS).read_text(encoding="utf-8")
+    for name, sliders in LIVE.items():
+        live = f"```{{raw}} html\n:file: {posixpath.basename(name)}.html\n```"
+        texts[f"{name}.md"] = re.sub(r"^!\[.*?\)$", live, texts[f"{name}.md"], count=1, flags=re.MULTILINE)
+        texts[f"{name}.html"] = figure(sliders)
+    groups = re.findall(r"^# (.*)\n\n((?:.+\n)+)", (ROOT / CONTENTS).read_text(encoding="utf-8"), re.M)
+    for title, entries in groups:
+        texts[f"contents/{anchor(title)}.md"] = listing(title, "", entries.split())
+    texts["index.md"] += listing("", "", [*LIVE, *(f"contents/{anchor(title)}" for title, _ in groups)][1:], ":hidden:")
     public = [name for name in cv.__all__ if name not in ("scenes", "shapes", "VERSION")]
     texts |= {f"api/{name}.rst": api(f"conservative.{name}", name) for name in public}
     texts |= {f"api/{name}.rst": api(name, name) for name in (*MODULES, "conservative.scenes", "conservative.shapes")}
@@ -177,16 +197,64 @@ def show_block(translator: Any, node: Any) -> None:
     raise nodes.SkipNode
 
 
+def divide_tables(app: Any, doctree: Any) -> None:
+    """Divide tables of more than `COLUMNS` columns."""
+    from docutils import nodes
+
+    for table in list(doctree.findall(nodes.table)):
+        more = len(list(table.findall(nodes.colspec))) - 1
+        if more < COLUMNS:
+            continue
+        width = math.ceil(more / math.ceil(more / (COLUMNS - 1)))
+        parts = []
+        for start in range(1, more + 1, width):
+            parts.append(part := table.deepcopy())
+            (group,) = part.findall(nodes.tgroup)
+            group["cols"] = 1 + min(width, more + 1 - start)
+            for row in [*part.findall(nodes.row), [each for each in group if isinstance(each, nodes.colspec)]]:
+                for number, cell in enumerate(list(row)):
+                    if number and not start <= number < start + width:
+                        cell.parent.remove(cell)
+        table.replace_self(parts)
+
+
+def add_excerpts(app: Any, page: str, template: str, context: Any, doctree: Any) -> None:
+    """Load the excerpts into the page of the search."""
+    if page == "search":
+        app.add_js_file("excerpts.js", priority=100)
+
+
+def write_excerpts(app: Any, error: Exception | None) -> None:
+    """Write the pages without navigation and attributes as a script: a page from disk may not fetch others."""
+    texts = {}
+    for page in sorted(app.env.found_docs) if error is None else ():
+        text = (Path(app.outdir) / f"{page}.html").read_text(encoding="utf-8")
+        text = "".join(re.findall(r"<article.*?</article>", text, re.DOTALL))
+        text = re.sub(r"<(script|style|svg|math)\b.*?</\1>", "", text, flags=re.DOTALL)
+        text = re.sub(r'<(\w+)(?=[^>]*?(\sid="[^"]*"))?[^>]*>', r"<\1\2>", text)  # identifiers stay: results lead to them
+        texts[f"./{page}.html"] = f'<div role="main">{text}</div>'
+    ours = "const ask = fetch;\nfetch = async (url, ...more) => (url in EXCERPTS ? new Response(EXCERPTS[url]) : ask(url, ...more));\n"
+    (Path(app.outdir) / "_static" / "excerpts.js").write_text(
+        f"const EXCERPTS = {json.dumps(texts)};\n{ours}", encoding="utf-8"
+    )
+
+
 def setup(app: Any) -> None:
-    """Extend Sphinx: our docstrings and formulas."""
+    """Extend Sphinx: our docstrings and formulas, narrow tables, and a search with excerpts from disk."""
+    from sphinx.util import inspect
+
     app.connect("autodoc-process-docstring", as_restructured, priority=400)  # before napoleon
+    inspect.TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]  # else the class is shown, in unions
+    app.connect("doctree-read", divide_tables)
+    app.connect("html-page-context", add_excerpts)
+    app.connect("build-finished", write_excerpts)
     app.add_html_math_renderer("mathml", (show_block, None), (show_block, None))
 
 
-def listing(title: str, folder: str, names: Iterable[str]) -> str:
-    """Return a page with links to the pages of a folder."""
-    entries = "\n".join(f"{folder}/{name}" for name in names)
-    return f"# {title}\n\n```{{toctree}}\n:maxdepth: 1\n\n{entries}\n```\n"
+def listing(title: str, folder: str, names: Iterable[str], option: str = ":maxdepth: 1") -> str:
+    """Return a page with links to the pages of a folder; without a title, the end of one."""
+    entries = "\n".join(posixpath.join("/", folder, name) for name in names)
+    return f"# {title}" * bool(title) + f"\n\n```{{toctree}}\n{option}\n\n{entries}\n```\n"
 
 
 def main() -> None:

@@ -1,0 +1,34 @@
+"""The live figure of the page `why_does_it_flip.md`: motions that `flip.js` computes, in the player of `reports/animation`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ..animation import frame, script
+from ..animation.frames import COLOURS, ERROR
+
+HERE = Path(__file__).parent
+DURATION = 12.0
+"""Simulated time, s."""
+
+
+def figure(sliders: bool) -> str:
+    """Return the HTML of the figure: body and polhode, exactly and with implicit Euler, and its sliders."""
+    from jinja2 import Environment, StrictUndefined
+
+    surfaces = ("energy", "momentum")
+    panels = [
+        {"label": label, "outcome": "", "sizes": sizes}
+        for label, sizes in (
+            ("exact", ()),
+            ("exact: polhode", surfaces),
+            ("implicit Euler, 1/60 s", (ERROR,)),
+            ("implicit Euler: polhode", surfaces),
+        )
+    ]
+    motion = frame(panels, "a box that spins about an axis", DURATION, "flip", json.dumps({"colours": COLOURS}))
+    template = (HERE / "flip.html.j2").read_text(encoding="utf-8")
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    physics = (HERE / "flip.js").read_text(encoding="utf-8")
+    return environment.from_string(template).render(sliders=sliders, motion=motion, script=script(), physics=physics)
