@@ -55,7 +55,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
 
 
 def render(document: Document, folder: Path, png: bool) -> None:
-    """Write report.md with its pictures, and the page."""
+    """Write report.md with its pictures, the page, and the pages of engines with their badges."""
     from .document import html, markdown
 
     names = dict[str, str]()
@@ -68,6 +68,11 @@ def render(document: Document, folder: Path, png: bool) -> None:
 
     files.write_text(folder / "report.md", markdown.render(document, draw), "out")
     files.write_text(folder / "index.html", html.render(document), "out")
+    for name, page in document.pages.items():
+        files.write_text(folder / f"{name}.md", markdown.render(page), "out")
+        files.write_text(folder / f"{name}.html", html.render(page), "out")
+        if page.badge:
+            files.write_text(folder / f"{name}.svg", page.badge, "out")
 
 
 def save_picture(chart: Any, path: Path, png: bool) -> str:

@@ -22,7 +22,7 @@ from ..motions import files
 from ..motions.motion import load
 from ..motions.programs import ANGLES, PARTS
 from .case import Case
-from .declaration import Declaration, Extent, Named
+from .declaration import Declaration, Named
 from .study import Progress, Study
 from .time_limit import attempt_within
 
@@ -60,4 +60,4 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield case.row(Value(Measure.ALLOWED, ratio), OK, mistake)
 
 
-STUDY = Declaration(findings, Extent.FULL, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))
+STUDY = Declaration(findings, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))

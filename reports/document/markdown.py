@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from .model import Block, Document, Emphasis, Facts, Figure, Items, Paragraph, Section, Table
+from .model import Block, Document, Emphasis, Facts, Figure, Items, Links, Paragraph, Section, Table
 
 Draw = Callable[[Figure], str]
 """Draws the picture of a figure into a file and returns the name of the file."""
@@ -30,6 +30,8 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
                 yield f"**{block.text}**" if block.role is Emphasis.LEAD else block.text
             case Items():
                 yield "\n".join(f"- {f'**{item.subject}**: ' * bool(item.subject)}{item.text}" for item in block.items)
+            case Links():
+                yield ", ".join(f"[{text}]({file})" for text, file in block.links)
             case Facts():
                 yield table(Table(("", ""), block.facts))
             case Table():

@@ -121,6 +121,13 @@ class Items:
 
 
 @dataclass(frozen=True)
+class Links:
+    """Links to files in the folder of the document: texts with names of files. The terminal does not show them."""
+
+    links: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
 class Facts:
     """Names with their values."""
 
@@ -200,7 +207,7 @@ class Section:
     """Columns and values that select the rows of its tables in `measurements.csv`, within those of the section around it."""
 
 
-Block = Paragraph | Items | Facts | Table | Figure | Motion | Section
+Block = Paragraph | Items | Links | Facts | Table | Figure | Motion | Section
 
 
 @dataclass(frozen=True)
@@ -233,6 +240,10 @@ class Document:
         The test cases of a gate or a comparison.
     failures
         Reasons why the command fails; empty if it succeeds.
+    pages
+        Documents next to this one, by the names of their files without an ending.
+    badge
+        A picture (SVG) with the result, for others to show; empty if there is none.
     """
 
     command: str
@@ -242,6 +253,8 @@ class Document:
     data: Mapping[str, Any] | Sequence[Any] = field(default_factory=dict)
     checks: Sequence[Check] = ()
     failures: Sequence[str] = ()
+    pages: Mapping[str, Document] = field(default_factory=dict)
+    badge: str = ""
 
     @property
     def figures(self) -> list[Figure]:

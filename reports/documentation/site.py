@@ -233,10 +233,10 @@ def write_excerpts(app: Any, error: Exception | None) -> None:
         text = re.sub(r"<(script|style|svg|math)\b.*?</\1>", "", text, flags=re.DOTALL)
         text = re.sub(r'<(\w+)(?=[^>]*?(\sid="[^"]*"))?[^>]*>', r"<\1\2>", text)  # identifiers stay: results lead to them
         texts[f"./{page}.html"] = f'<div role="main">{text}</div>'
-    ours = "const ask = fetch;\nfetch = async (url, ...more) => (url in EXCERPTS ? new Response(EXCERPTS[url]) : ask(url, ...more));\n"
-    (Path(app.outdir) / "_static" / "excerpts.js").write_text(
-        f"const EXCERPTS = {json.dumps(texts)};\n{ours}", encoding="utf-8"
-    )
+    ours = "const ask = fetch;\n"
+    ours += "fetch = async (url, ...more) => (url in EXCERPTS ? new Response(EXCERPTS[url]) : ask(url, ...more));\n"
+    script = f"const EXCERPTS = {json.dumps(texts)};\n{ours}"
+    (Path(app.outdir) / "_static" / "excerpts.js").write_text(script, encoding="utf-8")
 
 
 def setup(app: Any) -> None:

@@ -33,6 +33,6 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         names = ", ".join(failed["scene"][:4]) + f" and {len(failed) - 4} more" * (len(failed) > 4)
         counts = len(ran) - len(failed), len(failed), len(ended), len(group) - len(ran) - len(ended)
         told = ", ".join(f"{cause} ({count})" for cause, count in causes)
-        body.append([str(name), *map(str, counts), names or DASH, told or DASH])
-    header = ["engine", "passed", "failed", "ended early", "not taken", "which", "mistakes that explain it"]
+        body.append([str(name), f"{counts[0]} of {len(ran)}", *map(str, counts[2:]), names or DASH, told or DASH])
+    header = ["engine", "passed", "ended early", "not taken", "failed motions", "mistakes that explain them"]
     return Section("Motions", [Paragraph(TERMS), Table(header, body, "Exact motions")], "motions")

@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.studies import random
 
-from ..document.model import Document, Paragraph, Section
+from ..document.model import Document, Links, Paragraph, Section
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -17,6 +17,7 @@ from . import (
     advice,
     closing,
     drift,
+    engine_page,
     engines,
     failures,
     hard_cases,
@@ -51,8 +52,11 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     if random.STUDY.name in plan.names:
         details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
     details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
-    if plan.engines:
-        details.append(engines.section(measured))
+    pages = engine_page.pages(measured) if plan.engines else {}
+    if pages:
+        section = engines.section(measured)
+        links = Links([(f"Page of {page.title}", f"{name}.html") for name, page in pages.items()])
+        details.append(replace(section, blocks=[links, *section.blocks]))
     for name, part in SECTIONS.items():
         if name in plan.names:
             details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
@@ -70,6 +74,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *engines.tables(measured), *map(Paragraph, sentences)],
         data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
         failures=failures.failures_of_ours(rows),
+        pages=pages,
     )
 
 

@@ -31,8 +31,8 @@ def test_the_page_has_at_most_400_words():
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     file = tmp_path_factory.mktemp("flip") / "flip.html"
-    head = '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>flip</title>'
-    file.write_text(f"{head}<main>{flip.figure(sliders=True)}</main>", encoding="utf-8")
+    head = '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    file.write_text(f"{head}<title>flip</title><main>{flip.figure(sliders=True)}</main>", encoding="utf-8")
     return file
 
 

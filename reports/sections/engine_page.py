@@ -1,0 +1,164 @@
+"""A page for each engine, for its authors to link to: its errors on the scenes and the exact motions, and how to repeat them."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from collections.abc import Sequence
+
+import pandas as pd
+
+from conservative.outcome import OutcomeKind
+from conservative.references.environments.engine_method import EngineMethod
+from conservative.references.environments.environment import version_key
+from conservative.version import VERSION
+
+from ..document.badge import badge
+from ..document.cells import DASH, number, outcome_cell
+from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
+from ..rows.points import points as points_over
+from . import motions
+from .engines import AS_INSTALLED, AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, engine_rows
+from .measured import Measured
+
+COLUMNS = ("error, rad", "energy drift", "world momentum drift", "turns over")
+SAME = 0.1
+"""Largest relative difference of two errors that are called equal, between versions."""
+OBJECT = (
+    "The authors of an engine have the first word about its settings. Is a number wrong, or does a setting exist that gives a "
+    "better one? Open an issue with the template `Wrong result`, with the row and the command or the setting. We aim to repeat "
+    "both within two weeks and answer there, with commands, versions and the date. If we still disagree, this page gets a note "
+    "with both positions. An engine is made for more than one rotating body: this page says nothing about contacts and joints."
+)
+"""The rules of reports/documentation/neutrality.md for the author of an engine."""
+
+
+def file_name(engine: str) -> str:
+    """Return the name of the page of an engine, without an ending."""
+    return "engine_" + re.sub(r"[^\w.-]", "_", engine)
+
+
+def pages(measured: Measured, twins: pd.DataFrame | None = None) -> dict[str, Document]:
+    """Return the page of each engine that the report names, by the name of its file without an ending.
+
+    `twins` contains a row for each version of an engine and twin, if twins were measured: columns `engine` (such as
+    `exudyn==1.13.6`), `twin`, `passed` (bool) and `detail` (text).
+    """
+    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
+    points = points_over(table, OVER_STEPS)
+    scenes = {scene.name: engine_rows(table, scene.name, points) for scene in measured.plan.scenes}
+    labels = dict.fromkeys(row.engine for rows in scenes.values() for row in rows)
+    families: dict[str, list[str]] = {}
+    for label in sorted(labels, key=lambda label: version_key(label.partition("==")[2]), reverse=True):
+        families.setdefault(label.partition("==")[0], []).append(label)
+    return {file_name(family): _page(measured, family, versions, scenes, twins) for family, versions in families.items()}
+
+
+def _badge(found: pd.DataFrame, version: str) -> str:
+    """Return a badge with the exact motions that the best setting of a version passes, of those that it takes; empty if none."""
+    ran = found[(found["version"] == version) & (found["outcome"] != OutcomeKind.UNSUPPORTED)]
+    passed = (ran["value"] <= 1).groupby(ran["name"]).agg(["sum", "size"]).sort_values("sum", kind="stable")
+    if not len(passed):
+        return ""
+    best, every = passed.iloc[-1]
+    return badge("exact rigid-body motions", f"{best} of {every}", "good" if best == every else "fair")
+
+
+def _page(
+    measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]], twins: pd.DataFrame | None
+) -> Document:
+    newest, blocks, facts = versions[0], list[Block](), list[Item]()
+    for scene, every in scenes.items():
+        shown = _shown(every, newest)
+        if shown:
+            facts.append(Item("; ".join(_sentence(kind, row) for kind, row in shown.items()) + ".", scene))
+    blocks.append(Items(facts))
+    for scene in measured.plan.scenes:
+        if shown := _shown(scenes[scene.name], newest):
+            caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
+            blocks.append(Table(["setting", *COLUMNS], [_row(kind, row) for kind, row in shown.items()], caption))
+    blocks.append(Section("Since which version", _since(versions, scenes)))
+    found = measured.rows[(measured.rows["study"] == motions.STUDY.name) & (measured.rows["engine"] == family)]
+    if len(found):
+        blocks.append(motions.section(found, measured.samples))
+    if twins is not None and len(mine := twins[twins["engine"].isin(versions)]):
+        blocks.append(twins_section(mine))
+    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions)]))
+    blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
+    name = newest.replace("==", " ")
+    lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
+    return Document("conservative report", name, [lead, *blocks], badge=_badge(found, newest.partition("==")[2]))
+
+
+def twins_section(rows: pd.DataFrame) -> Section:
+    """Return the section of the twins of an engine, see `pages`."""
+    body: list[Row] = [
+        [str(row.engine), str(row.twin), "✓ passed" if row.passed else "✗ failed", str(row.detail) or DASH]
+        for row in rows.sort_values("passed", kind="stable").itertuples()
+    ]
+    return Section("Twins", [Table(["engine", "twin", "result", "detail"], body, "Twins")], "twins")
+
+
+def _shown(rows: Sequence[EngineRow], version: str) -> dict[str, EngineRow]:
+    """Return the rows of a version as installed and at its best, or its first row if it has neither."""
+    mine = [row for row in rows if row.engine == version]
+    found = {kind: row for row in mine for kind, on in ((AS_INSTALLED, row.as_installed), (AT_ITS_BEST, row.best)) if on}
+    if mine and not found:
+        found = {AT_ITS_BEST: mine[0]}
+    return {kind: found[kind] for kind in (AS_INSTALLED, AT_ITS_BEST) if kind in found}
+
+
+def _sentence(kind: str, row: EngineRow) -> str:
+    if not row.outcome.ok:
+        return f"{kind} ({row.setting or 'default'}): {row.outcome}"
+    energy = str(row.cells["energy drift"]).lstrip("✓≈✗ ")
+    return f"{kind} ({row.setting or 'default'}): attitude error {number(row.error)} rad, energy drift {energy}"
+
+
+def _row(kind: str, row: EngineRow) -> Row:
+    cells = [row.cells[name] for name in COLUMNS]
+    if not row.outcome.ok:
+        cells[0] = outcome_cell(row.outcome, reason=True)
+    return [f"{kind}: {row.setting}" if row.setting else kind, *cells]
+
+
+def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
+    """Return from which measured version on the errors are those of the newest one, and the errors of all versions."""
+    if len(versions) == 1:
+        family, _, version = versions[0].partition("==")
+        command = f"`conservative track {family} --last 3` finds the version since which an error changed."
+        return [Paragraph(f"Only {version or 'one version'} was measured here. {command}")]
+    kinds, items, tables = (AS_INSTALLED, AT_ITS_BEST), list[Item](), list[Block]()
+    for scene, rows in scenes.items():
+        shown = [_shown(rows, version) for version in versions]
+        for kind in kinds:
+            errors = [each[kind].error if kind in each else math.nan for each in shown]
+            same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN
+            if same[0]:
+                count = (*same, False).index(False)
+                text = f"{kind}: {number(errors[0])} rad since {versions[count - 1].partition('==')[2]}"
+                if count < len(errors):
+                    text += f", {number(errors[count])} rad in {versions[count].partition('==')[2]}"
+                items.append(Item(text, scene))
+        body = list[Row]()
+        for version, each in zip(versions, shown, strict=True):
+            found = [each.get(kind) for kind in kinds]
+            cells = [cell for row in found for cell in ((row.setting, row.cells["error, rad"]) if row else (DASH, DASH))]
+            body.append([version.replace("==", " "), *cells])
+        tables.append(
+            Table(["version", *(name for kind in kinds for name in (kind, "error, rad"))], body, f"{scene}: versions")
+        )
+    return [Items(items), *tables]
+
+
+def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[str]:
+    """Return the commands that repeat a page."""
+    plan = measured.plan
+    apart = {f"{each.maker}" for each in plan.engines if isinstance(each, EngineMethod)}
+    names = list(dict.fromkeys(each.replace("==", "@") if each in apart else family for each in versions))
+    install = " ".join(name for name in names if "@" in name)
+    scenes = shlex.quote(",".join(plan.arguments.get(scene.name, scene.name) for scene in plan.scenes))
+    command = f"conservative report --methods reduced --scenes {scenes} --engines {','.join(names)}" + " --quick" * plan.quick
+    commands = [command, f"conservative study motions --engines {','.join(names)}"]
+    return [f"`{each}`" for each in [*[f"conservative engines install {install}"] * bool(install), *commands]]

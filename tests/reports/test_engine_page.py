@@ -1,0 +1,119 @@
+"""The page of an engine and its badge, on made-up measurements."""
+
+import math
+from xml.etree import ElementTree
+
+import pandas as pd
+import pytest
+
+from conservative import registry
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.reports.document import html, markdown
+from conservative.reports.document.badge import badge
+from conservative.reports.document.model import Section, Table
+from conservative.reports.run.measure import Measurements
+from conservative.reports.run.plan import Plan
+from conservative.reports.run.provenance import provenance
+from conservative.reports.sections import engine_page
+from conservative.reports.sections.measured import Measured
+
+from . import rows
+from .made_up import at_step
+
+TWINS = pd.DataFrame(
+    [("a==2", "mirrored", False, "2e-3 rad"), ("a==2", "heavier", True, ""), ("b==7", "mirrored", False, "")],
+    columns=["engine", "twin", "passed", "detail"],
+)
+
+
+def motion(engine, setting, scene, ratio, detail="", kind=OutcomeKind.OK):
+    family, _, version = engine.partition("==")
+    names = {"label": f"{engine}/{setting}", "family": family, "version": version, "setting": setting, "role": "engine"}
+    outcome = Outcome(kind, "" if kind == OutcomeKind.OK else "why")
+    method = f"{family}@{version}:{setting}"
+    return rows.row("motions", method, Measure.ALLOWED, ratio, 0.01, scene=scene, detail=detail, outcome=outcome, **names)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    found = [
+        *at_step("a==2", "Euler", 0.5, as_installed=True, energy=0.2, direction="lost"),
+        *at_step("a==2", "RK4", 1e-6),
+        *at_step("a==1.10", "Euler", 0.52, as_installed=True),
+        *at_step("a==1.10", "RK4", 1e-3),
+        *at_step("a==1.9", "Euler", 3.0, as_installed=True),
+        *at_step("b==7", "x", math.nan, outcome=Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")),
+        motion("a==2", "Euler", "fast", 3.0, "damping"),
+        motion("a==2", "Euler", "slow", 0.5),
+        motion("a==2", "RK4", "fast", 0.2),
+        motion("a==2", "RK4", "slow", 0.4),
+        motion("a==2", "RK4", "spring", math.nan, kind=OutcomeKind.UNSUPPORTED),
+        motion("a==2", "RK4", "tiny", math.nan, kind=OutcomeKind.CRASHED),
+    ]
+    plan = Plan((registry.scene("brick_flip"),), (), (), engines=(registry.method("pinocchio"),))
+    return Measured(plan, Measurements(measurement.frame(found), measurement.samples_frame([])), provenance([]))
+
+
+@pytest.fixture(scope="module")
+def pages(measured):
+    return engine_page.pages(measured, TWINS)
+
+
+def tables(page):
+    inner = [block for each in page.blocks for block in (each.blocks if isinstance(each, Section) else [each])]
+    return {each.caption: [list(map(str, row)) for row in each.rows] for each in inner if isinstance(each, Table)}
+
+
+def test_there_is_a_page_for_each_engine_with_narrow_tables(pages):
+    assert list(pages) == ["engine_b", "engine_a"]
+    assert [page.title for page in pages.values()] == ["b 7", "a 2"]
+    for page in pages.values():
+        assert all(len(row) <= 6 for rows in tables(page).values() for row in rows)
+        assert html.render(page)
+
+
+def test_it_has_the_newest_version_as_installed_and_at_its_best(pages):
+    (found,) = (rows for name, rows in tables(pages["engine_a"]).items() if "exact motion" in name)
+    assert [row[:3] for row in found] == [
+        ["as installed: Euler", "0.5", "✗ 0.2 lost"],
+        ["at its best: RK4", "1.0e-6", "✓ 1.0e-12"],
+    ]
+
+
+def test_an_engine_that_crashed_says_so(pages):
+    text = markdown.render(pages["engine_b"])
+    assert "crashed: signal 11 (SIGSEGV)" in text
+    assert "Only 7 was measured" in text
+
+
+def test_it_names_the_version_since_which_an_error_is_the_same(pages):
+    text = markdown.render(pages["engine_a"])
+    assert "as installed: 0.5 rad since 1.10, 3 rad in 1.9" in text
+    assert "at its best: 1.0e-6 rad since 2, 1.0e-3 rad in 1.10" in text
+    assert [row[0] for row in tables(pages["engine_a"])["brick_flip: versions"]] == ["a 2", "a 1.10", "a 1.9"]
+
+
+def test_it_has_motions_and_twins_of_its_own_failures_first(pages, measured):
+    found = tables(pages["engine_a"])
+    assert found["Exact motions"][0] == ["a 2 Euler", "1 of 2", "0", "0", "fast", "damping (1)"]
+    assert found["Twins"] == [["a==2", "mirrored", "✗ failed", "2e-3 rad"], ["a==2", "heavier", "✓ passed", "–"]]
+    assert "Twins" not in tables(engine_page.pages(measured)["engine_a"])
+
+
+def test_commands_repeat_it(pages):
+    text = markdown.render(pages["engine_a"])
+    assert "`conservative report --methods reduced --scenes brick_flip --engines a,a,a`" not in text
+    assert "`conservative study motions --engines a`" in text
+
+
+def test_a_badge_counts_a_crash_as_a_failure_and_not_what_an_engine_does_not_take(pages):
+    svg = ElementTree.fromstring(pages["engine_a"].badge)
+    assert svg.get("aria-label") == "exact rigid-body motions: 2 of 3"
+    assert pages["engine_b"].badge == ""
+
+
+def test_a_badge_is_well_formed_with_any_text():
+    svg = ElementTree.fromstring(badge("a < b", "x & y"))
+    assert [each.text for each in svg.iter("{http://www.w3.org/2000/svg}text")] == ["a < b", "x & y"]
