@@ -10,8 +10,11 @@ from email import message_from_string
 from pathlib import PurePosixPath
 
 import pytest
+import yaml
+from trove_classifiers import classifiers
 
 from conservative.errors import EXTRAS
+from conservative.version import VERSION
 
 from .environments import LEAN, ROOT, run_python, variables
 
@@ -97,6 +100,24 @@ def test_citation_and_workflows_follow_their_schemas(tmp_path):
     broken = tmp_path / "CITATION.cff"
     broken.write_text((ROOT / "CITATION.cff").read_text().replace("title: ", "heading: "))
     assert check_schema("citation-file-format", broken).returncode == 1
+
+
+def test_the_conda_recipe_requires_what_the_package_requires():
+    recipe = yaml.safe_load((ROOT / ".ci" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert recipe["package"] == {"name": project["name"], "version": "${{ version }}"}
+    assert recipe["context"]["version"] == VERSION
+    required = [f"python{project['requires-python']}", *project["dependencies"]]
+    assert [each.replace(" ", "") for each in recipe["requirements"]["run"]] == required
+    (command,) = project["scripts"].items()
+    assert recipe["build"]["python"]["entry_points"] == [" = ".join(command)]
+    assert recipe["about"]["license"] == project["license"]
+
+
+def test_classifiers_exist():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert not set(project["classifiers"]) - {*classifiers}
+    assert project["classifiers"] == sorted(project["classifiers"])
 
 
 def test_the_commands_in_the_readme_name_extras_that_exist():

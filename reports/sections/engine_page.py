@@ -1,4 +1,4 @@
-"""A page for each engine, for its authors to link to: its errors on the scenes and the exact motions, and how to repeat them."""
+"""A page for each engine, for its authors to link to: errors on the scenes and the exact motions, and how to repeat them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
+from conservative.benchmarks.studies.motions import STUDY
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import version_key
@@ -19,7 +21,7 @@ from ..document.cells import DASH, number, outcome_cell
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
 from . import motions
-from .engines import AS_INSTALLED, AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, engine_rows
+from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, engine_rows
 from .measured import Measured
 
 COLUMNS = ("error, rad", "energy drift", "world momentum drift", "turns over")
@@ -56,7 +58,7 @@ def pages(measured: Measured, twins: pd.DataFrame | None = None) -> dict[str, Do
 
 
 def _badge(found: pd.DataFrame, version: str) -> str:
-    """Return a badge with the exact motions that the best setting of a version passes, of those that it takes; empty if none."""
+    """Return a badge with the exact motions that a version passes with its best setting, of those that it takes."""
     ran = found[(found["version"] == version) & (found["outcome"] != OutcomeKind.UNSUPPORTED)]
     passed = (ran["value"] <= 1).groupby(ran["name"]).agg(["sum", "size"]).sort_values("sum", kind="stable")
     if not len(passed):
@@ -69,17 +71,13 @@ def _page(
     measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]], twins: pd.DataFrame | None
 ) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
-    for scene, every in scenes.items():
-        shown = _shown(every, newest)
-        if shown:
-            facts.append(Item("; ".join(_sentence(kind, row) for kind, row in shown.items()) + ".", scene))
-    blocks.append(Items(facts))
     for scene in measured.plan.scenes:
         if shown := _shown(scenes[scene.name], newest):
+            facts.append(Item("; ".join(_sentence(kind, row) for kind, row in shown.items()) + ".", scene.name))
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [_row(kind, row) for kind, row in shown.items()], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
-    found = measured.rows[(measured.rows["study"] == motions.STUDY.name) & (measured.rows["engine"] == family)]
+    found = measured.rows[(measured.rows["study"] == STUDY.name) & (measured.rows["engine"] == family)]
     if len(found):
         blocks.append(motions.section(found, measured.samples))
     if twins is not None and len(mine := twins[twins["engine"].isin(versions)]):
@@ -88,7 +86,7 @@ def _page(
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = newest.replace("==", " ")
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
-    return Document("conservative report", name, [lead, *blocks], badge=_badge(found, newest.partition("==")[2]))
+    return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest.partition("==")[2]))
 
 
 def twins_section(rows: pd.DataFrame) -> Section:
@@ -146,9 +144,8 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
             found = [each.get(kind) for kind in kinds]
             cells = [cell for row in found for cell in ((row.setting, row.cells["error, rad"]) if row else (DASH, DASH))]
             body.append([version.replace("==", " "), *cells])
-        tables.append(
-            Table(["version", *(name for kind in kinds for name in (kind, "error, rad"))], body, f"{scene}: versions")
-        )
+        header = ["version", *(name for kind in kinds for name in (kind, "error, rad"))]
+        tables.append(Table(header, body, f"{scene}: versions"))
     return [Items(items), *tables]
 
 
