@@ -274,6 +274,8 @@ def main() -> None:
         if report:
             with (source / "results.md").open("a", encoding="utf-8") as page:
                 page.write('\n## Report of this version\n\n<a href="report/index.html">All methods, tables and charts</a>\n')
+                for engine in sorted(report.glob("engine_*.html")):
+                    page.write(f'\n* <a href="report/{engine.name}">{engine.stem.removeprefix("engine_")}</a>\n')
         app = Sphinx(source, None, built, Path(place) / "doctrees", "html", SETTINGS, status=None, warningiserror=True)
         app.build()
         if app.statuscode:
