@@ -17,16 +17,20 @@ from conservative.references.environments.environment import version_key
 from conservative.version import VERSION
 
 from ..document.badge import badge
-from ..document.cells import DASH, number, outcome_cell
+from ..document.cells import DASH, number
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
 from . import motions
-from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, engine_rows
+from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
 
 COLUMNS = ("error, rad", "energy drift", "world momentum drift", "turns over")
 SAME = 0.1
 """Largest relative difference of two errors that are called equal, between versions."""
+TERMS = (
+    "As installed: only the step size is set. At its best: the setting with the smallest error at this step. Drifts are the "
+    "largest of the run, relative."
+)
 OBJECT = (
     "The authors of an engine have the first word about its settings. Is a number wrong, or does a setting exist that gives a "
     "better one? Open an issue with the template `Wrong result`, with the row and the command or the setting. We aim to repeat "
@@ -72,10 +76,10 @@ def _page(
 ) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
     for scene in measured.plan.scenes:
-        if shown := _shown(scenes[scene.name], newest):
-            facts.append(Item("; ".join(_sentence(kind, row) for kind, row in shown.items()) + ".", scene.name))
+        if shown := chosen(scenes[scene.name], newest):
+            facts.append(Item("; ".join(map(_sentence, shown)) + ".", scene.name))
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
-            blocks.append(Table(["setting", *COLUMNS], [_row(kind, row) for kind, row in shown.items()], caption))
+            blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
     found = measured.rows[(measured.rows["study"] == STUDY.name) & (measured.rows["engine"] == family)]
     if len(found):
@@ -86,6 +90,7 @@ def _page(
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = newest.replace("==", " ")
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
+    facts.append(Item(TERMS))
     return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest.partition("==")[2]))
 
 
@@ -98,27 +103,11 @@ def twins_section(rows: pd.DataFrame) -> Section:
     return Section("Twins", [Table(["engine", "twin", "result", "detail"], body, "Twins")], "twins")
 
 
-def _shown(rows: Sequence[EngineRow], version: str) -> dict[str, EngineRow]:
-    """Return the rows of a version as installed and at its best, or its first row if it has neither."""
-    mine = [row for row in rows if row.engine == version]
-    found = {kind: row for row in mine for kind, on in ((AS_INSTALLED, row.as_installed), (AT_ITS_BEST, row.best)) if on}
-    if mine and not found:
-        found = {AT_ITS_BEST: mine[0]}
-    return {kind: found[kind] for kind in (AS_INSTALLED, AT_ITS_BEST) if kind in found}
-
-
-def _sentence(kind: str, row: EngineRow) -> str:
-    if not row.outcome.ok:
-        return f"{kind} ({row.setting or 'default'}): {row.outcome}"
-    energy = str(row.cells["energy drift"]).lstrip("✓≈✗ ")
-    return f"{kind} ({row.setting or 'default'}): attitude error {number(row.error)} rad, energy drift {energy}"
-
-
-def _row(kind: str, row: EngineRow) -> Row:
-    cells = [row.cells[name] for name in COLUMNS]
-    if not row.outcome.ok:
-        cells[0] = outcome_cell(row.outcome, reason=True)
-    return [f"{kind}: {row.setting}" if row.setting else kind, *cells]
+def _sentence(row: EngineRow) -> str:
+    name, energy = f"{row.taken or 'run'} ({row.setting or 'default'})", str(row.cells["energy drift"]).lstrip("✓≈✗ ")
+    return f"{name}: " + (
+        f"attitude error {number(row.error)} rad, energy drift {energy}" if row.outcome.ok else str(row.outcome)
+    )
 
 
 def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
@@ -129,7 +118,9 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
         return [Paragraph(f"Only {version or 'one version'} was measured here. {command}")]
     kinds, items, tables = (AS_INSTALLED, AT_ITS_BEST), list[Item](), list[Block]()
     for scene, rows in scenes.items():
-        shown = [_shown(rows, version) for version in versions]
+        shown = [
+            {kind: row for row in chosen(rows, each) for kind in kinds if row.taken in (kind, "both")} for each in versions
+        ]
         for kind in kinds:
             errors = [each[kind].error if kind in each else math.nan for each in shown]
             same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN

@@ -277,22 +277,24 @@ def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
     return Table(["engine==version/setting", *names], shown, caption, Style.FILTERED)
 
 
+def chosen(rows: Sequence[EngineRow], engine: str) -> list[EngineRow]:
+    """Return the rows of an engine as installed and at its best, one if they are the same; without an error its first row."""
+    mine = [row for row in rows if row.engine == engine]
+    installed, best = ([row for row in mine if on(row)] for on in (lambda row: row.as_installed, lambda row: row.best))
+    return [*installed[:1], *(row for row in best if not row.as_installed)] or mine[:1]
+
+
+def comparison_cells(row: EngineRow, parts: Sequence[str]) -> list[str | Cell]:
+    """Return the cells of a row in `chosen`: its setting, then columns by name; an outcome in place of the error."""
+    cells = [row.cells[part] for part in parts]
+    if math.isnan(row.error):
+        cells[parts.index("error, rad")] = outcome_cell(row.outcome, reason=True)
+    return [": ".join(filter(None, (row.taken, row.setting))) or DASH, *cells]
+
+
 def side_by_side(rows: Sequence[EngineRow], scene: str) -> Table:
-    """Return each engine as installed next to its best setting, the most accurate first; without an error, its outcome."""
-    parts = ("error, rad", "energy drift", "turns over")
-    sides = (AS_INSTALLED, AT_ITS_BEST)
-    header = ["engine", "bits", *(f"{side}: {part}" for side in sides for part in ("setting", *parts))]
-    body: list[Row] = []
-    for engine in dict.fromkeys(row.engine for row in rows):
-        members = [row for row in rows if row.engine == engine]
-        best = next((row for row in members if row.best), members[0])
-        cells: list[str | Cell] = [engine, best.cells["bits"]]
-        for row in (next((row for row in members if row.as_installed), None), best):
-            if row is None:
-                cells += [DASH] * 4
-            elif math.isnan(row.error):
-                cells += [row.setting or DASH, outcome_cell(row.outcome, reason=row is best), DASH, DASH]
-            else:
-                cells += [row.setting or DASH, *(row.cells[part] for part in parts)]
-        body.append(cells)
-    return Table(header, body, f"{scene}: each engine", Style.FILTERED)
+    """Return each engine as installed and with its best setting, the most accurate first."""
+    parts = ("error, rad", "energy drift", "turns over", "bits")
+    engines = dict.fromkeys(row.engine for row in rows)
+    body = [[engine, *comparison_cells(row, parts)] for engine in engines for row in chosen(rows, engine)]
+    return Table(["engine", "setting", *parts], body, f"{scene}: each engine", Style.FILTERED)

@@ -97,12 +97,15 @@ def test_a_crash_is_a_marked_row_and_unsupported_settings_share_one(settings):
 
 def test_an_engine_as_installed_is_compared_with_its_best(rows):
     table = side_by_side(list(rows.values()), SCENE)
-    found = {row[0]: dict(zip(table.header, map(str, row), strict=True)) for row in table.rows}
-    assert list(found) == ["a==1", "b==2", "c==3", "d==4", "e==5"]
-    reasons = [found[name]["at its best: error, rad"] for name in ("d==4", "e==5")]
-    assert reasons == ["✗ crashed: signal 11 (SIGSEGV)", "– unsupported: its adapter has free bodies"]
-    assert [found["a==1"][f"{part}: error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-6"]
-    assert found["b==2"]["as installed: setting"] == "–"
+    assert [[str(cell) for cell in row[:3]] for row in table.rows] == [
+        ["a==1", "as installed: Euler", "3"],
+        ["a==1", "at its best: RK4", "1.0e-6"],
+        ["b==2", "at its best: RK4", "1.0e-3"],
+        ["c==3", "both: default", "0.2"],
+        ["d==4", "x", "✗ crashed: signal 11 (SIGSEGV)"],
+        ["e==5", "x", "– unsupported: its adapter has free bodies"],
+    ]
+    assert len(table.header) <= 6
 
 
 def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend(rows):
