@@ -82,9 +82,10 @@ for (const page of document.querySelectorAll(".flip")) {
     for (const [k, slider] of sliders.entries()) slider.ariaValueText = slider.parentElement.querySelector("output").textContent = texts[k];
     const growth = ((J[0] - J[2]) * (J[2] - J[1])) / (J[0] * J[1]), up = runs[0].L.map((each) => each[2] > 0);
     const flips = up.filter((each, k) => k && each !== up[k - 1]).length, [energy, momentum] = ["energy", "momentum"].map((name) => runs[1][name].at(-1) / runs[1][name][0]);
-    const axis = abs(growth) < 1e-9 ? "two moments are equal" : growth > 0 ? "intermediate axis: unstable" : J[2] > J[0] ? "axis of the largest moment: stable" : "axis of the smallest moment: stable";
+    const axis = growth > 0 ? "intermediate axis: unstable" : `axis of the ${J[2] > J[0] ? "largest" : "smallest"} moment: stable`;
+    const spin = abs(growth) < 1e-9 ? "Two moments are equal." : `Spin about the ${axis}.`;
     const pace = growth > 1e-9 ? ` A disturbance grows tenfold in ${(Math.log(10) / (rate * sqrt(growth))).toFixed(2)} s.` : "";
-    said.textContent = `Spin about the ${axis}.${pace} In ${duration} s the body turns over ${flips} times. Implicit Euler loses ${Math.round(100 * (1 - energy))} % of the energy and ${Math.round(100 * (1 - momentum))} % of the momentum.`;
+    said.textContent = `${spin}${pace} In ${duration} s the body turns over ${flips} times. Implicit Euler loses ${Math.round(100 * (1 - energy))} % of the energy and ${Math.round(100 * (1 - momentum))} % of the momentum.`;
   }
   for (const slider of sliders) slider.addEventListener("input", show);
   show();

@@ -280,8 +280,8 @@ def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
 def chosen(rows: Sequence[EngineRow], engine: str) -> list[EngineRow]:
     """Return the rows of an engine as installed and at its best, one if they are the same; without an error its first row."""
     mine = [row for row in rows if row.engine == engine]
-    installed, best = ([row for row in mine if on(row)] for on in (lambda row: row.as_installed, lambda row: row.best))
-    return [*installed[:1], *(row for row in best if not row.as_installed)] or mine[:1]
+    installed = [row for row in mine if row.as_installed][:1]
+    return [*installed, *(row for row in mine if row.best and row not in installed)] or mine[:1]
 
 
 def comparison_cells(row: EngineRow, parts: Sequence[str]) -> list[str | Cell]:

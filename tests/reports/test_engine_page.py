@@ -10,9 +10,10 @@ from conservative import registry
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.reports import report
 from conservative.reports.document import html, markdown
 from conservative.reports.document.badge import badge
-from conservative.reports.document.model import Section, Table
+from conservative.reports.document.model import Document, Links, Section, Table
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan
 from conservative.reports.run.provenance import provenance
@@ -106,6 +107,15 @@ def test_commands_repeat_it(pages):
     text = markdown.render(pages["engine_a"])
     assert "`conservative report --methods reduced --scenes brick_flip --engines a,a,a`" not in text
     assert "`conservative study motions --engines a`" in text
+
+
+def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
+    links = Links([(page.title, f"{name}.html") for name, page in pages.items()])
+    report.render(Document("", "all", [links], pages=pages), tmp_path, png=False)
+    written = {"report.md", "index.html", "engine_a.html", "engine_a.md", "engine_a.svg", "engine_b.html", "engine_b.md"}
+    assert {path.name for path in tmp_path.iterdir()} == written
+    assert "[b 7](engine_b.html), [a 2](engine_a.html)" in (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert '<a href="engine_a.html">a 2</a>' in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_badge_counts_a_crash_as_a_failure_and_not_what_an_engine_does_not_take(pages):
