@@ -60,17 +60,22 @@
   // The momentum in axes of the body lies on two surfaces: the sphere of its length, and the ellipsoid of the energy. Where one
   // surface goes through the other is the polhode, so that both are opaque.
   function polhode({ moments, L, colours }) {
-    const points = split(L, 3, Vector3), axes = (at) => moments.map((each) => Math.sqrt(each * moments.reduce((sum, J, i) => sum + at.getComponent(i) ** 2 / J, 0)));
+    const points = split(L, 3, Vector3), twice = (at) => moments.reduce((sum, J, i) => sum + at.getComponent(i) ** 2 / J, 0); // the energy
+    const axes = (at) => moments.map((each) => Math.sqrt(each * twice(at)));
     const scale = 1.4 / Math.max(...axes(points[0])), ball = new THREE.SphereGeometry(scale, 64, 48);
-    const sphere = mesh(ball, colours.sphere), ellipsoid = mesh(ball, colours.ellipsoid), dot = mesh(new THREE.SphereGeometry(0.08), colours.arrow);
+    const [sphere, ellipsoid] = [colours.sphere, colours.ellipsoid].map((colour) => mesh(ball, colour));
+    const dot = mesh(new THREE.SphereGeometry(0.08), colours.arrow);
     const rods = moments.map((_, i) => {
       const rod = mesh(new THREE.CylinderGeometry(0.02, 0.02, 3.5), colours.faces[2 * i]);
       rod.quaternion.setFromUnitVectors(UP, new Vector3().setComponent(i, 1));
       return rod;
     });
     const line = new THREE.LineGeometry().setPositions(points.flatMap((each) => each.clone().multiplyScalar(1.01 * scale).toArray()));
-    const [near, far] = [[true, 1], [false, 0.25]].map(([depthTest, opacity]) => new THREE.Line2(line, new THREE.LineMaterial({ color: colours.trace, linewidth: 2, transparent: true, depthTest, opacity })));
-    const scene = stage(sphere, ellipsoid, dot, near, far, ...rods);
+    const traces = [[true, 1], [false, 0.25]].map(([depthTest, opacity]) => { // that on the far side is faint
+      const material = new THREE.LineMaterial({ color: colours.trace, linewidth: 2, transparent: true, depthTest, opacity });
+      return new THREE.Line2(line, material);
+    });
+    const scene = stage(sphere, ellipsoid, dot, ...traces, ...rods);
     return (frame) => {
       const at = new Vector3().lerpVectors(...between(points, frame));
       sphere.scale.setScalar(at.length());
@@ -87,7 +92,9 @@
     const canvases = [...motion.querySelectorAll("canvas")], values = [...motion.querySelectorAll(".values")];
     const load = () => {
       const content = motion.content ?? JSON.parse(motion.querySelector(".data").textContent);
-      for (const pose of poses ?? []) pose(0, null).traverse(({ geometry, material }) => [geometry, material].flat().forEach((each) => each?.dispose()));
+      for (const pose of poses ?? []) {
+        pose(0, null).traverse(({ geometry, material }) => [geometry, material].flat().forEach((each) => each?.dispose()));
+      }
       ({ duration, frames, truth, panels } = content);
       poses = renderer && panels.map((panel) => (panel.moments ? polhode : build)({ ...panel, colours: content.colours }));
       exact = truth !== null && split(panels[truth].q, 4, Quaternion);

@@ -5,6 +5,7 @@
 for (const page of document.querySelectorAll(".flip")) {
   const motion = page.querySelector(".motion"), said = page.querySelector(".said");
   const duration = Number(motion.querySelector(".time").max), h = 1 / 60, frames = Math.round(duration / h) + 1;
+  const { colours } = JSON.parse(motion.querySelector(".data").textContent);
   const sliders = [...page.querySelectorAll(".settings input")], FINE = 48; // steps of RK4 in a frame
   const { hypot, sqrt, abs, sin, cos } = Math;
 
@@ -36,56 +37,72 @@ for (const page of document.querySelectorAll(".flip")) {
   // Implicit Euler: J (w1 - w0) = h J w1 x w1, with one step of Newton's method, then a rotation by h w1. The matrix is that of
   // btRigidBody::computeGyroscopicImpulseImplicit_Body in Bullet.
   function losing(J, state) {
-    const w = state.slice(4), L = w.map((each, i) => J[i] * each), [a, b, c] = w;
-    const columns = [[J[0], h * (c * J[0] - L[2]), h * (L[1] - b * J[0])], [h * (L[2] - c * J[1]), J[1], h * (a * J[1] - L[0])], [h * (b * J[2] - L[1]), h * (L[0] - a * J[2]), J[2]]];
-    const gap = cross(w, L).map((each) => h * each), volume = dot(columns[0], cross(columns[1], columns[2]));
-    const step = [0, 1, 2].map((i) => dot(gap, cross(columns[(i + 1) % 3], columns[(i + 2) % 3])) / volume); // Cramer's rule
-    const next = w.map((each, i) => each - step[i]), angle = h * hypot(...next), half = (h * sin(angle / 2)) / (angle || 1);
-    return [...unit(times(state.slice(0, 4), [...next.map((each) => half * each), cos(angle / 2)])), ...next];
+    const w = state.slice(4), L = w.map((each, i) => J[i] * each);
+    const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis, k) => {
+      const a = cross(w, axis), b = cross(L, axis);
+      return axis.map((each, i) => J[k] * each + h * (J[k] * a[i] - b[i]));
+    });
+    const gap = cross(w, L), volume = dot(columns[0], cross(columns[1], columns[2]));
+    const change = (k) => (h * dot(gap, cross(columns[(k + 1) % 3], columns[(k + 2) % 3]))) / volume; // Cramer's rule
+    const next = w.map((each, k) => each - change(k)), rate = hypot(...next), angle = h * rate;
+    const turn = [...next.map((each) => (each * sin(angle / 2)) / (rate || 1)), cos(angle / 2)];
+    return [...unit(times(state.slice(0, 4), turn)), ...next];
   }
 
   // The texts and the grades of values, each with the frame from which it holds.
-  const sizes = (values, text, grade) => values.map((each, k) => [k, text(each), grade(each)]).filter((each, k, all) => !k || each[1] !== all[k - 1][1]);
-  const shares = (values) => sizes(values.map((each) => each / values[0]), (each) => `${Math.round(100 * each)} %`, (each) => (abs(each - 1) < 0.005 ? "good" : "bad"));
+  const sizes = (values, text, grade) =>
+    values.map((each, k) => [k, text(each), grade(each)]).filter((each, k, all) => !k || each[1] !== all[k - 1][1]);
+  const share = (each) => `${Math.round(100 * each)} %`;
+  const shares = (values) => sizes(values.map((each) => each / values[0]), share, (each) => (abs(each - 1) < 0.005 ? "good" : "bad"));
+  const grade = (error) => (error < 1e-3 ? "good" : error < 0.1 ? "fair" : "bad"); // as LIMITS in reports/animation/frames.py
   const largest = (values) => {
     let top = 0;
-    return sizes(values.map((each) => (top = Math.max(top, each))), (each) => `${Number(each.toPrecision(1))}`, (each) => (each < 1e-3 ? "good" : each < 0.1 ? "fair" : "bad"));
+    return sizes(values.map((each) => (top = Math.max(top, each))), (each) => `${Number(each.toPrecision(1))}`, grade);
   };
 
   function compute(length, rate, disturbance) {
     const [a, b, c] = [1, 9, length ** 2], J = [b + c, a + c, a + b]; // of a box with sides 1 : 3 : length, kg m^2
-    const size = [1, 3, length].map((each) => (2 * each) / hypot(1, 3, length)), start = [0, 0, 0, 1, 0, rate * disturbance, rate];
+    const size = [1, 3, length].map((each) => (2 * each) / hypot(1, 3, length));
+    const start = [0, 0, 0, 1, 0, rate * disturbance, rate];
     const runs = [exact, losing].map((step) => {
       const states = [start];
       while (states.length < frames) states.push(step(J, states.at(-1)));
       const w = states.map((each) => each.slice(4)), L = w.map((each) => each.map((x, i) => J[i] * x));
-      return { q: states.map((each) => each.slice(0, 4)), L, energy: w.map((each, k) => dot(each, L[k]) / 2), momentum: L.map((each) => hypot(...each)) };
+      const energy = w.map((each, k) => dot(each, L[k]) / 2), momentum = L.map((each) => hypot(...each));
+      return { q: states.map((each) => each.slice(0, 4)), L, energy, momentum };
     });
     const errors = runs[1].q.map((q, k) => { // the conjugate by components, and an angle that is accurate when small
       const [x, y, z, s] = times(q, runs[0].q[k].map((each, i) => (i < 3 ? -each : each)));
       return 2 * Math.atan2(hypot(x, y, z), abs(s));
     });
-    const panels = runs.flatMap(({ q, L, energy, momentum }, k) => [
-      { size, tip: [0, 0, 1.25], q: q.flat(), L: L.flatMap((each, n) => turn(q[n], each).map((x) => x / momentum[0])), sizes: k ? [largest(errors)] : [] },
-      { moments: J, L: L.flatMap((each) => each.map((x) => x / momentum[0])), sizes: [shares(energy), shares(momentum)] },
-    ]);
+    const panels = runs.flatMap(({ q, L, energy, momentum }, k) => {
+      const L_P = L.map((each) => each.map((x) => x / momentum[0])), L_W = L_P.map((each, n) => turn(q[n], each));
+      return [
+        { size, tip: [0, 0, 1.25], q: q.flat(), L: L_W.flat(), sizes: k ? [largest(errors)] : [] },
+        { moments: J, L: L_P.flat(), sizes: [shares(energy), shares(momentum)] },
+      ];
+    });
     return { J, panels, runs };
   }
 
   function show() {
-    const [length, rate, log] = sliders.length ? sliders.map((each) => Number(each.value)) : [2, 10, Math.log10(0.005)], disturbance = 10 ** log;
-    const { J, panels, runs } = compute(length, rate, disturbance);
-    motion.content = { duration, frames, truth: 0, colours: JSON.parse(motion.querySelector(".data").textContent).colours, panels };
+    const [length, rate, log] = sliders.length ? sliders.map((each) => Number(each.value)) : [2, 10, Math.log10(0.005)];
+    const { J, panels, runs } = compute(length, rate, 10 ** log);
+    motion.content = { duration, frames, truth: 0, colours, panels };
     motion.dispatchEvent(new Event("content"));
     if (!sliders.length) return;
-    const texts = [J.map((each) => each.toFixed(1)).join(", ") + " kg m²", `${rate.toFixed(1)} rad/s`, `${Number((100 * disturbance).toPrecision(2))} % of the rate`];
-    for (const [k, slider] of sliders.entries()) slider.ariaValueText = slider.parentElement.querySelector("output").textContent = texts[k];
-    const growth = ((J[0] - J[2]) * (J[2] - J[1])) / (J[0] * J[1]), up = runs[0].L.map((each) => each[2] > 0);
-    const flips = up.filter((each, k) => k && each !== up[k - 1]).length, [energy, momentum] = ["energy", "momentum"].map((name) => runs[1][name].at(-1) / runs[1][name][0]);
+    const moments = J.map((each) => each.toFixed(1)).join(", "), percent = Number((100 * 10 ** log).toPrecision(2));
+    const texts = [`${moments} kg m²`, `${rate.toFixed(1)} rad/s`, `${percent} % of the rate`];
+    for (const [k, slider] of sliders.entries()) {
+      slider.ariaValueText = slider.parentElement.querySelector("output").textContent = texts[k];
+    }
+    const growth = ((J[0] - J[2]) * (J[2] - J[1])) / (J[0] * J[1]); // (exponent / rate)^2 of a small disturbance
     const axis = growth > 0 ? "intermediate axis: unstable" : `axis of the ${J[2] > J[0] ? "largest" : "smallest"} moment: stable`;
     const spin = abs(growth) < 1e-9 ? "Two moments are equal." : `Spin about the ${axis}.`;
     const pace = growth > 1e-9 ? ` A disturbance grows tenfold in ${(Math.log(10) / (rate * sqrt(growth))).toFixed(2)} s.` : "";
-    said.textContent = `${spin}${pace} In ${duration} s the body turns over ${flips} times. Implicit Euler loses ${Math.round(100 * (1 - energy))} % of the energy and ${Math.round(100 * (1 - momentum))} % of the momentum.`;
+    const up = runs[0].L.map((each) => each[2] > 0), flips = up.filter((each, k) => k && each !== up[k - 1]).length;
+    const [energy, momentum] = ["energy", "momentum"].map((name) => share(1 - runs[1][name].at(-1) / runs[1][name][0]));
+    said.textContent = `${spin}${pace} In ${duration} s the body turns over ${flips} times. Implicit Euler loses ${energy} of the energy and ${momentum} of the momentum.`;
   }
   for (const slider of sliders) slider.addEventListener("input", show);
   show();
