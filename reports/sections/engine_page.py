@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -20,7 +21,6 @@ from ..document.badge import badge
 from ..document.cells import DASH, number
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
-from . import motions
 from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
 
@@ -45,11 +45,11 @@ def file_name(engine: str) -> str:
     return "engine_" + re.sub(r"[^\w.-]", "_", engine)
 
 
-def pages(measured: Measured, twins: pd.DataFrame | None = None) -> dict[str, Document]:
+def pages(measured: Measured, sections: Mapping[str, Any]) -> dict[str, Document]:
     """Return the page of each engine that the report names, by the name of its file without an ending.
 
-    `twins` contains a row for each version of an engine and twin, if twins were measured: columns `engine` (such as
-    `exudyn==1.13.6`), `twin`, `passed` (bool) and `detail` (text).
+    `sections` are the sections of studies of engines by their names, each a module with a function `section`. A page has those
+    of which the report has rows of its engine.
     """
     table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
     points = points_over(table, OVER_STEPS)
@@ -58,21 +58,21 @@ def pages(measured: Measured, twins: pd.DataFrame | None = None) -> dict[str, Do
     families: dict[str, list[str]] = {}
     for label in sorted(labels, key=lambda label: version_key(label.partition("==")[2]), reverse=True):
         families.setdefault(label.partition("==")[0], []).append(label)
-    return {file_name(family): _page(measured, family, versions, scenes, twins) for family, versions in families.items()}
+    return {file_name(family): _page(measured, family, versions, scenes, sections) for family, versions in families.items()}
 
 
 def _badge(found: pd.DataFrame, version: str) -> str:
     """Return a badge with the exact motions that a version passes with its best setting, of those that it takes."""
-    ran = found[(found["version"] == version) & (found["outcome"] != OutcomeKind.UNSUPPORTED)]
+    ran = found[(found["study"] == STUDY.name) & (found["version"] == version) & (found["outcome"] != OutcomeKind.UNSUPPORTED)]
     passed = (ran["value"] <= 1).groupby(ran["name"]).agg(["sum", "size"]).sort_values("sum", kind="stable")
     if not len(passed):
         return ""
     best, every = passed.iloc[-1]
-    return badge("exact rigid-body motions", f"{best} of {every}", "good" if best == every else "fair")
+    return badge("exact motions, at its best", f"{best} of {every}", "good" if best == every else "fair")
 
 
 def _page(
-    measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]], twins: pd.DataFrame | None
+    measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]], sections: Mapping[str, Any]
 ) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
     for scene in measured.plan.scenes:
@@ -81,12 +81,9 @@ def _page(
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
-    found = measured.rows[(measured.rows["study"] == STUDY.name) & (measured.rows["engine"] == family)]
-    if len(found):
-        blocks.append(motions.section(found, measured.samples))
-    if twins is not None and len(mine := twins[twins["engine"].isin(versions)]):
-        blocks.append(twins_section(mine))
-    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions)]))
+    found = measured.rows[measured.rows["engine"] == family]
+    blocks += [part.section(found, measured.samples) for name, part in sections.items() if (found["study"] == name).any()]
+    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions, sections)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = newest.replace("==", " ")
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
@@ -94,20 +91,10 @@ def _page(
     return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest.partition("==")[2]))
 
 
-def twins_section(rows: pd.DataFrame) -> Section:
-    """Return the section of the twins of an engine, see `pages`."""
-    body: list[Row] = [
-        [str(row.engine), str(row.twin), "✓ passed" if row.passed else "✗ failed", str(row.detail) or DASH]
-        for row in rows.sort_values("passed", kind="stable").itertuples()
-    ]
-    return Section("Twins", [Table(["engine", "twin", "result", "detail"], body, "Twins")], "twins")
-
-
 def _sentence(row: EngineRow) -> str:
     name, energy = f"{row.taken or 'run'} ({row.setting or 'default'})", str(row.cells["energy drift"]).lstrip("✓≈✗ ")
-    return f"{name}: " + (
-        f"attitude error {number(row.error)} rad, energy drift {energy}" if row.outcome.ok else str(row.outcome)
-    )
+    found = f"attitude error {number(row.error)} rad, energy drift {energy}"
+    return f"{name}: {found if row.outcome.ok else row.outcome}"
 
 
 def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
@@ -118,9 +105,8 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
         return [Paragraph(f"Only {version or 'one version'} was measured here. {command}")]
     kinds, items, tables = (AS_INSTALLED, AT_ITS_BEST), list[Item](), list[Block]()
     for scene, rows in scenes.items():
-        shown = [
-            {kind: row for row in chosen(rows, each) for kind in kinds if row.taken in (kind, "both")} for each in versions
-        ]
+        every = [chosen(rows, version) for version in versions]
+        shown = [{kind: row for row in each for kind in kinds if row.taken in (kind, "both")} for each in every]
         for kind in kinds:
             errors = [each[kind].error if kind in each else math.nan for each in shown]
             same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN
@@ -140,7 +126,7 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
     return [Items(items), *tables]
 
 
-def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[str]:
+def _commands(measured: Measured, family: str, versions: Sequence[str], studies: Iterable[str]) -> list[str]:
     """Return the commands that repeat a page."""
     plan = measured.plan
     apart = {f"{each.maker}" for each in plan.engines if isinstance(each, EngineMethod)}
@@ -148,5 +134,5 @@ def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[
     install = " ".join(name for name in names if "@" in name)
     scenes = shlex.quote(",".join(plan.arguments.get(scene.name, scene.name) for scene in plan.scenes))
     command = f"conservative report --methods reduced --scenes {scenes} --engines {','.join(names)}" + " --quick" * plan.quick
-    commands = [command, f"conservative study motions --engines {','.join(names)}"]
+    commands = [command, *(f"conservative study {study} --engines {','.join(names)}" for study in studies)]
     return [f"`{each}`" for each in [*[f"conservative engines install {install}"] * bool(install), *commands]]

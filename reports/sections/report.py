@@ -8,6 +8,8 @@ from typing import Any
 import pandas as pd
 
 from conservative.benchmarks.studies import random
+from conservative.benchmarks.studies.declaration import Named
+from conservative.benchmarks.studies.studies import STUDIES
 
 from ..document.model import Document, Links, Paragraph, Section
 from ..run.measure import Measurements
@@ -52,7 +54,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     if random.STUDY.name in plan.names:
         details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
     details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
-    pages = engine_page.pages(measured) if plan.engines else {}
+    of_engines = {name: part for name, part in SECTIONS.items() if STUDIES[name].named is Named.ONLY}
+    pages = engine_page.pages(measured, of_engines) if plan.engines else {}
     if pages:
         section = engines.section(measured)
         links = Links([(f"Page of {page.title}", f"{name}.html") for name, page in pages.items()])
