@@ -81,7 +81,7 @@ def _page(
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
-    found = measured.rows[measured.rows["engine"] == family]
+    found = measured.rows[measured.rows["engine"].str.partition("@")[0] == family]
     blocks += [part.section(found, measured.samples) for name, part in sections.items() if (found["study"] == name).any()]
     blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions, sections)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
@@ -112,7 +112,8 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
             same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN
             if same[0]:
                 count = (*same, False).index(False)
-                text = f"{kind}: {number(errors[0])} rad since {versions[count - 1].partition('==')[2]}"
+                since = f"since {'at least ' * (count == len(errors))}{versions[count - 1].partition('==')[2]}"
+                text = f"{kind}: {number(errors[0])} rad {since}"
                 if count < len(errors):
                     text += f", {number(errors[count])} rad in {versions[count].partition('==')[2]}"
                 items.append(Item(text, scene))

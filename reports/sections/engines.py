@@ -213,7 +213,7 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
         outcome_cell(outcome, reason=True),
     )
     return EngineRow(
-        engine="==".join(filter(None, (first["engine"], first["version"]))),
+        engine="==".join(filter(None, (first["engine"].partition("@")[0], first["version"]))),
         label=str(first["label"]),
         setting=str(first["setting"]),
         series=series,
