@@ -76,8 +76,8 @@ def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes and three random bodies.
 
     The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
-    error. Open OUT/index.html. The folder OUT is replaced when the report is complete. Until then, finished studies are in
-    OUT.partial.json.
+    error. Open OUT/index.html; OUT/engine_NAME.html is the page of an engine that is named. The folder OUT is replaced when
+    the report is complete. Until then, finished studies are in OUT.partial.json.
     """
     require_extra("conservative report", "report")
     from .. import report as work
