@@ -20,6 +20,17 @@ from .terminal.progress import Step, announce
 from .terminal.report_folder import MANIFEST, report_folder
 
 
+def render_pages(document: Document, folder: Path) -> None:
+    """Write the documents next to a document, and their badges."""
+    from .document import html, markdown
+
+    for name, page in document.pages.items():
+        files.write_text(folder / f"{name}.md", markdown.render(page), "out")
+        files.write_text(folder / f"{name}.html", html.render(page), "out")
+        if page.badge:
+            files.write_text(folder / f"{name}.svg", page.badge, "out")
+
+
 def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     """Measure and write the report into the folder `out`, and return its document.
 
@@ -43,6 +54,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
 
             document = build(plan, measurements, source)
             render(document, folder, plan.png)
+            render_pages(document, folder)
             files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
             names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
             files.write_text(folder / MANIFEST, json.render({**dict(document.data), "files": names}, indent=1), "out")
@@ -55,7 +67,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
 
 
 def render(document: Document, folder: Path, png: bool) -> None:
-    """Write report.md with its pictures, the page, and the pages of engines with their badges."""
+    """Write report.md with its pictures, and the page."""
     from .document import html, markdown
 
     names = dict[str, str]()
@@ -68,11 +80,6 @@ def render(document: Document, folder: Path, png: bool) -> None:
 
     files.write_text(folder / "report.md", markdown.render(document, draw), "out")
     files.write_text(folder / "index.html", html.render(document), "out")
-    for name, page in document.pages.items():
-        files.write_text(folder / f"{name}.md", markdown.render(page), "out")
-        files.write_text(folder / f"{name}.html", html.render(page), "out")
-        if page.badge:
-            files.write_text(folder / f"{name}.svg", page.badge, "out")
 
 
 def save_picture(chart: Any, path: Path, png: bool) -> str:

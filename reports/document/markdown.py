@@ -22,6 +22,8 @@ def render(document: Document, draw: Draw = _refuse) -> str:
 def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
     for block in blocks:
         match block:
+            case Links():
+                yield ", ".join(f"[{text}]({file})" for text, file in block.links)
             case Section():
                 if content := list(_blocks(block.blocks, level + 1, draw)):  # a section of the page alone has none
                     yield f"{'#' * level} {block.title}"
@@ -30,8 +32,6 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
                 yield f"**{block.text}**" if block.role is Emphasis.LEAD else block.text
             case Items():
                 yield "\n".join(f"- {f'**{item.subject}**: ' * bool(item.subject)}{item.text}" for item in block.items)
-            case Links():
-                yield ", ".join(f"[{text}]({file})" for text, file in block.links)
             case Facts():
                 yield table(Table(("", ""), block.facts))
             case Table():

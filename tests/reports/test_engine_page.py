@@ -105,7 +105,9 @@ def test_commands_repeat_it(pages):
 
 def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
     links = Links([(page.title, f"{name}.html") for name, page in pages.items()])
-    report.render(Document("", "all", [links], pages=pages), tmp_path, png=False)
+    document = Document("", "all", [links], pages=pages)
+    report.render(document, tmp_path, png=False)
+    report.render_pages(document, tmp_path)
     written = {"report.md", "index.html", "engine_a.html", "engine_a.md", "engine_a.svg", "engine_b.html", "engine_b.md"}
     assert {path.name for path in tmp_path.iterdir()} == written
     assert "[b 7](engine_b.html), [a 2](engine_a.html)" in (tmp_path / "report.md").read_text(encoding="utf-8")
