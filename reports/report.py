@@ -54,8 +54,8 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
 
             document = build(plan, measurements, source)
             render(document, folder, plan.png)
-            render_pages(document, folder)
             files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
+            render_pages(document, folder)
             names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
             files.write_text(folder / MANIFEST, json.render({**dict(document.data), "files": names}, indent=1), "out")
     except BaseException as error:
