@@ -12,5 +12,18 @@ from lazy_loader import attach_stub
 
 from . import version
 
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+_load, __dir__, __all__ = attach_stub(__name__, __file__)
 __version__ = version.VERSION
+
+
+def __getattr__(name: str) -> object:
+    """Return a public name, or a module of this package, such as `conservative.registry`."""
+    from importlib import import_module, util
+
+    from .posix import unstoppable
+
+    with unstoppable():
+        if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
+            return import_module(f"{__name__}.{name}")
+        value = globals()[name] = _load(name)
+        return value

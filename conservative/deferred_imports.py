@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .errors import REINSTALL, BadInput, MissingEngine, NotLoadable, nearest
+from .posix import unstoppable
 from .programs import list_programs
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "c
 @lru_cache(maxsize=32)
 def kernels(name: str) -> Any:
     """Return the module `conservative.kernels.<name>`. Calls after the first are 20 times as fast as an import statement."""
-    return import_module(f"{__package__}.kernels.{name}")
+    with unstoppable():
+        return import_module(f"{__package__}.kernels.{name}")
 
 
 @lru_cache(maxsize=8)
@@ -40,6 +42,8 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
     entries = list(entry_points(group=group))
     if group == ENGINES and (programs := list_programs()):
         module = find_entry(ROOMS, ROOMS, "programs").value
+        for name in programs.keys() & {*list_entries(METHODS), *(entry.name for entry in entries)}:
+            raise BadInput(str(programs[name].file), f"{name!r}, the name of a method or an engine", "another name")
         entries += [EntryPoint(name, f"{module}:{name}", group) for name in programs]
     return {entry.name: entry for entry in sorted(entries, key=lambda entry: entry.name)}
 
@@ -63,6 +67,8 @@ def load_entry(group: str, argument: str, name: str) -> Any:
     """
     entry = find_entry(group, argument, name)
     try:
+        with unstoppable():
+            import_module(entry.module)
         return entry.load()
     except MissingEngine:
         raise

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from .outcome import Outcome, OutcomeKind
+from .posix import unstoppable
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -234,11 +236,15 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def require_extra(what: str, extra: str, *packages: str) -> None:
     """Raise `MissingExtra` if a package that `what`, such as `conservative report`, needs is not installed.
 
-    `extra` is a key of `EXTRAS`. `packages` are import names, by default all of the extra. No package is imported.
+    `extra` is a key of `EXTRAS`. `packages` are import names, by default all of the extra. Packages that are given are
+    imported, without an interruption by Ctrl-C.
     """
     missing = [package for package in packages or EXTRAS[extra] if find_spec(package) is None]
     if missing:
         raise MissingExtra(what, ", ".join(missing), extra)
+    with unstoppable():
+        for package in packages:
+            import_module(package)
 
 
 MOST_LISTED = 12

@@ -6,8 +6,12 @@ No other file imports a module of one system, except the program of a worker, wh
 from __future__ import annotations
 
 import os
+import signal
+import stat
 import sys
-from contextlib import suppress
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,6 +21,8 @@ try:
 except ImportError:  # Windows
     fcntl = None
 
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Numbers of the signals that ask a process to end."""
 NO_LOCK = -1
 """Handle of a file or folder on a system, or a file system, without locks."""
 
@@ -55,6 +61,16 @@ def release(handle: int) -> None:
         os.close(handle)
 
 
+def is_own(file: Path) -> bool:
+    """Return whether a file belongs to this user, and no other one can write or replace it; True on Windows."""
+    if not hasattr(os, "geteuid"):
+        return True
+    found, folder = file.stat(), file.parent.stat()
+    sticky = folder.st_mode & stat.S_ISVTX  # as /tmp: only the owner of a file can replace it
+    writable = (found.st_mode | (0 if sticky else folder.st_mode)) & stat.S_IWOTH
+    return found.st_uid == os.geteuid() and not writable
+
+
 def physical_memory() -> int:
     """Return the memory of this machine in bytes; 0 if it is unknown, as on Windows."""
     with suppress(AttributeError, OSError, ValueError):
@@ -88,6 +104,12 @@ def session_options(life: int) -> dict[str, Any]:
     return {} if fcntl is None else {"start_new_session": True, "pass_fds": [] if life < 0 else [life]}
 
 
+def end_group(leader: int) -> None:
+    """End all processes of the session that `session_options` began with this process, which has ended: those it has forked."""
+    with suppress(OSError, AttributeError):  # there are none left; or, on Windows, no groups
+        os.killpg(leader, signal.SIGKILL)
+
+
 def limit_resources(process: int, memory: int, largest_file: int) -> None:
     """Keep a process from harming others by its memory or its output, both limits in bytes. Only Linux supports it."""
     with suppress(ImportError, OSError, ValueError, AttributeError):
@@ -97,3 +119,23 @@ def limit_resources(process: int, memory: int, largest_file: int) -> None:
         for which, most in limits.items():
             resource.prlimit(process, which, (most, most))
         Path(f"/proc/{process}/oom_score_adj").write_text("1000", encoding="utf-8")  # ended first when memory runs out
+
+
+@contextmanager
+def unstoppable() -> Iterator[None]:
+    """Delay signals until the end of the block: for renames that belong together, and for imports.
+
+    An import that ends half-way leaves modules behind with which the next one fails.
+    """
+    # Blocking them in this thread is not enough: the system would hand them to another one.
+    waiting: list[int] = []
+    in_main_thread = threading.current_thread() is threading.main_thread()  # only there can handlers be set
+    handled = [number for number in SIGNALS if in_main_thread and signal.getsignal(number) not in (None, signal.SIG_IGN)]
+    before = {number: signal.signal(number, lambda number, frame: waiting.append(number)) for number in handled}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in waiting[:1]:
+            signal.raise_signal(number)

@@ -3,8 +3,10 @@
     [engines]                       # conservative.toml
     my_engine = "build/my_engine"   # relative to this file
 
-The project's file is in the working directory, or in the nearest folder above it; CONSERVATIVE_PROJECT names another folder to
-start from. The user's file is in the configuration folder of platformdirs. A name in the project's file takes precedence.
+The project's file is in the working directory, or in the nearest folder above it in the same repository or in the home folder;
+CONSERVATIVE_PROJECT names another folder to start from. A file that other users could have written is not read, because its
+programs would run: only that of the folder which CONSERVATIVE_PROJECT names is, whoever wrote it. The user's file is in the
+configuration folder of platformdirs. A name in the project's file takes precedence over one in the user's.
 """
 
 from __future__ import annotations
@@ -12,11 +14,13 @@ from __future__ import annotations
 import os
 import shlex
 import tomllib
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import BadInput
+from .posix import is_own
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,19 @@ class Program:
 def project_file() -> Path:
     """Return the project's file, which may not exist."""
     here = Path(os.environ.get("CONSERVATIVE_PROJECT", "")).absolute()
-    places = [folder / "conservative.toml" for folder in (here, *here.parents)]
+    folders = [here, *here.parents]
+    ends = [i for i, folder in enumerate(folders) if folder == Path("~").expanduser() or (folder / ".git").exists()]
+    places = [folder / "conservative.toml" for folder in folders[: max(ends, default=0) + 1]]
     return next(filter(Path.is_file, places), places[0])
+
+
+def _is_trusted(file: Path) -> bool:
+    """Return whether a file can be read: it is of this user, or the user names its folder. Warn if not."""
+    if os.environ.get("CONSERVATIVE_PROJECT") == str(file.parent) or is_own(file):
+        return True
+    remedy = f"To use its programs, set CONSERVATIVE_PROJECT={file.parent}"
+    warnings.warn(f"{file} is not read, because other users can have written it. {remedy}", stacklevel=3)
+    return False
 
 
 def user_file() -> Path:
@@ -58,8 +73,9 @@ def list_programs() -> dict[str, Program]:
         files.append(user_file())
     with suppress(OSError):  # the working directory was removed
         files.append(project_file())
-    for file in filter(Path.is_file, files):
-        programs |= read_programs(file)
+    for file in files:
+        if file.is_file() and _is_trusted(file):
+            programs |= read_programs(file)
     return programs
 
 

@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
+from ..errors import NotWritten
 from ..files import write_text
 from .compiler import COMPILED as COMPILED
 from .compiler.parts import SMALL as SMALL
@@ -31,13 +32,18 @@ from .compiler.parts import kernel as kernel
 from .compiler.parts import small as small
 
 
+@cache  # once
+def _warn(reason: str) -> None:
+    said = f"Compiled kernels cannot be stored ({reason}), so every process compiles them again. Set NUMBA_CACHE_DIR."
+    warnings.warn(said, RuntimeWarning, stacklevel=3)
+
+
 def _can_cache() -> bool:
     """Return whether numba finds a folder for compiled code that can be written; warn if not."""
     try:
         njit(cache=True)(_can_cache)
     except RuntimeError:
-        said = "No folder for compiled kernels can be written, so every process compiles them again. Set NUMBA_CACHE_DIR."
-        warnings.warn(said, RuntimeWarning, stacklevel=2)
+        _warn("no folder for them can be written")
         return False
     return True
 
@@ -45,10 +51,26 @@ def _can_cache() -> bool:
 CACHED = COMPILED and _can_cache()
 """True if compiled code is stored for the next process."""
 
-entry: Any = partial(njit, cache=CACHED, error_model="numpy", nogil=True)
+
+def _compile(function: Any, **options: Any) -> Any:
+    compiled = njit(function, cache=CACHED, error_model="numpy", **options)
+    if CACHED:
+        compiled._cache.save_overload = partial(_save, compiled._cache.save_overload)
+    return compiled
+
+
+def _save(save: Any, *code: Any) -> None:
+    """Store compiled code. Without room for it, as on a full disk, this process goes on with a warning."""
+    try:
+        save(*code)
+    except OSError as error:
+        _warn(error.strerror)
+
+
+entry: Any = partial(_compile, nogil=True)
 """Compile a function that Python calls and that runs long: without the interpreter's lock, so that other threads go on."""
 
-brief: Any = partial(njit, cache=CACHED, error_model="numpy")
+brief: Any = _compile
 """Compile a function that Python calls and that takes microseconds. It keeps the interpreter's lock: giving it up and taking it
 again is expensive where many threads want it."""
 
@@ -63,14 +85,17 @@ def digest(package: Path) -> str:
     return found.hexdigest()
 
 
-def _drop_stale_code(cache: Path, sources: Path) -> None:
-    """Delete numba's indices in `cache`, without which it finds nothing, unless they are of the `sources` as they are."""
-    stamp, current = cache / "sources.sha256", digest(sources)
+def _drop_stale_code(folder: Path, sources: Path) -> None:
+    """Delete numba's indices in `folder`, without which it finds nothing, unless they are of the `sources` as they are."""
+    stamp, current = folder / "sources.sha256", digest(sources)
     if stamp.exists() and stamp.read_text() == current:
         return
-    for index in cache.glob("*.nbi"):
+    for index in folder.glob("*.nbi"):
         index.unlink(missing_ok=True)  # another process may be at it
-    write_text(stamp, current, "NUMBA_CACHE_DIR")
+    try:
+        write_text(stamp, current, "NUMBA_CACHE_DIR")
+    except NotWritten as error:  # the next process deletes the indices again
+        _warn(str(getattr(error.cause, "strerror", error.cause)))
 
 
 _folder = Path(brief(lambda: None).stats.cache_path) if CACHED else None

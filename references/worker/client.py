@@ -24,7 +24,7 @@ from typing import IO, Any, NoReturn
 
 from conservative.errors import IntegrationFailed
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.posix import life_line, limit_resources, session_options
+from conservative.posix import end_group, life_line, limit_resources, session_options
 
 from . import program
 
@@ -226,10 +226,10 @@ class Worker:
         """Send a request and return the answer."""
         process: Any = self._process
         if self._binary:
-            _write_all(process.stdin, program.pack(message), deadline)
-            return program.unpack(lambda count: _read_exactly(process.stdout, count, deadline))
-        _write_all(process.stdin, program.to_json(message), deadline)
-        return program.from_json(_read_line(process.stdout, deadline))
+            _write_all(process, program.pack(message), deadline)
+            return program.unpack(lambda count: _read_exactly(process, count, deadline))
+        _write_all(process, program.to_json(message), deadline)
+        return program.from_json(_read_line(process, deadline))
 
     @contextmanager
     def _ended_by_failure(self, limit: float) -> Iterator[float]:
@@ -306,6 +306,7 @@ class Worker:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+            end_group(self._process.pid)
         if self._life >= 0:
             os.close(self._life)
         if self._output:
@@ -328,52 +329,61 @@ def kill_workers() -> None:
     for worker in list(_workers):
         if process := worker._process:
             process.kill()
+            end_group(process.pid)
 
 
-def _wait(descriptor: int, event: int, deadline: float) -> None:
-    """Wait until a pipe can be read or written, or its other end is gone. Raise TimeoutError after the deadline."""
+Process = subprocess.Popen[bytes]
+
+
+def _wait(process: Process, descriptor: int, event: int, deadline: float) -> None:
+    """Wait until a pipe can be read or written. Raise EOFError if the process ends, and TimeoutError after the deadline."""
     if not _CAN_WAIT:
         return
     poll = select.poll()
     poll.register(descriptor, event)
-    while not poll.poll(max(0.0, min(deadline - monotonic(), _LONGEST_WAIT)) * 1000):
+    while not poll.poll(max(0.0, min(deadline - monotonic(), _PATIENCE)) * 1000):
+        if process.poll() is not None and not poll.poll(0):  # what it has forked can keep the pipe open
+            raise EOFError
         if monotonic() >= deadline:
             raise TimeoutError
 
 
-def _read_some(pipe: IO[bytes], most: int, deadline: float) -> bytes:
-    _wait(pipe.fileno(), _READ, deadline)
-    part = os.read(pipe.fileno(), min(most, 1 << 20))
+def _read_some(process: Process, most: int, deadline: float) -> bytes:
+    assert process.stdout is not None
+    descriptor = process.stdout.fileno()
+    _wait(process, descriptor, _READ, deadline)
+    part = os.read(descriptor, min(most, 1 << 20))
     if not part:
         raise EOFError
     return part
 
 
-def _read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
+def _read_exactly(process: Process, count: int, deadline: float) -> bytes:
     """Return a number of bytes. Raise EOFError if there are fewer, TimeoutError after the deadline, and EndlessAnswer."""
     if count > LARGEST_ANSWER:
         raise EndlessAnswer
     parts = []
     while count:
-        parts.append(_read_some(pipe, count, deadline))
+        parts.append(_read_some(process, count, deadline))
         count -= len(parts[-1])
     return b"".join(parts)
 
 
-def _read_line(pipe: IO[bytes], deadline: float) -> bytes:
+def _read_line(process: Process, deadline: float) -> bytes:
     """Return a line. Each request has one answer, so nothing can follow it. Raise as `_read_exactly`."""
-    parts, room = [_read_some(pipe, 1 << 20, deadline)], LARGEST_ANSWER
+    parts, room = [_read_some(process, 1 << 20, deadline)], LARGEST_ANSWER
     while not parts[-1].endswith(b"\n"):
-        parts.append(_read_some(pipe, 1 << 20, deadline))
+        parts.append(_read_some(process, 1 << 20, deadline))
         room -= len(parts[-1])
         if room < 0:
             raise EndlessAnswer
     return b"".join(parts)
 
 
-def _write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
+def _write_all(process: Process, data: bytes, deadline: float) -> None:
     """Write bytes. Raise BrokenPipeError if the reader is gone, and TimeoutError after the deadline."""
-    descriptor, rest = pipe.fileno(), memoryview(data)
+    assert process.stdin is not None
+    descriptor, rest = process.stdin.fileno(), memoryview(data)
     while rest:
-        _wait(descriptor, _WRITE, deadline)
+        _wait(process, descriptor, _WRITE, deadline)
         rest = rest[os.write(descriptor, rest[:_PART]) :]

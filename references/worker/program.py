@@ -253,7 +253,8 @@ def _end_with(life: int | None) -> bool:
     try:
         import fcntl
 
-        fcntl.fcntl(life, fcntl.F_SETOWN, os.getpid())
+        # The signal goes to the whole group if this process leads it: to processes that an engine has forked, too.
+        fcntl.fcntl(life, fcntl.F_SETOWN, os.getpid() if os.getpgrp() != os.getpid() else -os.getpid())
         fcntl.fcntl(life, fcntl.F_SETFL, fcntl.fcntl(life, fcntl.F_GETFL) | os.O_ASYNC)  # sends SIGIO
     except (ImportError, OSError, AttributeError):  # not available on this system
         return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -139,12 +140,23 @@ class OutputCommand(Command):
         rest = super().parse_args(ctx, args)
         force = ctx.meta["force"] = ctx.params.pop("force")
         taken = [Path(word) for each in self.params if not isinstance(each.type, Output) for word in _words(ctx, each)]
+        written: dict[str, str] = {}
         for each in self.params:
             if isinstance(each.type, Output) and (path := ctx.params.get(str(each.name))) is not None:
                 for name, mark in each.type.marks.items():
                     require_replaceable(path / name, mark, str(each.name), force, taken)
-                    taken.append(path / name)
+                    place = os.path.normcase(os.path.realpath(path / name))  # also of a file that does not exist yet
+                    if written.setdefault(place, str(each.name)) != each.name and not is_special(path / name):
+                        got = f"{str(path / name)!r}, the file of --{written[place]}"
+                        raise BadInput(str(each.name), got, "another file")
         return rest
+
+
+def is_special(file: Path) -> bool:
+    """Return whether a file is a pipe or a device, such as /dev/null, which several options can write to."""
+    with suppress(OSError):
+        return file.exists() and not file.is_file() and not file.is_dir()
+    return False
 
 
 HEAD = 4096

@@ -12,13 +12,12 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
 
-_NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+from conservative.posix import SIGNALS
+
 _AGAIN = 0.01
 """Time, s, after which a signal that was lost, or came while LLVM compiled, is sent again."""
 
@@ -40,7 +39,7 @@ def handle_signals() -> None:
 
     A second Ctrl-C ends the process at once. Other signals after the first are ignored, so that cleanup can finish.
     """
-    for number in _NUMBERS:
+    for number in SIGNALS:
         if signal.getsignal(number) not in (None, signal.SIG_IGN):
             signal.signal(number, _interrupt)
     sys.unraisablehook = _send_again
@@ -71,23 +70,6 @@ def _send_later(number: int) -> None:
     # On Windows os.kill would end the process at once. Elsewhere it also ends a wait of the main thread.
     send = signal.raise_signal if os.name == "nt" else partial(os.kill, os.getpid())
     threading.Timer(_AGAIN, send, (number,)).start()
-
-
-@contextmanager
-def unstoppable() -> Iterator[None]:
-    """Delay signals until the end of the block, for renames that belong together."""
-    # Blocking them in this thread is not enough: the system would hand them to another one.
-    waiting: list[int] = []
-    in_main_thread = threading.current_thread() is threading.main_thread()  # only there can handlers be set
-    handled = [number for number in _NUMBERS if in_main_thread and signal.getsignal(number) not in (None, signal.SIG_IGN)]
-    before = {number: signal.signal(number, lambda number, frame: waiting.append(number)) for number in handled}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        for number in waiting[:1]:
-            signal.raise_signal(number)
 
 
 def notes(error: BaseException) -> list[str]:

@@ -18,8 +18,7 @@ from typing import Any
 
 from conservative import files, posix
 from conservative.errors import BadInput, NotWritten
-
-from .interrupts import unstoppable
+from conservative.posix import unstoppable
 
 MANIFEST = "measurements.json"
 """The file of a report that lists the others under `files`. It identifies the folder of a report."""

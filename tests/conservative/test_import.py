@@ -2,6 +2,7 @@
 
 import ast
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import conservative
+
+from ..environments import run_python
 
 FORBIDDEN = ("numba", "llvmlite", "mujoco", "pinocchio", "heyoka", "pandas", "scipy", "altair")
 OURS = "[name for name in sys.modules if name.partition('.')[0] == 'conservative']"
@@ -52,3 +55,44 @@ def test_type_checkers_see_the_public_names():
 
 def test_classes_come_back_from_a_pickle():
     assert pickle.loads(pickle.dumps(conservative.Reduced)) is conservative.Reduced
+
+
+def test_modules_that_the_pages_name_are_there_without_an_import_of_their_own():
+    """`conservative.registry.method("exact")` of a page works after `import conservative`."""
+    root = Path(__file__).parents[2]
+    pages = [page for page in root.rglob("*.md") if page.name != "CHANGELOG.md"]
+    found = re.findall(r"\b(?:conservative|cv)\.([a-z_]+)\.[A-Za-z_]+", "\n".join(map(Path.read_text, pages)))
+    modules = {"registry", *found} & {path.stem for path in (root / "conservative").iterdir()}
+    assert len(modules) >= 3
+    missing = "[name for name in sys.argv[1:] if not hasattr(conservative, name)]"
+    code = f"import conservative, sys; print({missing}, hasattr(conservative, 'no_such_module'))"
+    assert run_python(code, *sorted(modules))[1] == "[] False\n"
+
+
+INTERRUPTED = """
+import signal, sys
+def interrupt(event, arguments):
+    if event == "import" and arguments[0] == sys.argv[1] and not done:
+        done.append(signal.raise_signal(signal.SIGINT))
+done = []
+sys.addaudithook(interrupt)
+import conservative as cv
+for _ in range(2):
+    try:
+        print(eval(sys.argv[2]))
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+FLIP = "cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1, method='moser_veselov')"
+
+
+@pytest.mark.parametrize(
+    ("module", "call", "value"),
+    [
+        ("numpy.linalg", "cv.integrate.__name__", "integrate"),
+        ("numba.core.types", f"{FLIP}.ok", "True"),
+        ("pandas.core.frame", f"len({FLIP}.to_pandas())", "11"),
+    ],
+)
+def test_ctrl_c_in_an_import_leaves_no_half_of_it(module, call, value):
+    assert run_python(INTERRUPTED, module, call) == (0, f"interrupted\n{value}\n", "")

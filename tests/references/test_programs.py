@@ -1,6 +1,7 @@
 """Programs of users: registered by a name, they are engines wherever a name of an engine is taken."""
 
 import json
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -54,6 +55,7 @@ def test_paths_in_the_file_of_a_project_are_relative_to_it(folder, monkeypatch):
     """The rest of the file stays as it is, and the command works in folders below it."""
     before = '# ours\n[engines]  # programs\nother = "node other.js"\n'
     (folder / "conservative.toml").write_text(before)
+    (folder / ".git").mkdir()
     (folder / "src").mkdir()
     (folder / "src" / "my-engine.py").write_text((PROGRAMS / "engine.py").read_text())
     monkeypatch.chdir(folder / "src")
@@ -128,3 +130,44 @@ def test_a_file_that_cannot_be_used_is_named(text, folder):
     (folder / "conservative.toml").write_text(text)
     code, text = run("engines", "list")
     assert (code, "conservative.toml: got" in text) == (2, True)
+
+
+HOSTILE = '[engines]\nmine = "touch ran"\n'
+
+
+def test_only_a_project_file_that_others_cannot_have_written_is_read(folder, monkeypatch):
+    def is_read():
+        deferred_imports.list_entries.cache_clear()
+        return "mine" in registry.list_engines()
+
+    file, below = folder / "conservative.toml", folder / "below"
+    below.mkdir()
+    file.write_text(HOSTILE)
+    assert is_read()
+    monkeypatch.chdir(below)
+    assert not is_read()  # in a folder above it, without a repository
+    monkeypatch.setenv("HOME", str(folder))
+    assert is_read()
+    monkeypatch.setenv("HOME", str(folder.parent / "elsewhere"))
+    (folder / ".git").mkdir()
+    assert is_read()
+    for place, mode in ((file, 0o666), (folder, 0o777)):
+        before = place.stat().st_mode
+        place.chmod(mode)
+        with pytest.warns(UserWarning, match=f"{file} is not read"):
+            assert not is_read()
+        place.chmod(before)
+    another = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: another)
+    with pytest.warns(UserWarning, match=f"set CONSERVATIVE_PROJECT={folder}"):
+        assert not is_read()
+    monkeypatch.setenv("CONSERVATIVE_PROJECT", str(folder))
+    assert is_read()
+
+
+@pytest.mark.parametrize("name", ["mujoco", "bullet", "reduced"])
+def test_a_project_cannot_take_an_installed_name(name, folder):
+    (folder / "conservative.toml").write_text(HOSTILE.replace("mine", name))
+    code, text = run("run", "brick_flip", "-m", name)
+    assert (code, f"conservative.toml: got {name!r}, the name of a method or an engine" in text) == (2, True)
+    assert not (folder / "ran").exists()

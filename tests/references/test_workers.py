@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -313,3 +314,25 @@ def test_an_unknown_name_names_the_nearest():
         registry.method("trail:segfault")
     with pytest.raises(cv.BadInput, match="with @ and a version"):
         registry.method("reduced@1.0")
+
+
+@pytest.mark.parametrize("how", ["close", "crash", "kill"])
+def test_what_a_program_has_forked_ends_with_it(how, tmp_path):
+    code = """
+import json, os, subprocess, sys
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+for line in sys.stdin:
+    if json.loads(line)["do"] == "crash": sys.exit(3)
+    print(json.dumps(dict(protocol=1, program="p", version="1", framing="lines", child=child.pid)), flush=True)
+"""
+    worker = Worker([sys.executable, "-c", code])
+    child = worker.greet()["child"]
+    if how == "close":
+        worker.close()
+    elif how == "crash":
+        with pytest.raises(EngineCrashed, match="exit code 3"):
+            worker.ask("crash")
+    else:
+        client.kill_workers()
+    assert _ends(child)
+    worker.close()

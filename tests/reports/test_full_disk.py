@@ -89,3 +89,22 @@ except NotWritten as error:
     assert run_python(code, str(folder)) == (0, "results\n", "")
     assert contents(folder) == before
     assert json.loads(before["results.json"])["machine"] == "a machine"
+
+
+CACHE = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
+sys.path.insert(0, sys.argv[2])
+from compiled import add, half
+print(add(1.0), half(1.0))
+"""
+
+
+@pytest.mark.parametrize("room", [0, 40, 1000])  # none; a part of the digest; the digest, but no code
+def test_compiling_goes_on_where_the_cache_cannot_be_written(room, tmp_path):
+    functions = "from conservative.kernels import brief\n@brief\ndef add(x): return x + 1\n@brief\ndef half(x): return x / 2\n"
+    (tmp_path / "compiled.py").write_text(functions)
+    code, out, err = run_python(CACHE, str(room), str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (code, out) == (0, "2.0 0.5\n"), err
+    assert err.count("RuntimeWarning: Compiled kernels cannot be stored (File too large)") == 1
+    assert not list(tmp_path.rglob("*.nbc"))

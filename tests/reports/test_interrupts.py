@@ -15,9 +15,10 @@ from click.testing import CliRunner
 from llvmlite import binding
 from llvmlite.binding import ffi
 
+from conservative.posix import unstoppable
 from conservative.reports.cli.main import main
 from conservative.reports.terminal import interrupts
-from conservative.reports.terminal.interrupts import Interrupted, handle_signals, unstoppable
+from conservative.reports.terminal.interrupts import Interrupted, handle_signals
 
 from ..environments import ROOT, programs, variables
 

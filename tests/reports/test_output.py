@@ -252,3 +252,25 @@ def test_new_empty_and_special_files_may_be_written(tmp_path):
         except BadInput:
             refused.append(name)
     assert refused == ["full"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "brick_flip", "--csv", "out.csv", "--parquet", "./out.csv"],
+        ["run", "brick_flip", "--csv", "there/out.csv", "--parquet", "link/out.csv"],
+        ["study", "convergence", "--out", "there", "--csv", "there/study.csv"],
+    ],
+)
+def test_two_options_never_write_the_same_file(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to("there")
+    done = CliRunner().invoke(main, arguments)
+    assert (done.exit_code, ": got '" in done.output, "; expected another file" in done.output) == (2, True, True)
+    assert tree(tmp_path / "there") == []
+
+
+def test_two_options_can_write_to_the_same_device():
+    done = CliRunner().invoke(main, ["run", "brick_flip", "--t-end", "0.1", "--csv", "/dev/null", "--parquet", "/dev/null"])
+    assert done.exit_code == 0, done.output
