@@ -38,7 +38,7 @@ import numpy as np
 from .. import files, posix
 from ..attitude import Array
 from ..batch import Batch
-from ..check import read_only
+from ..check import positive_integer, read_only
 from ..drifts import list_drifts
 from ..errors import (
     BadInput,
@@ -54,9 +54,11 @@ from ..errors import (
 )
 from ..grid import Grid
 from ..outcome import Outcome, OutcomeKind
+from ..potentials.turning import static_part
 from ..scene import Scene
 from ..version import VERSION
 from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, list_blocks
+from .inputs import list_parameters
 from .scene_record import find_scene, is_same_motion, record_scene
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
@@ -141,33 +143,43 @@ class Store:
             drifts, kinds = self.arrays["drifts"][:], self.arrays["outcome"][:]
             failed = np.flatnonzero(kinds != _KINDS.index(OutcomeKind.OK)).tolist()
             texts = self.arrays["failure"][:] if failed else ()
-        except ValueError as error:  # a checksum
-            raise BadInput("path", f"{str(self.place)!r}, an ensemble that is damaged ({error})", _WHOLE) from None
-        names = self.arrays["drifts"].attrs["names"]
-        return dict(zip(names, drifts.T, strict=True)), {i: _restore_failure(texts[i]) for i in failed}
+            failures = {i: _restore_failure(texts[i], _KINDS[kinds[i]]) for i in failed}
+            return dict(zip(self.arrays["drifts"].attrs["names"], drifts.T, strict=True)), failures
+        except Exception as error:  # a checksum; or any other one, for values that no run has
+            got = f"{str(self.place)!r}, an ensemble that is damaged ({type(error).__name__}: {error})"
+            raise BadInput("path", got, _WHOLE) from None
 
     def read_bodies(self, scene: Scene | None) -> Batch:
         """Return the bodies. Their initial states and parameters stay on the disk.
 
-        Raise `BadInput` if the scene is missing, or another one (`open_ensemble`).
+        Raise `BadInput` if the scene is missing, or another one (`open_ensemble`), or does not have the parameters.
         """
         inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
         for name in self.record["digests"]:
             group, _, own = name.partition("/")
             inputs[group][own] = _OnDisk(self.arrays[name])
         scene, start, n = find_scene(self.record["scene"], scene), inputs["start"], self.record["bodies"]
+        known = list_parameters(static_part(scene.potential))
+        for name, values in inputs["parameters"].items():
+            if known.get(name) != values.shape[1:]:
+                got = f"{str(self.place)!r}, with the parameter {name!r} of shape {values.shape}"
+                raise BadInput("path", got, f"parameters of its scene, {known}")
         R_WB0 = start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
         w_WB_B0 = start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
         return Batch(scene, R_WB0, w_WB_B0, start.get("inertia"), inputs["parameters"])
 
 
-def _restore_failure(text: str) -> IntegrationFailed:
+def _restore_failure(text: str, outcome_kind: str) -> IntegrationFailed:
+    """Return a stored failure. Raise an exception of any kind if it is none, or has another kind of outcome."""
     values = json.loads(text)
     if kind := _FAILURES.get(values.pop("type")):
-        return kind(**values)
-    outcome = Outcome(**values | {"kind": OutcomeKind(values["kind"])})
-    failure = IntegrationFailed(str(outcome))
-    failure.outcome = outcome
+        failure: IntegrationFailed = kind(**values)
+    else:
+        outcome = Outcome(**values | {"kind": OutcomeKind(values["kind"])})
+        failure = IntegrationFailed(str(outcome))
+        failure.outcome = outcome
+    if failure.outcome.kind != outcome_kind:
+        raise ValueError(f"the failure is {failure.outcome}, the outcome {outcome_kind}")
     return failure
 
 
@@ -302,7 +314,19 @@ def read_record(place: Path, allowed: str = NEW_FOLDER) -> dict[str, Any]:
     if record.get("format_version") != FORMAT_VERSION:
         got = f"{str(place)!r}, an ensemble in version {record.get('format_version')} of its format"
         raise BadInput("path", got, f"version {FORMAT_VERSION}")
+    try:
+        _grid_of(record), [positive_integer(name, record[name]) for name in ("bodies", "block")]
+        kinds = {record["scene"]["fields"].__class__, record["digests"].__class__, record["method"].__class__}
+        if kinds != {dict, str} or not all(name.startswith(("start/", "parameters/")) for name in record["digests"]):
+            raise TypeError("values of other types")
+    except Exception as error:  # KeyError, BadInput of another argument, or any other one
+        got = f"{str(place)!r}, an ensemble that is damaged ({type(error).__name__}: {error})"
+        raise BadInput("path", got, "an ensemble as `integrate_many` wrote it") from None
     return record
+
+
+def _grid_of(record: Mapping[str, Any]) -> Grid:
+    return Grid(record["dt"], record["n_steps"], record["sample_every"])
 
 
 def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
@@ -312,10 +336,26 @@ def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
         with zarr.config.set({"array.write_empty_chunks": True}):
             group = zarr.open_group(place, mode=mode, zarr_format=3)
             names = (*_RESULTS, *(["supplied"] if "supplied" in record else ()), *record["digests"])
-            return Store(place, record, {name: group[name] for name in names})
+            arrays = {name: group[name] for name in names}
+        _require_shapes(record, arrays)
+        return Store(place, record, arrays)
     except Exception as error:  # KeyError for a missing array, and anything for damaged metadata
         allowed = "an ensemble that can be read, or a new folder"
         raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", allowed) from None
+
+
+def _require_shapes(record: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+    """Raise an exception of any kind unless the arrays have the shapes of the record, and the drifts have names."""
+    n, m, block = record["bodies"], _grid_of(record).n_samples, record["block"]
+    names: list[str] = arrays["drifts"].attrs["names"]
+    shapes = {"R_WB": (n, m, 3, 3), "w_WB_B": (n, m, 3), "supplied": (n, m, 4), "drifts": (n, len(names))}
+    shapes |= {"outcome": (n,), "failure": (n,)}
+    shapes |= {"start/R_WB0": (n, 3, 3), "start/w_WB_B0": (n, 3), "start/inertia": (n, 3, 3)}
+    for name, array in arrays.items():
+        shape = shapes.get(name, (n, *array.shape[1:]) if name.startswith("parameters/") else None)
+        if (array.shape, array.chunks[0]) != (shape, block):
+            raise ValueError(f"{name} has shape {array.shape} in blocks of {array.chunks[0]}, not {shape} and {block}")
+    ", ".join(names)
 
 
 def open_store(path: str | Path) -> Store:
@@ -324,7 +364,8 @@ def open_store(path: str | Path) -> Store:
     place = Path(path).absolute()
     record = read_record(place, "the folder of an ensemble that integrate_many has written")
     store, n = _open(place, record, "r"), record["bodies"]
-    left = sum(min(record["block"], n - first) for first in store.blocks if not store.is_there(first))
+    there = {int(file.name) * record["block"] for file in (place / "outcome" / "c").glob("[0-9]*")}  # of any number of blocks
+    left = n - sum(min(record["block"], n - first) for first in there if first < n and store.is_there(first))
     if left > 0:
         got = f"{str(place)!r}, an ensemble of {n} bodies of which {left} were not integrated, or are missing or damaged"
         raise BadInput("path", got, _WHOLE)

@@ -1,5 +1,6 @@
 """Ensembles on disk are read as they were run, after interrupts and damage too; other files are not changed."""
 
+import json
 import os
 import shutil
 import signal
@@ -240,6 +241,71 @@ def test_an_ensemble_without_its_metadata_is_refused(whole, tmp_path, lost):
     for use in (cv.open_ensemble, lambda path: run(path, resume=True)):
         with pytest.raises(cv.BadInput, match=r"^path: got"):
             use(place)
+
+
+def change(place, array="", **attributes):
+    """Change the attributes of a group or an array, or other metadata of an array."""
+    file = place / array / "zarr.json"
+    content = json.loads(file.read_text())
+    for name, value in attributes.items():
+        (content if name in content else content["attributes"])[name] = value
+    file.write_text(json.dumps(content))
+
+
+def write(array, value):
+    """Return a function that writes the values of an array for body 3, which has failed."""
+    return lambda place: zarr.open_group(place, mode="r+")[array].__setitem__(3, value)
+
+
+def enlarge(place):
+    """Make everything consistent, but 10^12 bodies."""
+    change(place, bodies=10**12)
+    for file in place.rglob("*/zarr.json"):
+        content = json.loads(file.read_text())
+        if content["node_type"] == "array" and content["shape"][0] == N:
+            change(place, file.parent.relative_to(place), shape=[10**12, *content["shape"][1:]])
+
+
+WRONG = {
+    "bodies": lambda place: change(place, bodies=10**12),
+    "bodies in all arrays": enlarge,
+    "negative": lambda place: change(place, bodies=-N),
+    "text": lambda place: change(place, bodies=str(N)),
+    "block 0": lambda place: change(place, block=0),
+    "other blocks": lambda place: change(place, block=5),
+    "no steps": lambda place: change(place, n_steps=-1),
+    "more steps": lambda place: change(place, n_steps=100),
+    "dt": lambda place: change(place, dt="short"),
+    "method": lambda place: change(place, method=3),
+    "scene": lambda place: change(place, scene="top"),
+    "fields of the scene": lambda place: change(place, scene={"type": "conservative.scene:Scene", "fields": 3}),
+    "digests": lambda place: change(place, digests=3),
+    "input": lambda place: change(place, digests={"R_WB": ""}),
+    "parameter": lambda place: (
+        shutil.move(place / "parameters" / "weight", place / "parameters" / "mass")
+        and change(place, digests={"start/w_WB_B0": "", "parameters/mass": ""})
+    ),
+    "names": lambda place: change(place, "drifts", names=["energy"]),
+    "no names": lambda place: change(place, "drifts", names=3),
+    "outcome": write("outcome", 77),
+    "another outcome": write("outcome", 2),
+    "failure": write("failure", "crashed"),
+    "argument": write("failure", '{"type": "Diverged", "when": 3}'),
+    "kind": write("failure", '{"type": "", "kind": "tired"}'),
+    "number": write("failure", "3"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_store_with_values_that_no_run_has_is_refused(wrong, whole, tmp_path):
+    place = tmp_path / "a.zarr"
+    shutil.copytree(whole, place)
+    WRONG[wrong](place)
+    with pytest.raises(cv.BadInput, match=r"^path: got '.*a\.zarr"):
+        cv.open_ensemble(place)
+    if "outcome" not in wrong and wrong not in ("failure", "argument", "kind", "number", "names"):
+        with pytest.raises(cv.BadInput, match=r"^path: got '.*a\.zarr"):
+            run(place, resume=True)
 
 
 def test_every_row_of_the_inputs_is_compared():
