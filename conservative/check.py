@@ -8,6 +8,7 @@ A frozen dataclass that converts its arguments has its own `__init__`, which che
 from __future__ import annotations
 
 import math
+import unicodedata
 from dataclasses import fields
 from decimal import Decimal
 from numbers import Integral, Real
@@ -184,8 +185,8 @@ def positive_integer(argument: str, value: object, allowed: str = "an integer of
 
 
 def printable_text(argument: str, value: object, allowed: str) -> str:
-    """Return a text that can be written to files and terminals: without NUL and without lone surrogates."""
-    if not isinstance(value, str) or "\0" in value or any("\ud800" <= character <= "\udfff" for character in value):
+    """Return a text that can be written to files and terminals: without control characters and without lone surrogates."""
+    if not isinstance(value, str) or any(unicodedata.category(character) in ("Cc", "Cs") for character in value):
         raise BadInput(argument, describe(value), allowed)
     return value
 

@@ -9,6 +9,7 @@ again. Where the system has no locks, it is removed `_AGE` after its last change
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import re
@@ -59,6 +60,12 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
         left = memoryview(content)
         while left:
             left = left[raw.write(left) :]
+
+
+def safe_name(text: str) -> str:
+    """Return a name for a file without a suffix: letters, digits, and some signs instead of any other, in at most 100 bytes."""
+    name = re.sub(r"[^\w+=,-]", "_", text)  # no point either: a suffix starts at the last one
+    return name if len(name.encode()) <= 100 else f"{name[:20]}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
 
 def make_folder(folder: Path, argument: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -73,8 +72,8 @@ def render(document: Document, folder: Path, png: bool) -> None:
     names = dict[str, str]()
 
     def draw(figure: Figure) -> str:
-        name = re.sub(r"[^\w+=,-]", "_", figure.name)  # a scene's parameters have points, and a suffix starts at the last one
-        while names.setdefault(name, figure.name) != figure.name:
+        name = files.safe_name(figure.name)
+        while names.setdefault(name.casefold(), figure.name) != figure.name:  # some disks take a name in capitals for the same
             name += "_"
         return save_picture(figure.picture, folder / name, png)
 

@@ -1,7 +1,8 @@
-"""Markdown of a document, with pictures in files next to it."""
+"""Markdown of a document, with pictures in files next to it. Words in backticks are code; every other text is shown as it is."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 
 from .model import Block, Document, Emphasis, Facts, Figure, Items, Links, Paragraph, Section, Table
@@ -14,9 +15,18 @@ def _refuse(figure: Figure) -> str:
     raise ValueError(f"{figure.name}: this document has no folder for pictures")
 
 
+def escape(value: object) -> str:
+    """Return a text without the characters that Markdown would not show, such as those of a name with HTML in it."""
+    return re.sub(r"`[^`]+`|[<*\[\]\\]|&(?=#?\w+;)|(?<!\w)_|_(?!\w)|^[#>+-](?= )", _escape_match, str(value))
+
+
+def _escape_match(match: re.Match[str]) -> str:
+    return match[0] if match[0].startswith("`") else f"\\{match[0]}"
+
+
 def render(document: Document, draw: Draw = _refuse) -> str:
     """Return a document as Markdown."""
-    return "\n\n".join([f"# {document.title}", *_blocks(document.blocks, 2, draw)]) + "\n"
+    return "\n\n".join([f"# {escape(document.title)}", *_blocks(document.blocks, 2, draw)]) + "\n"
 
 
 def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
@@ -26,22 +36,24 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
                 yield ", ".join(f"[{text}]({file})" for text, file in block.links)
             case Section():
                 if content := list(_blocks(block.blocks, level + 1, draw)):  # a section of the page alone has none
-                    yield f"{'#' * level} {block.title}"
+                    yield f"{'#' * level} {escape(block.title)}"
                     yield from content
             case Paragraph():
-                yield f"**{block.text}**" if block.role is Emphasis.LEAD else block.text
+                text = escape(block.text)
+                yield f"**{text}**" if block.role is Emphasis.LEAD else text
             case Items():
-                yield "\n".join(f"- {f'**{item.subject}**: ' * bool(item.subject)}{item.text}" for item in block.items)
+                subjects = (f"**{escape(item.subject)}**: " * bool(item.subject) for item in block.items)
+                yield "\n".join(f"- {each}{escape(item.text)}" for each, item in zip(subjects, block.items, strict=True))
             case Facts():
                 yield table(Table(("", ""), block.facts))
             case Table():
-                yield from filter(None, [block.caption])
+                yield from filter(None, [escape(block.caption)])
                 yield table(block)
             case Figure() if block.picture is not None:
-                yield f"![{block.title}]({draw(block)})"
+                yield f"![{escape(block.title)}]({draw(block)})"
 
 
 def table(content: Table) -> str:
     """Return a table as Markdown, without padding."""
     lines = [content.header, ["---", *["---:"] * (len(content.header) - 1)], *content.rows]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return "\n".join("| " + " | ".join(escape(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -177,3 +177,12 @@ def test_a_temporary_file_removed_by_another_writer_is_made_again(tmp_path, monk
         assert fresh == made[1]
         assert fresh.exists()
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["a/b", "../../etc", "x" * 300, "木" * 60, "a\\b:c", ".", "brick_flip:disturbance=1e-6", "CON.svg"]
+)
+def test_every_name_has_a_file_of_its_own(name, tmp_path):
+    (tmp_path / f"drift_{files.safe_name(name)}.svg").write_text("x")
+    assert [path.parent for path in tmp_path.rglob("*")] == [tmp_path]
+    assert files.safe_name(name + "1") != files.safe_name(name + "2")

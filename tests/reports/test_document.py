@@ -3,10 +3,13 @@
 import copy
 import json
 import math
+import re
+from html import escape
 from html.parser import HTMLParser
 
 import pytest
 import vl_convert
+from markdown_it import MarkdownIt
 
 from conservative.outcome import OK
 from conservative.reports import report
@@ -87,10 +90,21 @@ def test_markdown_has_every_block_and_the_picture_in_a_file():
         "| class | µs |\n| --- | ---: |\n| ours (a, b) | 12 (a) |",
         "### Folded",
         "Sorted",
-        "| method | ratio |\n| --- | ---: |\n| <b>\\| | 1.100 |",
+        "| method | ratio |\n| --- | ---: |\n| \\<b>\\| | 1.100 |",
         "|  |  |\n| --- | ---: |\n| command | `conservative` |",
     ]
     assert text == "\n\n".join(parts) + "\n"
+
+
+@pytest.mark.parametrize(
+    "name", ["<img src=x onerror=alert(1)>", "a*b*c", "_a_", "moser_veselov", "[x](y)", "&lt;", r"a\*b", "# x", "a|b", "a/b"]
+)
+def test_markdown_shows_every_name_as_it_is(name):
+    blocks = [Paragraph(f"{name} is slow."), Items([Item(name, name)]), Facts([(name, name)]), Section(name, [Paragraph("x")])]
+    content = Document("c", name, [*blocks, Table(["case", name], [[name, Cell(name)]], name), Figure("f", name, picture=1)])
+    page = MarkdownIt("gfm-like", {"linkify": False}).render(markdown.render(content, lambda figure: "f.svg"))
+    assert page.count(escape(name)) == 12
+    assert not {"img src=x", "<a ", "<em>"} & set(re.findall(r"img src=x|<a |<em>", page))
 
 
 def test_a_picture_needs_a_folder():
