@@ -7,8 +7,10 @@ from .card import Card as Card
 from .errors import AccuracyNotReached as AccuracyNotReached
 from .errors import BadInput as BadInput
 from .errors import Diverged as Diverged
+from .errors import ImpossibleInertia as ImpossibleInertia
 from .errors import IntegrationFailed as IntegrationFailed
 from .errors import InvalidResult as InvalidResult
+from .errors import LargeEnsemble as LargeEnsemble
 from .errors import LoadNotResolved as LoadNotResolved
 from .errors import MissingEngine as MissingEngine
 from .errors import MissingExtra as MissingExtra

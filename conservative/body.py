@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array, triple
 from .check import PickledByFields, read_inertia, read_only, set_fields
+from .errors import ImpossibleInertia
 from .needs import Need, Needs
 from .potentials.load import Given, RotorMomentum
 
 _EQUAL = 4e-15
 """Largest difference of two equal moments of a rotated tensor, relative to the largest: twice the 2e-15 of 3,000 tensors."""
+_ROUND_OFF = 1e-6
+"""Relative excess of a moment over the sum of the others that counts as rounding, as of a plate in a file with seven digits."""
+
+
+def find_impossible(moments: Array) -> Any:
+    """Return whether no mass distribution has these moments (..., 3): one exceeds the sum of the others, beyond round-off."""
+    return 2 * moments.max(axis=-1) > moments.sum(axis=-1) * (1 + _ROUND_OFF)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -40,8 +50,9 @@ class RigidBody(PickledByFields):
     ------
     BadInput
         The inertia is not finite, not symmetric, not positive definite, or of another shape; or a tensor that is not diagonal
-        has moments with a ratio above 1e13. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
-        the equations hold for them, but some engines reject them. Or the rotor momentum is not three finite numbers.
+        has moments with a ratio above 1e13. Or the rotor momentum is not three finite numbers.
+    ImpossibleInertia
+        A warning: no mass distribution has the moments (J1 + J2 < J3). The equations hold for them, but engines reject them.
 
     Attributes
     ----------
@@ -67,6 +78,8 @@ class RigidBody(PickledByFields):
         rotor = None if rotor_momentum is None else np.asarray(rotor_momentum, dtype=float)
         rotor = None if rotor is None or not rotor.any() else read_only(rotor)
         set_fields(self, inertia=read_inertia(inertia), rotor_momentum=rotor, motor=motor)
+        if find_impossible(self.moments):
+            warnings.warn(ImpossibleInertia(self.moments.tolist()), stacklevel=2)
 
     @property
     def needs(self) -> Needs:

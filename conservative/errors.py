@@ -204,6 +204,31 @@ class AccuracyNotReached(UserWarning):
         )
 
 
+class ImpossibleInertia(UserWarning):
+    """No mass distribution has these moments. Attributes: `moments` (3,), kg m^2, and `bodies`, the number of such bodies."""
+
+    def __init__(self, moments: Iterable[float], bodies: int = 1) -> None:
+        self.moments, self.bodies = tuple(moments), bodies
+        numbers = ", ".join(f"{moment:g}" for moment in self.moments)
+        others = f" (and {bodies - 1} more bodies)" if bodies > 1 else ""
+        super().__init__(
+            f"No mass distribution has the moments {numbers} kg m^2{others}: one exceeds the sum of the other two. The "
+            "equations hold for them, as in the problem EULR of Hairer, Nørsett and Wanner, but engines refuse or change such a body. "
+            "Check the units and the axes of the inertia"
+        )
+
+
+class LargeEnsemble(UserWarning):
+    """The samples of an ensemble take much memory. Attribute: `size`, bytes."""
+
+    def __init__(self, size: int, bodies: int, samples: int) -> None:
+        self.size = size
+        super().__init__(
+            f"{samples} samples of {bodies} bodies take {size / 1e9:.2g} GB of memory. Store fewer of them by sample_every, or "
+            "write them to a folder by path"
+        )
+
+
 class LoadNotResolved(UserWarning):
     """Steps are too long for a function of time. Attributes: `dt`, the longest step, `step`, and the `interval`, all s."""
 

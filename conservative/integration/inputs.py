@@ -6,6 +6,7 @@ error.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -16,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
 from ..batch import Batch
-from ..body import RigidBody
+from ..body import RigidBody, find_impossible
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, require_size, rotation
-from ..errors import BadInput, nearest
+from ..errors import BadInput, ImpossibleInertia, nearest
 from ..potentials.turning import static_part
 from ..scene import Scene
 
@@ -102,6 +103,9 @@ def _read_inertia(value: Array) -> Array:
         moments[good] = np.linalg.eigvalsh(tensors[good])
     good &= (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
     _refuse_first("inertia", value, ~good, RigidBody)  # its checks are exact, and accept most of them
+    impossible = find_impossible(moments)
+    if impossible.any():
+        warnings.warn(ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum())), stacklevel=4)
     return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
 
 

@@ -95,6 +95,8 @@ def integrate_many(
         another version of this package.
     NotWritten
         The folder cannot be written, or the disk is full. Finished blocks stay there.
+    ImpossibleInertia, LargeEnsemble
+        Warnings: no mass distribution has an inertia; the samples take more than 1 GB of memory, without a `path`.
     MissingExtra
         Zarr (extra `ensembles`) or Dask (extra `cluster`) is not installed.
     MissingEngine

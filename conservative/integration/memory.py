@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,11 +11,14 @@ import numpy as np
 
 from ..batch import Batch
 from ..drifts import list_drifts
-from ..errors import BadInput
+from ..errors import BadInput, LargeEnsemble
 from ..grid import SAMPLE_BYTES, Grid, most_samples
 from .blocks import LOAD_BYTES, BlockResult
 from .blocks import SAMPLE_BYTES as STORED_BYTES
 from .ensemble import Ensemble
+
+LARGE = 10**9
+"""Size of samples in memory, bytes, above which a run warns before it starts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,5 +57,7 @@ def write_memory(label: str, bodies: Batch, grid: Grid) -> Iterator[Memory]:
     if n * m > (most := most_samples() * SAMPLE_BYTES // size):
         allowed = f"more steps between samples, or a path: {most:.3g} samples of {size} bytes fit in memory"
         raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
+    if n * m * size > LARGE:
+        warnings.warn(LargeEnsemble(n * m * size, n, m), stacklevel=4)
     drifts, supplied = np.empty((n, len(list_drifts(bodies)))), np.empty((n, m, 4)) if loaded else None
     yield Memory(label, bodies, grid, BlockResult(np.empty((n, m, 3, 3)), np.empty((n, m, 3)), drifts, {}, supplied))

@@ -1,4 +1,4 @@
-"""Markdown of a document, with pictures in files next to it. Words in backticks are code; every other text is shown as it is."""
+"""Markdown of a document, with pictures in files next to it. Words in backticks are code, other texts appear as they are."""
 
 from __future__ import annotations
 

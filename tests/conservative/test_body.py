@@ -1,6 +1,7 @@
 """Bodies from tensors, moments and shapes, and their axes of symmetry."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -161,3 +162,29 @@ def test_scipy_rotations_are_accepted_as_attitudes():
         np.testing.assert_allclose(R_WB0, R_BS, atol=1e-15)  # measured 1e-16
     given, same = (free_body(scene.body, R, (0.5, -1.5, 2.5), [2.0])[0] for R in (rotation, R_BS))
     np.testing.assert_allclose(given, same, atol=1e-14)  # measured 0
+
+
+TURN = rotation_about((1, 2, 3), 0.7)
+
+
+@pytest.mark.parametrize("inertia", [(1, 1, 5), (0.5, 2, 3), TURN @ np.diag((1, 2, 3.1)) @ TURN.T])
+def test_moments_of_no_mass_distribution_are_accepted_with_a_warning(inertia):
+    with pytest.warns(cv.ImpossibleInertia) as said:
+        body = cv.RigidBody(inertia)
+    assert said[0].message.moments == tuple(body.moments)
+    assert said[0].filename == __file__
+
+
+@pytest.mark.parametrize("inertia", [(1, 2, 3), (1, 2, 3.000001), (1e-9, 1, 1), TURN @ np.diag((1, 2, 3)) @ TURN.T])
+def test_bodies_of_a_mass_distribution_have_no_warning(inertia):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cv.RigidBody(inertia)
+        cv.integrate_many(cv.scenes.brick_flip(), inertia=np.asarray(inertia)[None], dt=0.1, t_end=0.1, method="moser_veselov")
+
+
+def test_an_ensemble_counts_the_bodies_that_no_mass_distribution_has():
+    inertia = np.array([(1, 2, 2.5), (1, 1, 5), (0.5, 2, 3)])
+    with pytest.warns(cv.ImpossibleInertia) as said:
+        cv.integrate_many(cv.scenes.brick_flip(), inertia=inertia, dt=0.01, t_end=0.01, method="moser_veselov")
+    assert [(each.message.moments, each.message.bodies, each.filename) for each in said] == [((1, 1, 5), 2, __file__)]

@@ -17,7 +17,7 @@ import conservative as cv
 from conservative.attitude import from_quaternion, orthonormality, rotation_about
 from conservative.batch import Batch
 from conservative.drifts import arrange_drifts, find_reference, list_drifts, measure_drifts
-from conservative.integration import blocks, shared_choice
+from conservative.integration import blocks, memory, shared_choice
 from conservative.integration.inputs import read_bodies
 from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
 from conservative.method import Method, Role
@@ -578,3 +578,15 @@ def test_directions_of_a_field_are_normalised():
 def test_a_step_that_is_too_long_for_the_fastest_is_refused_before_any_work():
     with pytest.raises(cv.BadInput, match=r"^dt: got 0.05.*\(body 321\)"):
         cv.integrate_many(scene(), w_WB_B0=changed(W, 321, (300.0, 20, 10)), method="moser_veselov", dt=0.05, t_end=1.0)
+
+
+@pytest.mark.parametrize("how", [{"dt": 0.01, "method": "moser_veselov"}, {"error": 1e-3}])
+def test_an_ensemble_that_fills_the_memory_says_so_before_it_runs(how, monkeypatch):
+    """Here it is more than 2 kB: 1 GB takes a second."""
+    monkeypatch.setattr(memory, "LARGE", 2000)
+    rates, done = np.eye(3), []
+    with pytest.warns(cv.LargeEnsemble, match=r"by sample_every, or write them to a folder by path") as said:
+        found = cv.integrate_many(cv.scenes.brick_flip(), w_WB_B0=rates, t_end=0.5, **how, progress=done.append)
+    assert said[0].message.size == found.R_WB.nbytes + found.w_WB_B.nbytes > 2000
+    assert said[0].filename == __file__
+    cv.integrate_many(cv.scenes.brick_flip(), w_WB_B0=rates, t_end=0.5, **how, sample_every=10**6)

@@ -104,7 +104,7 @@ def test_markdown_shows_every_name_as_it_is(name):
     content = Document("c", name, [*blocks, Table(["case", name], [[name, Cell(name)]], name), Figure("f", name, picture=1)])
     page = MarkdownIt("gfm-like", {"linkify": False}).render(markdown.render(content, lambda figure: "f.svg"))
     assert page.count(escape(name)) == 12
-    assert not {"img src=x", "<a ", "<em>"} & set(re.findall(r"img src=x|<a |<em>", page))
+    assert not re.search("<img src=x|<a |<em>", page)
 
 
 def test_a_picture_needs_a_folder():
