@@ -213,7 +213,7 @@ class ImpossibleInertia(UserWarning):
         others = f" (and {bodies - 1} more bodies)" if bodies > 1 else ""
         super().__init__(
             f"No mass distribution has the moments {numbers} kg m^2{others}: one exceeds the sum of the other two. The "
-            "equations hold for them, as in the problem EULR of Hairer, Nørsett and Wanner, but engines refuse or change such a body. "
+            "equations hold for them, as in the problem EULR of Hairer, Nørsett and Wanner. Engines refuse or change it. "
             "Check the units and the axes of the inertia"
         )
 
@@ -248,6 +248,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "report": ("jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
         "parquet": ("pyarrow",),
+        "xarray": ("xarray",),
         "video": ("matplotlib", "imageio_ffmpeg"),
         "models": ("pxr", "trimesh", "lxml", "cloudpickle"),
         "cluster": ("distributed", "cloudpickle"),

@@ -17,6 +17,7 @@ from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
+    import xarray
 
 COLUMNS = (
     "t",
@@ -36,8 +37,10 @@ UNITS = {"t": "s", "w": "rad/s", "energy": "J", "momentum": "kg m^2/s", "p": "m"
 LEAST_DRAWN = 1e-17
 """Smallest relative drift in a chart, also drawn for smaller ones and 0: a tenth of the round-off of one number."""
 
-MOST_DRAWN = 1000
-"""Largest number of samples in a chart, evenly chosen: more than its pixels, fewer than the 5,000 rows that Altair accepts."""
+MOST_DRAWN = 480
+"""Largest number of points of a line, as many as its pixels: more samples are drawn as an envelope, as fast motions need it."""
+TIME_UNITS = (("days", 86400.0), ("h", 3600.0), ("s", 1.0))
+"""Units of time axes by their length, s. A unit is used from a duration of two on."""
 
 _WIDTH, _HEIGHT = 480, 160
 
@@ -58,6 +61,28 @@ def header(trajectory: Any) -> list[str]:
     """Return the columns with their units, such as `w_WB_B_1 (rad/s)`."""
     units = {name: UNITS.get(name.split("_")[0]) for name in columns(trajectory)}
     return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
+
+
+AXES = {"world": "123", "axis": "123", "part": "wxyz"}
+"""Coordinates of the dimensions of arrays: world axes, body axes and parts of a quaternion."""
+_DIMENSIONS = {"R_WB": ("world", "axis"), "q_WB": ("part",), "w_WB_B": ("axis",), "energy": (), "momentum_W": ("world",)}
+_DIMENSIONS |= {"p_WB": ("world",), "v_WB": ("world",)}
+
+
+def dataset(t: Array, values: dict[str, Array], first: tuple[str, ...] = ("t",), **attributes: str) -> xarray.Dataset:
+    """Return arrays by the names of columns as a dataset, with times t (n,), s, units, and names of the axes.
+
+    Each array has the dimensions `first`, then its own.
+    """
+    import xarray
+
+    variables = {
+        name: ((*first, *_DIMENSIONS[name]), array, {"units": unit} if (unit := UNITS.get(name.split("_")[0])) else {})
+        for name, array in values.items()
+    }
+    used = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & AXES.keys()
+    coordinates = {"t": ("t", t, {"units": "s"}), **{name: list(AXES[name]) for name in sorted(used)}}
+    return xarray.Dataset(variables, coordinates, attributes)
 
 
 def picture(trajectory: Any) -> altair.VConcatChart:
@@ -102,27 +127,41 @@ def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
     return Offline.from_dict(chart.to_dict(), validate=False)
 
 
-def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
-    """Return one line for each of `series`, (n,), over time."""
+def time_unit(duration: float) -> tuple[str, float]:
+    """Return the unit of an axis of time for a duration in s, "s", "h" or "days", and its length, s."""
+    return next(((name, length) for name, length in TIME_UNITS if duration >= 2 * length), TIME_UNITS[-1])
+
+
+def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> Any:
+    """Return one line for each of `series`, (n,), over time.
+
+    Of many samples, each interval has its largest value on a logarithmic axis, and the band of all values on a linear one.
+    """
     import altair as alt
     import pandas as pd
 
-    drawn = np.unique(np.linspace(0, len(trajectory) - 1, MOST_DRAWN).astype(int))
-    t = trajectory.t[drawn]
-    data = pd.concat([pd.DataFrame({"t": t, "of": name, "value": values[drawn]}) for name, values in series.items()])
-    axis = alt.Axis(format=".0e" if scale == "log" else "")
-    tooltip = [alt.Tooltip("of:N", title="what"), alt.Tooltip("t:Q", title="time, s"), alt.Tooltip("value:Q", format=".6g")]
-    return (
-        alt.Chart(data, width=_WIDTH, height=_HEIGHT)
-        .mark_line()
-        .encode(
-            x=alt.X("t:Q", title="time, s"),
-            y=alt.Y("value:Q", title=quantity, axis=axis, scale=alt.Scale(type=scale)),
-            color=alt.Color("of:N", title=quantity, sort=list(series)),
-            tooltip=tooltip,
-        )
-        .interactive(name=f"zoom_{scale}", bind_y=False)
+    n, (unit, length) = len(trajectory), time_unit(float(trajectory.t[-1]))
+    starts = ends = np.arange(n)
+    if many := n > MOST_DRAWN:
+        starts, ends = (np.linspace(0, n - 1, MOST_DRAWN + 1).astype(int)[part] for part in (slice(-1), slice(1, None)))
+    t, tables = (trajectory.t[starts] + trajectory.t[ends]) / 2 / length, []
+    for name, values in series.items():  # an interval has both its ends, so that bands join
+        low, high = (each(each.reduceat(values, starts), values[ends]) for each in (np.minimum, np.maximum))
+        tables.append(pd.DataFrame({"t": t, "of": name, "value": high, "low": low}))
+    base = alt.Chart(pd.concat(tables), width=_WIDTH, height=_HEIGHT).encode(
+        x=alt.X("t:Q", title=f"time, {unit}"),
+        y=alt.Y("value:Q", title=quantity, axis=alt.Axis(format=".0e") if scale == "log" else {}, scale=alt.Scale(type=scale)),
+        color=alt.Color("of:N", title=quantity, sort=list(series)),
+        tooltip=[
+            alt.Tooltip("of:N", title="what"),
+            alt.Tooltip("t:Q", title=f"time, {unit}"),
+            *(alt.Tooltip(f"{name}:Q", format=".6g") for name in ("value", "low")[: 1 + (many and scale == "linear")]),
+        ],
     )
+    line: Any = base.mark_line(strokeWidth=1.5)
+    if many and scale == "linear":  # the lines show where the band is thin, as in slow motions
+        line = base.mark_area(opacity=0.35).encode(y2="low:Q") + line + line.encode(y="low:Q")
+    return line.interactive(name=f"zoom_{scale}", bind_y=False)
 
 
 def html_table(caption: str, rows: list[tuple[str, str]]) -> str:

@@ -25,6 +25,7 @@ from .scene import Scene
 if TYPE_CHECKING:
     import altair
     import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +172,19 @@ class Trajectory:
         frame = pd.DataFrame(presentation.samples(self), columns=presentation.columns(self))
         frame.attrs = {"scene": self.scene.name, "method": self.label, "outcome": str(self.outcome)}
         return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return a dataset of R_WB, q_WB, w_WB_B, energy and momentum_W, and in free flight p_WB and v_WB; units as above.
+
+        Raises
+        ------
+        MissingExtra
+            xarray, of the extra `xarray`, is not installed.
+        """
+        require_extra("Trajectory.to_xarray", "xarray", "xarray")
+        state = {"R_WB": self.R_WB, "q_WB": self.quaternion_wxyz, "w_WB_B": self.w_WB_B}
+        values = state | {"energy": self.energy, "momentum_W": self.momentum_W} | dict(zip(("p_WB", "v_WB"), self.place))  # noqa: B905
+        return presentation.dataset(self.t, values, scene=self.scene.name, method=self.label, outcome=str(self.outcome))
 
     def plot(self) -> altair.VConcatChart:
         """Return a chart of the body rates and of the drift of every invariant over time.

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import unit_vector
-from ..presentation import LEAST_DRAWN
+from ..presentation import LEAST_DRAWN, time_unit
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
@@ -43,10 +43,11 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
     elif (axis := ensemble.bodies.take(0).symmetry_axis_B) is None:
         axis = np.array([0.0, 0.0, 1.0])
     along, m = np.flatnonzero(axis == 1), len(ensemble.t)
+    unit, length = time_unit(float(ensemble.t[-1]))
     named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis)})"
     ends, shown = sorted({0, m - 1}), np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
     discs = [
-        draw_pointing(directions_W, f"Body axis {named} at t = {ensemble.t[sample]:.6g} s")
+        draw_pointing(directions_W, f"Body axis {named} at t = {ensemble.t[sample] / length:.6g} {unit}")
         for sample, directions_W in zip(ends, directions(ensemble.R_WB, axis, ends), strict=True)
     ]
     quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, shown), shown)
@@ -60,11 +61,12 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
 def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
     """Return a chart of the median and the 90 % band of angles from the mean attitude, (s, 3), rad, over times (s,), s."""
     low, middle, high = np.degrees(quantiles).T
-    data = pd.DataFrame({"t": t, "low": low, "middle": middle, "high": high})
+    unit, length = time_unit(float(t[-1]))
+    data = pd.DataFrame({"t": t / length, "low": low, "middle": middle, "high": high})
     positive = low[low > 0]
     wide = len(positive) == len(low) and high.max() > 1000 * positive.min()
     scale = alt.Scale(type="log" if wide else "linear")
-    base = alt.Chart(data, width=_WIDTH, height=_HEIGHT).encode(x=alt.X("t:Q", title="time, s"))
+    base = alt.Chart(data, width=_WIDTH, height=_HEIGHT).encode(x=alt.X("t:Q", title=f"time, {unit}"))
     y = alt.Y("low:Q", title="angle from the mean, °", scale=scale)
     band = base.mark_area(opacity=0.25, color=BLUE).encode(y=y, y2="high:Q")
     line = base.mark_line(color=BLUE, point=len(t) == 1).encode(

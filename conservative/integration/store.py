@@ -228,7 +228,7 @@ def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
     Raise `BadInput` if it contains something else, or an ensemble although `resume` is False; `NotWritten` if it cannot be
     created; and `MissingExtra` without Zarr, of the extra `ensembles`.
     """
-    require_extra("path", "ensembles")
+    require_extra("path", "ensembles", "zarr")
     place = Path(path).absolute()
     try:
         if not any(place.iterdir()):
@@ -360,7 +360,7 @@ def _require_shapes(record: Mapping[str, Any], arrays: Mapping[str, Any]) -> Non
 
 def open_store(path: str | Path) -> Store:
     """Return a complete store for reading. Raise `BadInput` or `MissingExtra` as `open_ensemble` does."""
-    require_extra("open_ensemble", "ensembles")
+    require_extra("open_ensemble", "ensembles", "zarr")
     place = Path(path).absolute()
     record = read_record(place, "the folder of an ensemble that integrate_many has written")
     store, n = _open(place, record, "r"), record["bodies"]

@@ -8,6 +8,8 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
+from conservative.presentation import time_unit
+
 from ..document.cells import tolerance
 from ..rows.names import MethodClass
 from .style import HEIGHT, PALETTE, SHAPES, WIDTH, apply_style, colours, families_of, look, power_axis, scale
@@ -87,6 +89,12 @@ def best_of_families(picture: pd.DataFrame) -> Any:
     return apply_style(chart)
 
 
+def _over_time(rows: pd.DataFrame) -> tuple[pd.DataFrame, alt.X]:
+    """Return rows with times t, s, and the axis of their times, in the unit of the axis."""
+    unit, length = time_unit(float(rows["t"].max()))
+    return rows.assign(t=rows["t"] / length), alt.X("t:Q", title=f"t, {unit}", scale=alt.Scale(nice=False))
+
+
 def signed_drift(drifts: pd.DataFrame) -> Any:
     """Return the drift over time with its sign, from `lines.signed_drifts` of a scene, a panel for each invariant."""
     channels = look(families_of(drifts), "strokeDash", title="method", symbolSize=300)
@@ -99,8 +107,9 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
             title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"
         )
         y = alt.Y("drift:Q", axis=axis, scale=alt.Scale(type="symlog", constant=1e-14, nice=False))
+        part, x = _over_time(part)
         chart = alt.Chart(part, width=WIDTH, height=HEIGHT, title=str(kind)).mark_line(strokeWidth=2)
-        panels.append(chart.encode(x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)), y=y, **channels))
+        panels.append(chart.encode(x=x, y=y, **channels))
     return apply_style(alt.hconcat(*panels))
 
 
@@ -109,8 +118,8 @@ def judged(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
     panels = []
     shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))[rows["t"] > rows["t"].min()]
     for kind, part in shown.groupby("quantity", sort=False):
+        part, x = _over_time(part)
         base = alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 130, title=f"{name}: {kind}").mark_line(strokeWidth=1.4)
-        x = alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False))
         limit = limits.get(str(kind))
         sizes = part["shown"] if limit is None else pd.concat([part["shown"], pd.Series([limit])])
         y = alt.Y(**log_channel("shown", "size" if limit is None else "size; dashed: allowed", sizes))

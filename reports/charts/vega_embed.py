@@ -43,7 +43,7 @@ SHOWN: dict[str, Shown] = {
         ("microseconds", "Q", "µs per simulated second"),
         ("sample", "Q", f"µs a sample, of {step_ladder.SAMPLES}"),
         ("dt", "Q", "step, s"),
-        ("t", "Q", "t, s"),
+        ("t", "Q", "t"),
         ("drift", "Q", "largest drift so far"),
         ("name", "N", "method"),
         ("setting", "N", "setting"),
