@@ -22,8 +22,8 @@ from conservative.trajectory import Trajectory
 
 from .frames import COLOURS, make_panels, speeds
 
-KINDS = (".html", ".gif", ".mp4")
-"""Endings of files that contain an animation."""
+KINDS = (".html", ".gif", ".mp4", ".png")
+"""Endings of files that contain an animation, or its last frame."""
 MARK = "Written by conservative watch"
 """Text near the beginning of each such file."""
 _HERE = Path(__file__).parent
@@ -42,14 +42,14 @@ class Animation:
     truth: int | None = None
 
     def save(self, path: str | Path) -> None:
-        """Write a page (.html), or a video (.gif, .mp4); an existing file is replaced.
+        """Write a page (.html), a video (.gif, .mp4), or the last frame (.png); an existing file is replaced.
 
         Raises
         ------
         BadInput
             The name has another ending, or the file cannot be written; or as in `element`.
         MissingExtra
-            A package is not installed: for pages of the extra `report`, for videos of `video`.
+            A package is not installed: for pages of the extra `report`, for videos and frames of `video`.
         """
         write_bytes(Path(path), self.render(Path(path).suffix), "path")
 
@@ -60,7 +60,8 @@ class Animation:
         if kind == ".html":
             motion = element(self.trajectories, self.labels, truth=self.truth)
             name = self.trajectories[0].scene.name
-            return _fill("page.html.j2", name=name, mark=MARK, motion=motion, script=script()).encode()
+            page = {"name": name, "mark": MARK, "motion": motion, "script": script(), "panels": len(self.trajectories)}
+            return _fill("page.html.j2", **page).encode()
         from .video import draw
 
         return draw(*make_panels(self.trajectories, self.labels, self.truth), self.truth, kind, MARK, progress)

@@ -1,4 +1,4 @@
-"""Animations as .gif and .mp4: the scene of the page, drawn by matplotlib."""
+"""Animations as .gif and .mp4, and their last frame as .png: the scene of the page, drawn by matplotlib."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from .frames import COLOURS, FACES, Panel, speeds
 ARROW, TRACE, OUTLINE, INK = (str(COLOURS[name]) for name in ("arrow", "trace", "outline", "ink"))
 RATES = {".gif": 12.5, ".mp4": 30.0}
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, BELOW, DPI = 1.92, 0.64, 100
-"""Sides of the picture of a panel and of the text below it, inches; multiples of 16 pixels, which encoders ask for."""
+SIDE, BELOW, DPI, FINE = 1.92, 0.64, 100, 300
+"""Sides of the picture of a panel and of the text below it, inches: multiples of 16 pixels, which encoders ask for. Pixels per
+inch of a video, and of a single frame."""
 TILT, TURN = 20.0, 34.4
 """Direction to the eye, degrees, as in the page."""
 EYE = np.array([math.cos(math.radians(TURN)), math.sin(math.radians(TURN)), math.tan(math.radians(TILT))])
@@ -32,7 +33,7 @@ _SIDES = [np.flatnonzero(_CORNERS[:, axis] == sign / 2)[[0, 1, 3, 2]] for axis i
 def draw(
     times: Array, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
 ) -> bytes:
-    """Return a video with an ending of `RATES`, at the default speed, with `mark` as its comment.
+    """Return a video with an ending of `RATES`, at the default speed, or the last frame, .png, with `mark` as its comment.
 
     Raises
     ------
@@ -40,7 +41,17 @@ def draw(
         matplotlib, or for .mp4 imageio-ffmpeg, is not installed.
     """
     require_extra(f"Writing {kind}", "video", "matplotlib", *["imageio_ffmpeg"] * (kind == ".mp4"))
-    images = _images(times, panels, truth, RATES[kind], progress)
+    if kind == ".png":
+        from PIL import Image, PngImagePlugin
+
+        out, comment = io.BytesIO(), PngImagePlugin.PngInfo()
+        comment.add_text("Comment", mark)
+        (image,) = _images(times, panels, truth, [len(times) - 1], FINE, progress)
+        Image.fromarray(image).save(out, "PNG", pnginfo=comment, dpi=(FINE, FINE))
+        return out.getvalue()
+    count = max(2, round(times[-1] / speeds(times[-1])[2] * RATES[kind]))
+    shown = np.linspace(0, len(times) - 1, count).round().astype(int).tolist()
+    images = _images(times, panels, truth, shown, DPI, progress)
     if kind == ".gif":
         from PIL import Image, ImageColor
 
@@ -67,21 +78,20 @@ def draw(
 
 
 def _images(
-    times: Array, panels: Sequence[Panel], truth: int | None, rate: float, progress: Callable[[float], None]
+    times: Array, panels: Sequence[Panel], truth: int | None, shown: Sequence[int], dpi: int, progress: Callable[[float], None]
 ) -> Iterator[Any]:
-    """Yield the images (height, width, 3) of a video, bytes."""
+    """Yield the images (height, width, 3), bytes, of the frames with the numbers `shown`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     columns, rows = min(len(panels), 4), math.ceil(len(panels) / 4)
-    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + BELOW)), dpi=DPI)
+    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + BELOW)), dpi=dpi)
     canvas: Any = FigureCanvasAgg(figure)
     axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
     figure.subplots_adjust(0, BELOW / (SIDE + BELOW) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=BELOW / SIDE)
     clock = figure.text(0.01, 0.99, "", va="top", size=8, color=INK)
-    count = max(2, round(times[-1] / speeds(times[-1])[2] * rate))
-    for number, frame in enumerate(np.linspace(0, len(times) - 1, count).round().astype(int)):
-        progress(number / count)
+    for number, frame in enumerate(shown):
+        progress(number / len(shown))
         exact = None if truth is None else panels[truth]
         for axis, panel in zip(axes, panels, strict=True):
             _draw_panel(axis, panel, frame, None if panel is exact else exact)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
 from conservative.attitude import Array
+from conservative.scene import Scene
 
 from .style import PALETTE, colours
 from .vega_embed import Spec, as_csv
@@ -14,18 +17,49 @@ TURN, TILT = np.deg2rad(35.0), np.deg2rad(25.0)
 """Direction of the view of the spheres, rad: about the vertical axis, and above the horizontal plane."""
 BEHIND = 0.3
 """Opacity of points behind the sphere."""
+_ANGLES = np.linspace(0, 2 * np.pi, 241)
+_CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=1)
+_CIRCLES = [np.roll(_CIRCLE[::4], shift, axis=1) for shift in range(3)]
+"""Great circles of the unit sphere."""
 
 
-def chart(curve: pd.DataFrame) -> Spec:
+def polhode(scene: Scene) -> Array | None:
+    """Return the polhode of a free body, closed (n, 3), in principal axes and the momentum's length; None for another scene.
+
+    It is where the sphere of the momentum meets the ellipsoid of the energy, an ellipse seen along the axis that it is around.
+    """
+    if not scene.free or scene.body.rotor_momentum is not None:
+        return None
+    moments, axes = np.linalg.eigh(scene.body.inertia)
+    momentum = scene.body.momentum(scene.w_WB_B0) @ axes
+    start, inverse = momentum / np.linalg.norm(momentum), 1 / moments
+    energy = float(inverse @ start**2)
+    around = 2 if energy < inverse[1] else 0  # of the largest moment, or the smallest
+    others = [axis for axis in range(3) if axis != around]
+    gaps = np.abs(inverse[others] - inverse[around])
+    if not gaps.all():  # the momentum rests in a body of revolution that turns across its axis, or in a sphere
+        return np.stack([start, start])
+    ellipse = _CIRCLE[:, :2] * np.sqrt(np.abs(energy - inverse[around]) / gaps)
+    along = np.sqrt(np.maximum(1 - (ellipse**2).sum(axis=1), 0)) * (np.sign(start[around]) or 1.0)
+    return np.insert(ellipse, around, along, axis=1)
+
+
+def chart(curve: pd.DataFrame, exact: Array | None = None) -> Spec:
     """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    The samples are dots, as a line between them would cut corners: a turn of the brick has only a few samples.
+    The samples are dots, as a line between them would cut corners: a turn of the brick has only a few samples. The exact curve
+    (n, 3) below them, such as a polhode, is a line.
     """
     name, family = curve[["name", "family"]].iloc[0]
     colour = colours({name: family})[name]
     across, up, near = _project(curve[["x", "y", "z"]].to_numpy())
     sides = ((near < 0, BEHIND), (near >= 0, 1.0))
-    layers = [_great_circles(), *(_dots(across[side], up[side], colour, opacity) for side, opacity in sides)]
+    layers = [_lines(_CIRCLES, PALETTE["grey"], 0.6, 0.5)]
+    if exact is not None:
+        parts = _split(exact)
+        for side, opacity in ((False, BEHIND), (True, 1.0)):
+            layers.append(_lines([part for part, near in parts if near == side], PALETTE["black"], 1.2, opacity))
+    layers += [_dots(across[side], up[side], colour, opacity) for side, opacity in sides]
     return {
         "usermeta": {"name": name},
         "width": 190,
@@ -64,19 +98,22 @@ def _line(colour: str, width: float, opacity: float) -> Spec:
     return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}  # of points: their own
 
 
-def _great_circles() -> Spec:
-    """Return three great circles of the unit sphere."""
-    angles = np.linspace(0, 2 * np.pi, 61)
-    c, s, zero = np.cos(angles), np.sin(angles), np.zeros_like(angles)
-    circles = [np.stack(circle, axis=1) for circle in ((c, s, zero), (c, zero, s), (zero, c, s))]
+def _split(curve: Array) -> list[tuple[Array, bool]]:
+    """Return the parts of a curve (n, 3) behind the sphere and before it, and which of both; neighbours share a point."""
+    near = _project(curve)[2] >= 0
+    starts = [0, *(np.flatnonzero(np.diff(near)) + 1).tolist()]
+    return [(curve[start : end + 1], bool(near[start])) for start, end in zip(starts, [*starts[1:], len(curve)], strict=True)]
+
+
+def _lines(curves: Sequence[Array], colour: str, width: float, opacity: float) -> Spec:
     rows = [
         {"part": f"p{number}", "k": k, "across": x, "up": y}
-        for number, circle in enumerate(circles)
-        for k, (x, y, _) in enumerate(_project(circle).T.tolist())
+        for number, curve in enumerate(curves)
+        for k, (x, y, _) in enumerate(_project(curve).T.tolist())
     ]
     return {
         "data": as_csv(rows, ("part", "k", "across", "up")),
-        "mark": _line(PALETTE["grey"], 0.6, 0.5),
+        "mark": _line(colour, width, opacity),
         "encoding": _encoding() | {"detail": {"field": "part"}},
     }
 

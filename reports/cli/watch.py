@@ -32,6 +32,7 @@ from .options import (
         "conservative watch brick_flip -m mujoco:Euler,reduced,exact",
         "conservative watch lagrange_top -m mujoco:RK4,taylor --dt 0.01 --out top.html",
         "conservative watch brick_flip -m mujoco:Euler,pybullet,reduced,exact --out brick.gif",
+        "conservative watch brick_flip -m reduced,exact --out brick.png      the last frame",
     ),
 )
 @scene_argument
@@ -53,7 +54,7 @@ from .options import (
     type=Output("Written by conservative watch"),
     default="watch.html",
     show_default=True,
-    help="File that ends in .html, .gif or .mp4. The last two need the extra `video`.",
+    help="File that ends in .html, .gif or .mp4, or in .png for the last frame. All but .html need the extra `video`.",
 )
 def watch(
     scene: str,

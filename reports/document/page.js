@@ -74,6 +74,14 @@
     }
   }
 
+  const mark = (scroll) => scroll.classList.toggle("more", scroll.scrollLeft + scroll.clientWidth < scroll.scrollWidth - 8);
+  const sized = new ResizeObserver((entries) => { for (const { target } of entries) mark(target.closest(".scroll")); });
+  for (const scroll of document.querySelectorAll(".scroll")) {
+    scroll.addEventListener("scroll", () => mark(scroll), { passive: true });
+    sized.observe(scroll);
+    sized.observe(scroll.querySelector("table"));
+  }
+
   // Figures are drawn one after the other and tables are made sortable last, so that the page responds at once.
   const pause = () => new Promise((done) => setTimeout(done, 0));
   let drawing = Promise.resolve(), equipped;

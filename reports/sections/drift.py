@@ -56,11 +56,12 @@ def spheres_figure(measured: Measured, scene: Scene, methods: Sequence[str] | No
     title, words = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
     if scene.free:
         title = "polhode on the momentum sphere"
-        words = "The angular momentum in body axes. The exact curve is closed; drift widens it or leaves the sphere."
+        words = "The angular momentum in body axes. Line: the exact curve, which is closed. Drift leaves it, or the sphere."
     absent = "" if methods else ", ".join(sorted(_competitors(measured) - set(curves["method"])))
     failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
     name = f"sphere_{scene.name}" if methods is None else "polhodes"
-    panels = [spheres.chart(curve) for _, curve in curves.groupby("name", sort=False)]
+    exact = spheres.polhode(scene)
+    panels = [spheres.chart(curve, exact) for _, curve in curves.groupby("name", sort=False)]
     return Figure(name, f"{scene.name}: {title}", words + failed, panels=panels, layout=Layout.SPHERES)
 
 

@@ -173,6 +173,12 @@ def read_frames(file, shape=None):
     return np.frombuffer(pixels, np.uint8).reshape(-1, *shape, 3)
 
 
+def faces_to_the_eye(panel, R):
+    """Return the projected area of each face of a box at an attitude (3, 3), negative for those turned away, by colour."""
+    towards = np.repeat(R.T @ video.EYE, 2) * np.tile([1, -1], 3)
+    return dict(zip(FACES, towards * np.repeat(panel.size.prod() / panel.size, 2), strict=True))
+
+
 def test_a_gif_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(motions, tmp_path, monkeypatch):
     monkeypatch.setitem(video.RATES, ".gif", 2.0)
     motions[0].animate(labels=["a", "b"], truth=motions[1]).save(tmp_path / "a.gif")
@@ -182,9 +188,7 @@ def test_a_gif_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(motions,
     chosen = np.linspace(0, len(times) - 1, len(images)).round().astype(int)
     for image, R in zip(images, panels[0].R_WP[chosen], strict=True):
         found = counts(image[:, image.shape[1] // 2 :])
-        towards = np.repeat(R.T @ video.EYE, 2) * np.tile([1, -1], 3)
-        areas = towards * np.repeat(panels[0].size.prod() / panels[0].size, 2)
-        for colour, area in zip(FACES, areas, strict=True):
+        for colour, area in faces_to_the_eye(panels[0], R).items():
             if abs(area) > 0.15:  # an edge on its own has pixels of blended colours
                 assert (found.get(colour, 0) > 30) == (area > 0)
         assert found[COLOURS["arrow"]] > 30  # measured 51
@@ -201,6 +205,23 @@ def test_watch_writes_a_video_and_replaces_its_own(kind, tmp_path, monkeypatch):
     assert images.shape == (10, 256, 384, 3)
     assert np.abs(images[0].astype(float) - images[-1]).mean() > 1  # measured 10: it moves
     assert list(tmp_path.iterdir()) == [out]
+
+
+def test_watch_writes_the_last_frame_and_replaces_its_own(tmp_path):
+    out = tmp_path / "brick.png"
+    for _ in range(2):
+        done = watch("brick_flip", "-m", "moser_veselov,exact", "--t-end", "1", "--out", out)
+        assert done.exit_code == 0, done.output
+    with Image.open(out) as image:
+        assert (image.size, image.text) == ((1152, 768), {"Comment": MARK})  # 2 panels at 300 pixels per inch
+        found = counts(np.asarray(image.convert("RGB")))
+    _, (panel,) = make_panels([Exact().solve(cv.scenes.brick_flip(), cv.Grid(0.005, 200))], ["a"], None)
+    areas = faces_to_the_eye(panel, panel.R_WP[-1])
+    assert [found.get(colour, 0) > 1000 for colour, area in areas.items() if abs(area) > 0.15] == [
+        area > 0 for area in areas.values() if abs(area) > 0.15
+    ]
+    out.write_bytes(b"of a user")
+    assert watch("brick_flip", "--out", out).exit_code == 2
 
 
 def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():

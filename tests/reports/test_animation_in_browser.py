@@ -116,6 +116,20 @@ def test_reduced_motion_waits_for_play_and_a_keyboard_plays_and_moves(browser):
     assert browser.execute_script(time) == pytest.approx(0.006)
 
 
+@pytest.mark.parametrize(("width", "share"), [(1280, 0.7), (390, 0.2)])
+def test_the_bodies_fill_the_window_and_nothing_is_below_it(browser, width, share):
+    size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        wait(browser, f"return innerWidth === {width}")
+        script = "return [document.querySelector('canvas').clientHeight / innerHeight, document.documentElement.scrollHeight]"
+        height, page = browser.execute_script(script)
+        assert height >= share  # measured 0.75 and 0.22; before 0.3 at 1280 px
+        assert page <= 800
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_it_plays_by_itself_otherwise(page, tmp_path):
     browser = opened(page, tmp_path, *WEBGL)
     try:

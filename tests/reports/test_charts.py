@@ -8,8 +8,10 @@ import pandas as pd
 import pytest
 import vl_convert
 
+import conservative as cv
 from conservative import Reduced, Role, registry
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.motion import project_on_sphere
 from conservative.reports.charts import figures, recommendation, spheres
 from conservative.reports.charts.style import _OTHERS, PALETTE, SHAPES, colours, look, power_axis, svg_text
 from conservative.reports.document.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
@@ -78,6 +80,34 @@ def test_the_far_side_of_a_sphere_is_faint():
     behind, before = spheres.chart(curve)["layer"][1:]
     assert ["values" in layer["data"] and layer["data"]["values"].count("\n") for layer in (behind, before)] == [2, 2]
     assert behind["mark"]["opacity"] < before["mark"]["opacity"]
+
+
+@pytest.mark.parametrize(
+    ("moments", "rates"),
+    [
+        ((13, 5, 10), (0.01, 0.02, 10)),
+        ((1, 2, 2.5), (3, 0.1, 0.2)),
+        ((1, 2, 2.5), (0.1, 0.1, -3)),
+        ((1, 1, 1.5), (1, 2, 3)),
+        ((1, 2, 2), (1, 2, -3)),
+        ((2, 2, 2), (1, 2, 3)),
+        ((1, 1, 1.5), (1, 2, 0)),
+        ((1, 2, 2.5), (0, 0, 2)),
+    ],
+)
+def test_a_polhode_is_closed_and_goes_through_the_exact_motion(moments, rates):
+    scene = cv.Scene("s", cv.RigidBody(moments), np.eye(3), rates, 20.0)
+    curve, run = spheres.polhode(scene), registry.method("exact").solve(scene, cv.Grid(0.05, 400))
+    points = project_on_sphere(run)
+    np.testing.assert_allclose(curve[0], curve[-1], atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(np.linalg.norm(curve, axis=1), 1, atol=1e-14)  # measured 2e-16
+    energy = (curve**2 / np.sort(moments)).sum(axis=1)
+    np.testing.assert_allclose(energy, (points[0] ** 2 / np.sort(moments)).sum(), rtol=1e-13)  # measured 1e-15
+    apart = [np.linalg.norm(curve - point, axis=1).min() for point in points]
+    assert max(apart) < 0.06  # measured 0.047: between two points of the curve
+    parts = spheres._split(curve)
+    assert sum(len(part) - 1 for part, _ in parts) == len(curve) - 1  # no gap where the curve passes behind the sphere
+    assert spheres.polhode(cv.scenes.lagrange_top()) is spheres.polhode(cv.scenes.volterra_gyrostat()) is None
 
 
 def test_samples_on_a_sphere_are_not_joined():

@@ -258,6 +258,40 @@ def test_a_control_that_is_bad_is_found_by_axe(opened):
     assert "button-name" in {violation["id"] for violation in found["violations"]}
 
 
+AT_390 = """
+    const left = [...document.querySelectorAll('#motion figure')].map((e) => e.getBoundingClientRect().left);
+    const tables = [...document.querySelectorAll('.scroll')].filter((e) => e.checkVisibility());
+    const hints = (e) => [e.classList.contains('more'), getComputedStyle(e).maskImage !== 'none'];
+    const wide = tables.filter((e) => e.scrollWidth > e.clientWidth + 8), before = wide.map(hints);
+    wide.forEach((e) => { e.scrollLeft = e.scrollWidth; });
+    const empty = [...document.querySelectorAll('.scroll tbody tr')].filter((e) => e.checkVisibility()).map((row) => {
+      const heights = [...row.cells].map((cell) => {
+        const range = document.createRange();
+        range.selectNodeContents(cell);
+        return range.getBoundingClientRect().height;
+      });
+      return row.offsetHeight - Math.max(...heights.slice(0, 2));
+    });
+    requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]({
+      columns: new Set(left).size, tables: wide.length, before, after: wide.map(hints), empty: Math.max(...empty),
+    })));
+"""
+
+
+def test_phone_has_two_panels_in_a_row_low_rows_and_a_sign_at_tables_that_scroll(opened):
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    opened.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        wait(opened, "return innerWidth <= 390 && document.querySelector('.scroll.more')")
+        found = opened.execute_async_script(AT_390)
+        assert (found["columns"], found["tables"] >= 2) == (2, True)
+        assert found["before"] == [[True, True]] * found["tables"]
+        assert found["after"] == [[False, False]] * found["tables"]
+        assert found["empty"] < 40  # px beside the first two cells: a line and the padding; measured 33
+    finally:
+        opened.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_phone_has_no_sideways_scrolling_of_the_page(opened):
     size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     opened.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
