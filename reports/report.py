@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from conservative import files
 from conservative.errors import BadInput
@@ -52,7 +52,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
             from .sections.report import build  # here, as altair takes a second to import
 
             document = build(plan, measurements, source)
-            render(document, folder, plan.png)
+            render(document, folder, plan.png, plan.latex)
             files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
             render_pages(document, folder)
             names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
@@ -65,30 +65,42 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     return document
 
 
-def render(document: Document, folder: Path, png: bool) -> None:
-    """Write report.md with its pictures, and the page."""
-    from .document import html, markdown
+def render(document: Document, folder: Path, png: bool, latex: bool = False) -> None:
+    """Write report.md with its pictures, the page and, if `latex`, the tables in report.tex."""
+    from .document import html, markdown, text
+
+    files.write_text(folder / "report.md", markdown.render(document, draw_into(folder, png)), "out")
+    files.write_text(folder / "index.html", html.render(document), "out")
+    if latex:
+        files.write_text(folder / "report.tex", text(document, "latex"), "out")
+
+
+def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:
+    """Return a function that draws a figure as SVG and PDF, and as PNG if `png`, and returns the name of the SVG.
+
+    Files in the folder with another content than such a picture are not replaced.
+    """
+    from .charts.style import picture_file
+    from .document import SVG_MARK
 
     names = dict[str, str]()
 
+    def is_taken(name: str, figure: Figure) -> bool:
+        """Return whether another figure has the name, also on a disk that takes a name in capitals for the same, or a user."""
+        if names.get(name.casefold(), figure.name) != figure.name:
+            return True
+        svg, others = folder / f"{name}.svg", [folder / f"{name}{kind}" for kind in (".pdf", ".png")]
+        if svg.exists():
+            return not svg.read_text(encoding="utf-8", errors="replace").startswith(SVG_MARK)
+        return any(each.exists() for each in others)
+
     def draw(figure: Figure) -> str:
         name = files.safe_name(figure.name)
-        while names.setdefault(name.casefold(), figure.name) != figure.name:  # some disks take a name in capitals for the same
+        while is_taken(name, figure):
             name += "_"
-        return save_picture(figure.picture, folder / name, png)
+        names[name.casefold()] = figure.name
+        for kind in (".svg", ".pdf", *[".png"] * png):
+            files.write_bytes(folder / f"{name}{kind}", picture_file(figure.picture, kind), "out")
+        return f"{name}.svg"
 
-    files.write_text(folder / "report.md", markdown.render(document, draw), "out")
-    files.write_text(folder / "index.html", html.render(document), "out")
-
-
-def save_picture(chart: Any, path: Path, png: bool) -> str:
-    """Write a picture as SVG, and as PNG if `png`; return the name of the SVG."""
-    import vl_convert
-
-    from .charts.style import specification
-
-    picture, svg = specification(chart), path.with_suffix(".svg")
-    files.write_text(svg, vl_convert.vegalite_to_svg(picture), "out")
-    if png:
-        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(picture, scale=2), "out")
-    return svg.name
+    return draw

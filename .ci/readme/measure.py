@@ -204,11 +204,11 @@ def _date(path: Path) -> str:
 def draw(report: Path, picture: Path) -> None:
     """Draw time against error on the Lagrange top, for a few methods of a report; `picture` ends in .svg."""
     from conservative.reports.charts import figures
-    from conservative.reports.report import save_picture
+    from conservative.reports.charts.style import svg_text
     from conservative.reports.rows.names import MethodClass
     from conservative.reports.rows.points import front
 
     table = _read(report / "measurements.csv")
     few = points(with_names(table[(table["scene"] == "lagrange_top") & table["series"].isin(PICTURED)]))
     best = front(few[few["class"] != MethodClass.SOLUTION])
-    save_picture(figures.work_precision(few, best, "lagrange_top"), picture, png=False)
+    picture.write_text(svg_text(figures.work_precision(few, best, "lagrange_top")), encoding="utf-8")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import altair as alt
+import numpy as np
 import pandas as pd
 
 from conservative.presentation import time_unit
@@ -30,6 +32,8 @@ CLASS_DASHES = {name: dash for name, (_, dash) in _CLASSES.items()}
 _ENGINE_COLOURS = tuple(
     PALETTE[name] for name in ("blue", "vermilion", "green", "orange", "purple", "indigo", "sky", "wine", "olive", "teal")
 )
+_GROWTHS = (("∝ √t", 0.5), ("∝ t", 1.0))
+"""Growth of an error whose parts are random, and of one whose parts have the same direction."""
 _KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
 
 
@@ -44,21 +48,59 @@ def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, 
     }
 
 
+def _with_range(points: pd.DataFrame, name: str = "microseconds") -> pd.DataFrame:
+    """Return points with times in µs: the geometric mean of all processes, and the range of these, low and high.
+
+    Times of a single process have no range: both ends are the time.
+    """
+    ends = []
+    for each, mean in zip(points["times"] if "times" in points else points["time"], points["time"], strict=True):
+        known = [time for time in each if not math.isnan(time)] if isinstance(each, tuple) else []
+        ends.append((min(known), max(known)) if len(known) > 1 else (mean, mean))
+    low, high = np.array(ends, dtype=float).reshape(-1, 2).T * 1e6
+    return points.drop(columns="times", errors="ignore").assign(**{name: points["time"] * 1e6, "low": low, "high": high})
+
+
+def _bars(base: alt.Chart, data: pd.DataFrame, y: alt.Y, **channels: Any) -> list[alt.Chart]:
+    """Return the bars from the fastest to the slowest process of each time; none if a single process measured them."""
+    if not (data["high"] > data["low"]).any():
+        return []
+    ends = {"y": alt.Y("low:Q", scale=y["scale"], axis=y["axis"]), "y2": "high:Q"}
+    return [base.mark_rule(strokeWidth=1.2, opacity=0.7).encode(**ends, **channels)]
+
+
+def _about_bars(data: pd.DataFrame) -> str:
+    return "; bars: from the fastest process to the slowest" * bool((data["high"] > data["low"]).any())
+
+
+def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: str) -> alt.LayerChart:
+    """Return dashed lines of known slopes with labels, from the two ends of each: columns text, and those of x and y.
+
+    The labels are below the second ends, which are on the left or the right of their lines, as `align` says.
+    """
+    base = alt.Chart(ends).encode(x=x, y=y)
+    lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
+    last = alt.Chart(ends.groupby("text", sort=False).tail(1)).encode(x=x, y=y)
+    shift = 8 if align == "left" else -8
+    return lines + last.mark_text(align=align, dx=shift, dy=9, fontSize=10, color=PALETTE["grey"]).encode(text="text:N")
+
+
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:
     return alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=alt.Title(title, subtitle=subtitle))
 
 
 def _time_against_error(data: pd.DataFrame) -> tuple[alt.X, alt.Y]:
     x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
-    return x, alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
+    times = pd.concat([data["low"], data["high"]])
+    return x, alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", times))
 
 
 def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any:
     """Return time against error, from the points of a scene (see `rows.points`) and their `front`, which is the bold line."""
-    data, best_points = (rows.assign(microseconds=rows["time"] * 1e6) for rows in (points, front))
+    data, best_points = map(_with_range, (points, front))
     channels = look(families_of(data), "shape", title="method", orient="right", symbolOpacity=1)
     x, y = _time_against_error(data)
-    subtitle = "lower left is better; bold grey: fastest at each error, without closed forms"
+    subtitle = "lower left is better; bold grey: fastest at each error, without closed forms" + _about_bars(data)
     base = _large(data, f"{scene}: time against error", subtitle).encode(x=x, y=y)
     best = alt.Chart(best_points).mark_line(
         color=PALETTE["black"], opacity=0.22, strokeWidth=11, strokeCap="round", strokeJoin="round"
@@ -66,27 +108,28 @@ def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any
     lines = base.mark_line(strokeWidth=1.6).encode(color=channels["color"], detail="name:N", order="rank:Q")
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(**channels)
     lines = lines.transform_window(rank="row_number()")
-    return apply_style(best.encode(x=x, y=y, order="error:Q") + lines + marks)
+    bars = _bars(base, data, y, color=channels["color"])
+    return apply_style(alt.layer(best.encode(x=x, y=y, order="error:Q"), *bars, lines, marks))
 
 
 def best_of_families(picture: pd.DataFrame) -> Any:
     """Return time against error of the best of each family; columns as in `rows.points`."""
-    data = picture.assign(microseconds=picture["time"] * 1e6, sample=picture["sample"] * 1e6, rank=range(len(picture)))
+    data = _with_range(picture).assign(sample=picture["sample"] * 1e6, rank=range(len(picture)))
     families = families_of(data)
     x = alt.X(**log_channel("error", "largest attitude error, rad", data["error"]))
-    y = alt.Y(**log_channel("microseconds", "µs per simulated second", data["microseconds"]))
-    line = alt.Chart(data, width=WIDTH, height=HEIGHT).mark_line(
-        strokeWidth=2.2, point=alt.OverlayMarkDef(size=50, filled=True, opacity=1)
-    )
+    y = alt.Y(**log_channel("microseconds", "µs per simulated second", pd.concat([data["low"], data["high"]])))
+    base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x)
+    line = base.mark_line(strokeWidth=2.2, point=alt.OverlayMarkDef(size=50, filled=True, opacity=1))
+    colour = alt.Color("name:N", scale=scale(colours(families)), sort=list(families))
     chart = line.encode(
-        x=x,
         y=y,
-        color=alt.Color("name:N", scale=scale(colours(families)), sort=list(families)),
+        color=colour,
         shape=alt.Shape("class:N", scale=scale(CLASS_SHAPES)),
         strokeDash=alt.StrokeDash("class:N", scale=scale(CLASS_DASHES)),
         order=alt.Order("rank:Q"),
     )
-    return apply_style(chart)
+    bars = _bars(base, data, y, color=colour)
+    return apply_style(alt.layer(*bars, chart) if bars else chart)
 
 
 def _over_time(rows: pd.DataFrame) -> tuple[pd.DataFrame, alt.X]:
@@ -136,12 +179,13 @@ def growth(lines: pd.DataFrame) -> Any:
     data = lines.assign(shown=lines["value"].clip(lower=FLOOR))
     channels = look(families_of(data), "strokeDash", title="method", orient="bottom", columns=4, symbolSize=300)
     x, y = (alt.X(**log_channel("t", "turns", data["t"])), alt.Y(**log_channel("shown", "largest so far", data["shown"])))
-    panels = [
-        alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=f"{scene}: {quantity}")
-        .mark_line(strokeWidth=1.8, clip=True)
-        .encode(x=x, y=y, **channels)
-        for (scene, quantity), part in data.groupby(["scene", "quantity"], sort=False)
-    ]
+    panels = []
+    for (scene, quantity), part in data.groupby(["scene", "quantity"], sort=False):
+        chart = alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=f"{scene}: {quantity}")
+        t, least = np.array([part["t"].min(), part["t"].max()]), float(part["shown"].min())
+        ends = [{"text": text, "t": x, "shown": least * (x / t[0]) ** k} for text, k in _GROWTHS for x in t.tolist()]
+        drawn = chart.mark_line(strokeWidth=1.8, clip=True).encode(x=x, y=y, **channels)
+        panels.append(_guides(pd.DataFrame(ends), x, y, "right") + drawn)
     return apply_style(alt.concat(*panels, columns=3))
 
 
@@ -150,11 +194,31 @@ def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any
     x = alt.X(**log_channel("dt", "step, s", errors["dt"]))
     y = alt.Y(**log_channel("error", "largest attitude error over the run, rad", errors["error"]))
     channels = look(families_of(errors), "shape", title="method (observed order)", orient="right", symbolOpacity=1)
-    title, subtitle = f"{scene}: convergence", "bold: the stretch that the order is fitted to, and the fit"
+    title, subtitle = (
+        f"{scene}: convergence",
+        "bold: the stretch of the fit, and the fit; dashed: whole orders",
+    )
     base = _large(errors, title, subtitle).encode(x=x, y=y, color=channels["color"])
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=channels["shape"])
     bold = alt.Chart(fit_ends).mark_line(strokeWidth=6, opacity=0.35, strokeCap="round")
-    return apply_style(bold.encode(x=x, y=y, color=channels["color"]) + base.mark_line(strokeWidth=1.2) + marks)
+    layers = bold.encode(x=x, y=y, color=channels["color"]) + base.mark_line(strokeWidth=1.2) + marks
+    return apply_style(_guides(guides, x, y, "left") + layers if len(guides := order_guides(errors, fit_ends)) else layers)
+
+
+def order_guides(errors: pd.DataFrame, fit_ends: pd.DataFrame) -> pd.DataFrame:
+    """Return the ends of lines of the whole orders that were fitted, from the largest step and error: columns text, dt, error.
+
+    Each ends at the smallest step or error.
+    """
+    dt, error = (np.log(errors.loc[errors[name] > 0, name]) for name in ("dt", "error"))
+    logs = fit_ends.assign(dt=np.log(fit_ends["dt"]), error=np.log(fit_ends["error"])).groupby("name")[["dt", "error"]]
+    slopes = (logs.last() - logs.first()).eval("error / dt").round().dropna()
+    rows = []
+    for order in sorted({int(slope) for slope in slopes if slope >= 1}):
+        run = min(dt.max() - dt.min(), (error.max() - error.min()) / order)
+        rows += [(f"order {order}", dt.max() - back, error.max() - order * back) for back in (0.0, run)]
+    ends = pd.DataFrame(rows, columns=["text", "dt", "error"])
+    return ends.assign(dt=np.exp(ends["dt"]), error=np.exp(ends["error"])) if rows else ends
 
 
 def engine_looks(names: Iterable[str]) -> Mapping[str, tuple[str, str]]:
@@ -165,12 +229,14 @@ def engine_looks(names: Iterable[str]) -> Mapping[str, tuple[str, str]]:
 
 def engines(points: pd.DataFrame, scene: str) -> Any:
     """Return time against error of engines, from `engines.picture_points`: at their best solid, as installed dashed."""
-    data = points.assign(microseconds=points["time"] * 1e6)
+    data = _with_range(points)
     looks = engine_looks(data["name"])
     legend = alt.Legend(title="engine", orient="right", columns=1, symbolOpacity=1)
     colours, marks = (alt.Scale(domain=list(looks), range=[look[part] for look in looks.values()]) for part in (0, 1))
     x, y = _time_against_error(data)
-    subtitle = "lower left is better; solid: at its best, dashed: as installed; runs with an error below 1 rad"
+    subtitle = "lower left is better; solid: at its best, dashed: as installed; runs with an error below 1 rad" + _about_bars(
+        data
+    )
     base = _large(data, f"{scene}: engines, time against error", subtitle).encode(
         x=x,
         y=y,
@@ -179,7 +245,7 @@ def engines(points: pd.DataFrame, scene: str) -> Any:
     )
     dash = alt.StrokeDash("kind:N", scale=scale(_KINDS), legend=None)
     lines = base.mark_line(strokeWidth=1.6).encode(detail="setting:N", order="rank:Q", strokeDash=dash)
-    lines = lines.transform_window(rank="row_number()")
+    lines = alt.layer(*_bars(base, data, y), lines.transform_window(rank="row_number()"))
     return apply_style(lines + base.mark_point(filled=True, size=48, opacity=1))
 
 
@@ -214,14 +280,16 @@ def body_costs(points: pd.DataFrame) -> Any:
     channels = look(families_of(points), "strokeDash", title="method", orient="bottom", columns=2, symbolSize=300)
     shown = [alt.Tooltip("name:N"), alt.Tooltip("size:Q"), alt.Tooltip("time:Q", format=".3g")]
     x = alt.X(**log_channel("size", "number of bodies", points["size"]))
-    y = alt.Y(**log_channel("time", "µs a body and simulated second", points["time"]))
+    points = _with_range(points, name="time")
+    y = alt.Y(**log_channel("time", "µs a body and simulated second", pd.concat([points["low"], points["high"]])))
 
     def panel(part: pd.DataFrame, kind: str, error: Any) -> Any:
         title = f"{kind.replace('_', ' ')}, {tolerance(error)} rad"
         base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **channels)
         marks = alt.Chart(part).mark_point(filled=True, size=30, opacity=1)
         marks = marks.encode(x=x, y=y, color=channels["color"].legend(None), tooltip=shown)
-        return base.mark_line(strokeWidth=1.6).encode(tooltip=shown) + marks
+        bars = _bars(alt.Chart(part).encode(x=x), part, y, color=channels["color"].legend(None))
+        return alt.layer(*bars, base.mark_line(strokeWidth=1.6).encode(tooltip=shown), marks)
 
     rows = [
         alt.hconcat(*(panel(part, str(kind), error) for error, part in here.groupby("error", sort=False)))

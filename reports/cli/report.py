@@ -66,7 +66,8 @@ from .options import (
     help="Time budget per run, s. Slower methods get fewer points. A run beyond ten times the budget (at least 60 s) is "
     "stopped.  [default: 0.15, with --full 0.6]",
 )
-@click.option("--png", is_flag=True, help="Write pictures as PNG as well.")
+@click.option("--png", is_flag=True, help="Write pictures as PNG as well as SVG and PDF.")
+@click.option("--latex", is_flag=True, help="Write the tables as LaTeX, report.tex.")
 @click.option("--json", "as_json", is_flag=True, help="Print the content of measurements.json instead of tables.")
 @click.option("--resume", is_flag=True, help="Continue an interrupted report, with the same options.")
 @option(

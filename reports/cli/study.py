@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,9 @@ from .options import (
     split_names,
 )
 
-FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": '}
-"""The files of `--out`, and how each begins."""
+TABLES = "% Written by conservative"
+FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": ', "study.tex": TABLES}
+"""The files of `--out` beside pictures, and how each begins."""
 
 
 class StudyCommand(OutputCommand):
@@ -77,7 +79,8 @@ class StudyCommand(OutputCommand):
 @json_option
 @click.option("--csv", type=Output(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=Output(FILES["study.md"]), help="Write the tables as Markdown.")
-@option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
+@click.option("--latex", type=Output(TABLES), help="Write the tables as LaTeX.")
+@option("out", f"Write {', '.join(FILES)} and the pictures, as SVG, PDF and PNG, into this folder.", type=Output(FILES))
 def study(
     name: str,
     scenes: tuple[str, ...],
@@ -88,6 +91,7 @@ def study(
     as_json: bool,
     csv: Path | None,
     markdown: Path | None,
+    latex: Path | None,
     out: Path | None,
     **numbers: Any,
 ) -> None:
@@ -96,12 +100,15 @@ def study(
     A report consists of the same studies.
     """
     require_extra("conservative study", "report")
+    from ..document.markdown import render
+    from ..document.model import without_figures
+    from ..report import draw_into
     from ..run.provenance import provenance
     from ..run.single_study import measure_study, plan_study
     from ..sections.study import build
     from ..terminal.progress import announce, progress
 
-    with output_files(out, FILES, csv=csv, markdown=markdown) as write:
+    with output_files(out, FILES, csv=csv, markdown=markdown, latex=latex) as write:
         planned = plan_study(
             name,
             split_names("scenes", scenes),
@@ -115,5 +122,11 @@ def study(
         with progress() as step:
             measured = measure_study(planned, step, scheduler)
         document = build(name, measured, made)
-        write(document, csv=lambda: measured.table.to_csv(index=False, lineterminator="\n"))
+        folder = out or Path()  # not used without --out
+        write(
+            document,
+            csv=lambda: measured.table.to_csv(index=False, lineterminator="\n"),
+            md=lambda: render(document, draw_into(folder, png=True)),
+            markdown=lambda: render(replace(document, blocks=without_figures(document.blocks))),
+        )
     show(document, as_json)

@@ -14,6 +14,9 @@ PICTURES = (".svg", ".png", ".pdf")
 
 
 def text(document: Document, kind: str) -> str:
-    """Return a document as "markdown" or "md", "html", "junit" or "json" (its data); renderers are imported when used."""
-    renderer = import_module(f".{'markdown' if kind == 'md' else kind}", __package__)
+    """Return a document as "markdown" or "md", "html", "junit", "json" (its data), or "latex" or "tex" (its tables).
+
+    Renderers are imported when used.
+    """
+    renderer = import_module(f".{ {'md': 'markdown', 'tex': 'latex'}.get(kind, kind) }", __package__)
     return str(renderer.render(document.data if kind == "json" else document))

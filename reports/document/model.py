@@ -6,7 +6,7 @@ Text is plain. Words between backticks are code. Everything else that a renderer
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -268,6 +268,12 @@ def walk(blocks: Iterable[Block]) -> Iterator[Block]:
         yield block
         if isinstance(block, Section):
             yield from walk(block.blocks)
+
+
+def without_figures(blocks: Iterable[Block]) -> list[Block]:
+    """Return blocks and the blocks of their sections without figures, for a document without a folder for pictures."""
+    kept = [block for block in blocks if not isinstance(block, Figure)]
+    return [replace(each, blocks=without_figures(each.blocks)) if isinstance(each, Section) else each for each in kept]
 
 
 AnyBlock = TypeVar("AnyBlock", bound=Block)

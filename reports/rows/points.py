@@ -1,8 +1,8 @@
 """Errors and times of runs over steps and tolerances, and the picture of the best of each family.
 
 A picture has the columns `name` (of the family), `family`, `class`, `setting` (of a point), `error` (rad), `time` (s per
-simulated second), `sample` (s per sample, of a scene), `dt` (s), and `within` (on how many bodies the error is reached, if
-there are several).
+simulated second), `times` (of each process), `sample` (s per sample, of a scene), `dt` (s), and `within` (on how many bodies
+the error is reached, if there are several).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def front(points: pd.DataFrame) -> pd.DataFrame:
     return ordered[ordered["error"] < best_before]
 
 
-COLUMNS = ("name", "family", "class", "setting", "error", "time", "sample", "dt", "within")
+COLUMNS = ("name", "family", "class", "setting", "error", "time", "times", "sample", "dt", "within")
 SAME = 0.01
 """Relative difference of two values that a picture does not show."""
 

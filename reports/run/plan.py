@@ -59,6 +59,7 @@ class Plan:
     quick: bool = False
     skip_missing: bool = False
     png: bool = False
+    latex: bool = False
     time_limit: float | None = None
     bodies: int = 0
     seed: int = 0
@@ -86,6 +87,7 @@ def plan_report(
     quick: bool = False,
     skip_missing: bool = False,
     png: bool = False,
+    latex: bool = False,
     time_limit: float | None = None,
     bodies: int | None = None,
     seed: int = 0,
@@ -100,8 +102,8 @@ def plan_report(
         The kind of the report, see `KINDS`; `quick` also for each study.
     skip_missing, time_limit
         See `Study`. The default limit is that of the kind.
-    png
-        True if pictures are also written as PNG.
+    png, latex
+        True if pictures are also written as PNG, and tables as LaTeX.
     bodies, seed
         Random bodies in each field, and their seed. Default: those of the kind; in a default report in `FEW_BODIES` fields, and
         none if a scene or a method is named; in a full one none if a scene is named.
@@ -151,4 +153,4 @@ def plan_report(
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
         made.append(study)
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
-    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed, arguments)
+    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, latex, time_limit, bodies, seed, arguments)

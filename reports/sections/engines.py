@@ -137,7 +137,7 @@ def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFr
     """Return the points of each engine's best setting, and as installed if that is another one: two lines per engine.
 
     Columns name (engine with version), kind (as installed, or at its best), setting, dt (s), error (rad), time (s per simulated
-    second).
+    second), times (of each process).
     """
     parts = [
         points[points["series"] == row.series].assign(name=row.engine, kind=AT_ITS_BEST if row.best else AS_INSTALLED)
@@ -145,7 +145,7 @@ def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFr
         if row.best or row.as_installed
     ]
     joined = pd.concat(parts, ignore_index=True) if parts else points.assign(kind="")
-    columns = joined[["name", "kind", "setting", "dt", "error", "time"]]
+    columns = joined[["name", "kind", "setting", "dt", "error", "time", "times"]]
     return columns.sort_values(["name", "kind"], kind="stable", ignore_index=True)
 
 

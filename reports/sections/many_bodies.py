@@ -40,8 +40,8 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
     rows = lines(table)
     reached = body_costs(rows)
     figure = None
-    points = reached[reached["statistic"] == MEDIAN].assign(time=reached["time"] * 1e6)
-    points = points.rename(columns={"scene": "kind", "bodies": "size"})[["kind", "error", "name", "family", "size", "time"]]
+    points = reached[reached["statistic"] == MEDIAN]
+    points = points.rename(columns={"scene": "kind", "bodies": "size"})
     if len(points):
         title = "Many bodies: the cost of one of them"
         summary = "Time per body and simulated second at equal error, against the number of bodies; lower is better."

@@ -95,19 +95,23 @@ def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str =
     """
     example = f"`conservative run random_body:field=spring,seed={seed},index=0` runs the first on a spring."
     drawn = f"Our closed forms do not solve these motions. Bodies in each field: {bodies}, from seed {seed}; {example}"
-    points, figure = chart_points(ratios), None
-    if len(points):
-        picture = figures.random_ratios(points, bodies, seed)
-        words = (
-            f"Bodies in each field: {bodies}. Line: geometric mean; band: from the worst body to the best; above the dashed "
-            "line ours is faster."
-        )
-        title = "Random bodies: the fastest engine's time divided by ours"
-        panels = vega_embed.embed(picture, (), 220)
-        figure = Figure("random_bodies", title, words, picture, panels, layout=Layout.PAIRS)
     terms = Paragraph(TERMS, Emphasis.NOTE)
-    blocks = filled(Paragraph(f"{drawn} {about}"), figure, as_table(ratios), by_engine(ratios), terms)
+    blocks = filled(Paragraph(f"{drawn} {about}"), figure(ratios, bodies, seed), as_table(ratios), by_engine(ratios), terms)
     return Section("Random bodies", blocks, "random", "Random bodies", source={"study": STUDY.name})
+
+
+def figure(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Figure | None:
+    """Return the figure of the ratios; None without any. For `bodies` and `seed` see `section`."""
+    points = chart_points(ratios)
+    if not len(points):
+        return None
+    picture = figures.random_ratios(points, bodies, seed)
+    words = (
+        f"Bodies in each field: {bodies}. Line: geometric mean; band: from the worst body to the best; above the dashed "
+        "line ours is faster."
+    )
+    title = "Random bodies: the fastest engine's time divided by ours"
+    return Figure("random_bodies", title, words, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:

@@ -47,9 +47,8 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         'compiled code available, and "first call" the first run after that. The first column of numbers is the time per step '
         f"relative to `{DEFAULT_METHOD}`."
     )
-    picture = figures.work_precision(points, front(points[points["class"] != MethodClass.SOLUTION]), name)
     work: list[Block] = [
-        Figure(f"work_precision_{name}", f"{name}: time against attitude error", picture=picture),
+        work_figure(points, name),
         Paragraph(SAMPLE_TERMS, Emphasis.NOTE),
     ]
     if decades.rows:
@@ -70,7 +69,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Section(
                 "Drift at the scene's own step", filled(drift(rows, name)), folded=True, source={"study": paper.STUDY.name}
             ),
-            Section("Convergence", [_convergence_figure(errors, fits, name), Paragraph(order_words)]),
+            Section("Convergence", [convergence_figure(errors, fits, name), Paragraph(order_words)]),
             Section(
                 "Orders and errors as tables", orders, folded=True, source={"study": (convergence.STUDY.name, paper.STUDY.name)}
             ),
@@ -83,13 +82,20 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     )
 
 
-def _convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> Figure:
+def work_figure(points: pd.DataFrame, name: str) -> Figure:
+    """Return the picture of time against error, from the points of a scene."""
+    picture = figures.work_precision(points, front(points[points["class"] != MethodClass.SOLUTION]), name)
+    return Figure(f"work_precision_{name}", f"{name}: time against attitude error", picture=picture)
+
+
+def convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> Figure:
+    """Return the figure of error against step, from errors of a scene and their fits."""
     named = lines.with_slopes(errors, fits)
     picture = figures.convergence(named, lines.fit_ends(lines.with_slopes(fits, fits)), name)
     return Figure(
         f"convergence_{name}",
         f"{name}: attitude error against step",
-        "In parentheses the fitted slope with its standard error; the bold stretch shows the fit.",
+        "In parentheses the fitted slope with its standard error; the bold stretch shows the fit, dashed lines whole orders.",
         picture,
         vega_embed.embed(picture, ("name", "dt", "error"), 520),
         vega_embed.legend(families_of(named), marks=True),

@@ -8,14 +8,18 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import random
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import convergence, random, work_precision
 from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
-from ..document.model import Block, Document, Facts, Paragraph, Row, Section, Table, filled
+from ..document.model import Block, Document, Facts, Figure, Paragraph, Row, Section, Table, filled
+from ..rows import lines
 from ..rows.names import with_names
+from ..rows.points import points
 from ..run.measure import Measurements
-from . import random_bodies
+from . import random_bodies, scenes
+from .measured import of_scene
 from .report import SECTIONS, records
 
 
@@ -27,17 +31,32 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     if name == random.STUDY.name:
         ratios = random_bodies.ratios(named)
         sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
-        shown, terms = filled(random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence), random_bodies.TERMS
+        picture = random_bodies.figure(ratios, named["body"].nunique(), int(named["seed"].max()))
+        shown = filled(picture, random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence)
+        terms = random_bodies.TERMS
         data["ratios"] = random_bodies.records(ratios)
     elif name in SECTIONS:
         part = SECTIONS[name].section(named, with_names(measured.samples))
-        shown, terms = [block for block in part.blocks if isinstance(block, Table | Section)], SECTIONS[name].TERMS
+        shown, terms = [block for block in part.blocks if isinstance(block, Table | Section | Figure)], SECTIONS[name].TERMS
     else:
-        shown, terms = [rows_table(name, named)], ""
+        shown, terms = [*pictures(name, named), rows_table(name, named)], ""
     data |= {"rows": records(measured.table), "samples": records(measured.samples)}
     origin = Section("How this was made", [Facts(list(made.items()))])
     blocks = filled(Paragraph(terms) if terms else None, *shown, origin)
     return Document("conservative study", f"Study: {name}", blocks, brief=shown, data=data)
+
+
+def pictures(name: str, table: pd.DataFrame) -> list[Figure]:
+    """Return the figures of named rows of a study, one for each scene; none for studies without a chart of their own."""
+    found = [str(scene) for scene in table["scene"].dropna().unique()]
+    if name == work_precision.STUDY.name:
+        measured = points(table)
+        return [scenes.work_figure(of_scene(measured, scene), scene) for scene in found if scene in set(measured["scene"])]
+    if name == convergence.STUDY.name:
+        errors = lines.errors(table, Measure.ATTITUDE_MAX)
+        each = {scene: of_scene(errors, scene) for scene in found}
+        return [scenes.convergence_figure(rows, lines.fits(rows), scene) for scene, rows in each.items() if len(rows)]
+    return []
 
 
 def rows_table(name: str, table: pd.DataFrame) -> Table:

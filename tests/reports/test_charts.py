@@ -68,6 +68,58 @@ def test_lines_have_the_colour_of_their_family_and_the_mark_of_their_place():
     assert found == [colours(families), {"reduced": SHAPES[0], "gauss 2": SHAPES[0], "gauss 3": SHAPES[1]}]
 
 
+def timed(times):
+    """Return the points of two methods; the second one was timed in several processes."""
+    rows = [("ours", 1e-3, (1e-6,)), ("theirs", 1e-3, (2e-6,)), ("theirs", 1e-6, times)]
+    found = pd.DataFrame(rows, columns=["name", "error", "times"])
+    time = [float(np.exp(np.nanmean(np.log(each)))) for each in found["times"]]
+    return found.assign(
+        family=found["name"], time=time, kind="at its best", setting="", sample=1.0, dt=1.0, within="", **{"class": "engines"}
+    )
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda points: figures.work_precision(points, points, "s"),
+        lambda points: figures.engines(points, "s"),
+        figures.best_of_families,
+        lambda points: figures.body_costs(points.assign(size=[1, 1, 10], kind="tops", error=1e-3)),
+    ],
+)
+@pytest.mark.parametrize(("times", "ends"), [((2e-6, 4e-6, np.nan, 8e-6), (2.0, 8.0)), ((3e-6,), None), ((np.nan, 3e-6), None)])
+def test_times_of_several_processes_have_bars(draw, times, ends):
+    spec = draw(timed(times)).to_dict()
+    rules = [mark for mark in found_marks(spec) if mark["mark"]["type"] == "rule"]
+    assert len(rules) == (ends is not None)
+    for rule in rules:
+        assert (rule["encoding"]["y"]["field"], rule["encoding"]["y2"]["field"]) == ("low", "high")
+        (row,) = [each for rows in spec["datasets"].values() for each in rows if each["high"] > each["low"]][:1]
+        assert (row["low"], row["high"]) == pytest.approx(ends)
+
+
+def found_marks(spec):
+    if "mark" in spec:
+        yield spec
+    for key in ("layer", "vconcat", "hconcat", "concat"):
+        for part in spec.get(key, ()):
+            yield from found_marks(part)
+
+
+def test_guides_have_the_slopes_of_the_fitted_orders():
+    dt = np.array([0.1, 0.01])
+    errors = pd.concat([pd.DataFrame({"name": f"{k}", "dt": dt, "error": dt**k}) for k in (1, 2, 4)])
+    fits = pd.concat([pd.DataFrame({"name": f"{k}", "dt": dt, "error": 3 * dt**k}) for k in (1.9, 2.05, 4.1)])
+    guides = figures.order_guides(errors, fits)
+    assert guides["text"].unique().tolist() == ["order 2", "order 4"]
+    for order, ends in guides.groupby("text"):
+        slope = np.diff(np.log(ends["error"])) / np.diff(np.log(ends["dt"]))
+        assert slope == pytest.approx(int(order[-1]))
+        assert ends["dt"].between(0.01 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
+        assert ends["error"].between(1e-8 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
+    assert figures.order_guides(errors, fits.iloc[:0]).empty
+
+
 def test_the_cost_of_a_recommendation_is_in_microseconds():
     probe = SimpleNamespace(method=Reduced(), dt=0.25, setting=0.25)
     advice = [SimpleNamespace(reached=reached, best=probe, cost=3e-6, line="reduced") for reached in (True, False)]

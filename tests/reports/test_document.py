@@ -7,14 +7,16 @@ import re
 from html import escape
 from html.parser import HTMLParser
 
+import altair as alt
+import pandas as pd
 import pytest
 import vl_convert
 from markdown_it import MarkdownIt
 
 from conservative.outcome import OK
 from conservative.reports import report
-from conservative.reports.charts import figures, vega_embed
-from conservative.reports.document import html, markdown, terminal, text
+from conservative.reports.charts import figures, style, vega_embed
+from conservative.reports.document import SVG_MARK, html, markdown, terminal, text
 from conservative.reports.document.model import (
     Cell,
     Check,
@@ -240,13 +242,38 @@ def test_data_are_short_and_exact_to_their_digits():
     assert data["format"]["parse"] == {"x": "number"}
 
 
-def test_pictures_of_scenes_with_parameters_have_files_of_their_own(tmp_path, monkeypatch):
+def test_every_picture_has_files_of_its_own(tmp_path, monkeypatch):
     """`brick_flip:t_end=0.5` and `t_end=0.7` had one file, because a suffix starts at the last point."""
-    saved = []
-    monkeypatch.setattr(
-        report, "save_picture", lambda chart, path, png: saved.append(path.with_suffix(".svg").name) or saved[-1]
-    )
-    names = ["a:t_end=0.5", "a:t_end=0.7", "a_t_end=0_7", "a:t_end=0.5"]
-    figures = [Figure(name, "title", "", picture=object()) for name in names]
-    report.render(Document("c", "t", [Section("s", figures, "s")]), tmp_path, png=False)
-    assert saved == ["a_t_end=0_5.svg", "a_t_end=0_7.svg", "a_t_end=0_7_.svg", "a_t_end=0_5.svg"]
+    monkeypatch.setattr(style, "picture_file", lambda chart, kind: f"{SVG_MARK} {chart} {kind}".encode())
+    (tmp_path / "mine.svg").write_text("<svg/>")
+    (tmp_path / "plot.pdf").write_text("of a user")
+    names = ["a:t_end=0.5", "a:t_end=0.7", "a_t_end=0_7", "A:t_end=0.5", "a:t_end=0.5", "mine", "plot"]
+    draw = report.draw_into(tmp_path, png=True)
+    found = [draw(Figure(name, "title", "", picture=name)) for name in names]
+    plain = ["a_t_end=0_5", "a_t_end=0_7", "a_t_end=0_7_", "A_t_end=0_5_", "a_t_end=0_5", "mine_", "plot_"]
+    assert found == [f"{name}.svg" for name in plain]
+    for kind in (".svg", ".pdf", ".png"):
+        assert [(tmp_path / f"{name}{kind}").read_text().split()[-2:] for name in plain] == [[name, kind] for name in names]
+    assert ((tmp_path / "mine.svg").read_text(), (tmp_path / "plot.pdf").read_text()) == ("<svg/>", "of a user")
+    assert report.draw_into(tmp_path, png=False)(Figure("plot_", "t", "", picture="again")) == "plot_.svg"  # an earlier result
+
+
+def test_a_picture_is_a_file_of_its_kind():
+    chart = alt.Chart(pd.DataFrame({"x": [1, 2]})).mark_point().encode(x="x:Q")
+    beginnings = {".svg": SVG_MARK.encode(), ".pdf": b"%PDF-", ".png": b"\x89PNG"}
+    assert all(style.picture_file(chart, kind).startswith(begin) for kind, begin in beginnings.items())
+
+
+def test_latex_has_every_table_and_no_character_with_a_meaning():
+    rows = [["a_b & 50 %", "1e-3", "✓ 2.5e-12"], ["{x}^2~\\input#1$", "3", "≈ 1"]]
+    content = Document("c", "t", [Section("s", [Table(["m", "m", "µs"], rows, "Caption 50 %"), Table(["n"], [["1"]] * 50)])])
+    text_of = text(content, "latex")
+    assert text_of == text(content, "tex")
+    lines = text_of.splitlines()
+    assert lines[0].startswith("% Written by conservative")
+    assert [line.count(" & ") for line in lines if line.endswith(r"\\")][:3] == [2, 2, 2]
+    assert r"a\_b \& 50 \% & $10^{-3}$ & $\checkmark$ $2.5\times10^{-12}$ \\" in lines
+    assert r"\{x\}\textasciicircum{}2\textasciitilde{}\textbackslash input\#1\$ & 3 & $\approx$ 1 \\" in lines
+    assert r"m & m & \textmu{}s \\" in lines
+    assert r"\caption{Caption 50 \%}" in lines
+    assert (text_of.count(r"\begin{tabular}{lrr}"), text_of.count(r"\begin{longtable}{l}")) == (1, 1)

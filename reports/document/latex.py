@@ -1,0 +1,56 @@
+"""The tables of a document as LaTeX, for papers, by the styler of pandas.
+
+They need the packages booktabs, longtable, amssymb and textcomp. Text of other alphabets stays as it is.
+"""
+
+from __future__ import annotations
+
+import re
+
+import pandas as pd
+
+from .model import Document, Table, walk
+
+LATEX_MARK = "% Written by conservative. It needs \\usepackage{booktabs,longtable,amssymb,textcomp}"
+"""The first line of files of tables."""
+LONGEST = 40
+"""Largest number of rows of a table on one page."""
+_SIGNS = str.maketrans(
+    {
+        "✓": r"$\checkmark$",
+        "✗": r"$\times$",
+        "≈": r"$\approx$",
+        "±": r"$\pm$",
+        "≤": r"$\le$",
+        "–": "--",
+        "µ": r"\textmu{}",
+        "°": r"\textdegree{}",
+        "²": r"\textsuperscript{2}",
+        "ω": r"$\omega$",
+        "↕": "",
+    }
+)
+
+
+def render(document: Document) -> str:
+    """Return all tables of a document."""
+    tables = [table(block) for block in walk(document.blocks) if isinstance(block, Table) and block.rows]
+    return "\n".join([LATEX_MARK, *tables])
+
+
+def table(content: Table) -> str:
+    """Return a table, with its caption, numbers such as 1e-3 as powers of ten, and columns of numbers to the right."""
+    texts = [[str(cell) for cell in row] for row in content.rows]
+    header = [_typeset(name) for name in content.header]
+    style = pd.DataFrame(texts, columns=range(len(header))).style.format(_typeset).format_index(header.__getitem__, axis=1)
+    form, kind = "l" + "r" * (len(header) - 1), "longtable" if len(texts) > LONGEST else None
+    caption = _typeset(content.caption) or None
+    return style.hide(axis="index").to_latex(hrules=True, caption=caption, column_format=form, environment=kind)
+
+
+def _typeset(text: str) -> str:
+    """Return a text whose characters have no meaning in LaTeX."""
+    escaped = re.sub(r"[&%$#_{}]", r"\\\g<0>", re.sub(r"\\", r"\\textbackslash ", text))
+    escaped = escaped.replace("~", r"\textasciitilde{}").replace("^", r"\textasciicircum{}")
+    powers = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e(-?\d{1,3})\b", r"$\1\\times10^{\2}$", escaped)
+    return powers.replace(r"$1\times10", "$10").translate(_SIGNS)
