@@ -143,7 +143,7 @@ class Ensemble:
         values = {"R_WB": R_WB, "q_WB": q_WB, "w_WB_B": w_WB_B}
         found = dataset(self.t, values, ("body", "t"), scene=self.bodies.scene.name, method=self.label)
         drifts = {f"drift of {name}": ("body", each) for name, each in self.drifts.items()}
-        return found.assign(outcome=("body", [str(self.outcome(i)) for i in range(len(self))]), **drifts)
+        return found.assign(drifts | {"outcome": ("body", np.array([str(self.outcome(i)) for i in range(len(self))]))})
 
     def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
         """Return a chart of the directions of a body axis at start and end, the spread of attitudes over time, and the drifts.

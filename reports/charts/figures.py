@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import altair as alt
 import numpy as np
@@ -73,7 +73,7 @@ def _about_bars(data: pd.DataFrame) -> str:
     return "; bars: from the fastest process to the slowest" * bool((data["high"] > data["low"]).any())
 
 
-def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: str) -> alt.LayerChart:
+def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: Literal["left", "right"]) -> alt.LayerChart:
     """Return dashed lines of known slopes with labels, from the two ends of each: columns text, and those of x and y.
 
     The labels are below the second ends, which are on the left or the right of their lines, as `align` says.
@@ -211,10 +211,11 @@ def order_guides(errors: pd.DataFrame, fit_ends: pd.DataFrame) -> pd.DataFrame:
     Each ends at the smallest step or error.
     """
     dt, error = (np.log(errors.loc[errors[name] > 0, name]) for name in ("dt", "error"))
-    logs = fit_ends.assign(dt=np.log(fit_ends["dt"]), error=np.log(fit_ends["error"])).groupby("name")[["dt", "error"]]
-    slopes = (logs.last() - logs.first()).eval("error / dt").round().dropna()
+    slopes = [
+        np.diff(np.log(ends["error"])).item() / np.diff(np.log(ends["dt"])).item() for _, ends in fit_ends.groupby("name")
+    ]
     rows = []
-    for order in sorted({int(slope) for slope in slopes if slope >= 1}):
+    for order in sorted({round(slope) for slope in slopes if slope >= 0.5}):
         run = min(dt.max() - dt.min(), (error.max() - error.min()) / order)
         rows += [(f"order {order}", dt.max() - back, error.max() - order * back) for back in (0.0, run)]
     ends = pd.DataFrame(rows, columns=["text", "dt", "error"])

@@ -42,15 +42,19 @@ def table(content: Table) -> str:
     """Return a table, with its caption, numbers such as 1e-3 as powers of ten, and columns of numbers to the right."""
     texts = [[str(cell) for cell in row] for row in content.rows]
     header = [_typeset(name) for name in content.header]
-    style = pd.DataFrame(texts, columns=range(len(header))).style.format(_typeset).format_index(header.__getitem__, axis=1)
+    style = (
+        pd.DataFrame(texts, columns=range(len(header)))
+        .style.format(_typeset)
+        .format_index(lambda k: header[int(str(k))], axis=1)
+    )
     form, kind = "l" + "r" * (len(header) - 1), "longtable" if len(texts) > LONGEST else None
     caption = _typeset(content.caption) or None
     return style.hide(axis="index").to_latex(hrules=True, caption=caption, column_format=form, environment=kind)
 
 
-def _typeset(text: str) -> str:
+def _typeset(text: object) -> str:
     """Return a text whose characters have no meaning in LaTeX."""
-    escaped = re.sub(r"[&%$#_{}]", r"\\\g<0>", re.sub(r"\\", r"\\textbackslash ", text))
+    escaped = re.sub(r"[&%$#_{}]", r"\\\g<0>", re.sub(r"\\", r"\\textbackslash ", str(text)))
     escaped = escaped.replace("~", r"\textasciitilde{}").replace("^", r"\textasciicircum{}")
     powers = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e(-?\d{1,3})\b", r"$\1\\times10^{\2}$", escaped)
     return powers.replace(r"$1\times10", "$10").translate(_SIGNS)

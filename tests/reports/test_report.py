@@ -34,7 +34,7 @@ def made(tmp_path_factory):
     """A real report of one scene and three methods: its folder and the result of the command."""
     folder = tmp_path_factory.mktemp("made") / "report"
     methods = "reduced,mujoco:RK4,heyoka:tol=1e-9,frame=non_spinning"
-    options = ["--quick", "--scenes", "brick_flip", "--methods", methods, "--out", str(folder)]
+    options = ["--quick", "--scenes", "brick_flip", "--methods", methods, "--latex", "--out", str(folder)]
     done = CliRunner().invoke(main, ["report", *options], env={"COLUMNS": "80"})
     assert done.exit_code == 0, done.output
     return folder, done
@@ -44,7 +44,9 @@ def test_report_has_its_files_and_lists_them(made):
     folder, done = made
     names = {path.name for path in folder.iterdir()}
     pictures = {f"{kind}_brick_flip.svg" for kind in ("work_precision", "drift", "convergence")}
-    assert names == pictures | {"report.md", "index.html", "measurements.csv", "measurements.json"}
+    others = {"report.md", "report.tex", "index.html", "measurements.csv", "measurements.json"}
+    assert names == pictures | {name.replace(".svg", ".pdf") for name in pictures} | others
+    assert r"\caption{brick\_flip: observed order}" in (folder / "report.tex").read_text()
     assert set(json.loads((folder / "measurements.json").read_text())["files"]) == names
     assert set(re.findall(r"\]\((\w+\.svg)\)", (folder / "report.md").read_text())) == pictures
     assert done.stdout.strip().endswith("index.html")
