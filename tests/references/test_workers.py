@@ -29,6 +29,7 @@ from conservative.references.worker import client
 from conservative.references.worker.client import EngineCrashed, Worker, time_limit
 
 from ..declared import ENGINES
+from ..environments import run_python
 from . import trial
 from .trial_engine import Trial
 
@@ -204,8 +205,6 @@ def test_a_worker_ends_with_its_parent(folder):
         "threading.Thread(target=worker.ask, args=('prepare',), kwargs=given, daemon=True).start()\n"
         "time.sleep(0.5); print(worker.pid, flush=True); os._exit(0)\n"
     )
-    from ..environments import run_python
-
     status, out, errors = run_python(code)
     assert status == 0 or not errors, errors
     assert _ends(int(out))
@@ -320,7 +319,7 @@ def test_an_unknown_name_names_the_nearest():
 def test_what_a_program_has_forked_ends_with_it(how, tmp_path):
     code = """
 import json, os, subprocess, sys
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
 for line in sys.stdin:
     if json.loads(line)["do"] == "crash": sys.exit(3)
     print(json.dumps(dict(protocol=1, program="p", version="1", framing="lines", child=child.pid)), flush=True)
@@ -336,3 +335,25 @@ for line in sys.stdin:
         client.kill_workers()
     assert _ends(child)
     worker.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system has a life line")
+def test_what_an_engine_has_forked_ends_when_the_client_is_killed(tmp_path):
+    (tmp_path / "adapter.py").write_text("""
+import subprocess, sys
+def fork(): return {"child": subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"], close_fds=False).pid}
+def spin():
+    while True: pass
+""")
+    code = f"""
+import os, sys, threading, time
+from conservative.references.worker import program
+from conservative.references.worker.client import Worker
+worker, adapter = Worker([sys.executable, program.__file__]), {str(tmp_path / "adapter.py")!r}
+print(worker.ask("call", adapter=adapter, function="fork")["child"], flush=True)
+threading.Thread(target=worker.ask, args=("call",), kwargs=dict(adapter=adapter, function="spin"), daemon=True).start()
+time.sleep(0.5); os._exit(0)
+"""
+    status, out, errors = run_python(code)
+    assert status == 0, errors
+    assert _ends(int(out))
