@@ -73,7 +73,7 @@ def _about_bars(data: pd.DataFrame) -> str:
     return "; bars: from the fastest process to the slowest" * bool((data["high"] > data["low"]).any())
 
 
-def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: Literal["left", "right"]) -> alt.LayerChart:
+def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: Literal["left", "right"]) -> list[alt.Chart]:
     """Return dashed lines of known slopes with labels, from the two ends of each: columns text, and those of x and y.
 
     The labels are below the second ends, which are on the left or the right of their lines, as `align` says.
@@ -82,7 +82,8 @@ def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: Literal["left", "righ
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
     last = alt.Chart(ends.groupby("text", sort=False).tail(1)).encode(x=x, y=y)
     shift = 8 if align == "left" else -8
-    return lines + last.mark_text(align=align, dx=shift, dy=9, fontSize=10, color=PALETTE["grey"]).encode(text="text:N")
+    labels = last.mark_text(align=align, dx=shift, dy=9, fontSize=10, color=PALETTE["grey"]).encode(text="text:N")
+    return [lines, labels]
 
 
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:
@@ -182,10 +183,10 @@ def growth(lines: pd.DataFrame) -> Any:
     panels = []
     for (scene, quantity), part in data.groupby(["scene", "quantity"], sort=False):
         chart = alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=f"{scene}: {quantity}")
-        t, least = np.array([part["t"].min(), part["t"].max()]), float(part["shown"].min())
-        ends = [{"text": text, "t": x, "shown": least * (x / t[0]) ** k} for text, k in _GROWTHS for x in t.tolist()]
+        first, last, least = float(part.loc[part["t"] > 0, "t"].min()), float(part["t"].max()), float(part["shown"].min())
+        ends = [{"text": text, "t": t, "shown": least * (t / first) ** k} for text, k in _GROWTHS for t in (first, last)]
         drawn = chart.mark_line(strokeWidth=1.8, clip=True).encode(x=x, y=y, **channels)
-        panels.append(_guides(pd.DataFrame(ends), x, y, "right") + drawn)
+        panels.append(alt.layer(*_guides(pd.DataFrame(ends), x, y, "right"), drawn))
     return apply_style(alt.concat(*panels, columns=3))
 
 
@@ -201,8 +202,10 @@ def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any
     base = _large(errors, title, subtitle).encode(x=x, y=y, color=channels["color"])
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=channels["shape"])
     bold = alt.Chart(fit_ends).mark_line(strokeWidth=6, opacity=0.35, strokeCap="round")
-    layers = bold.encode(x=x, y=y, color=channels["color"]) + base.mark_line(strokeWidth=1.2) + marks
-    return apply_style(_guides(guides, x, y, "left") + layers if len(guides := order_guides(errors, fit_ends)) else layers)
+    ends = order_guides(errors, fit_ends)
+    guides = _guides(ends, x, y, "left") if len(ends) else []
+    bold = bold.encode(x=x, y=y, color=channels["color"])
+    return apply_style(alt.layer(*guides, bold, base.mark_line(strokeWidth=1.2), marks))
 
 
 def order_guides(errors: pd.DataFrame, fit_ends: pd.DataFrame) -> pd.DataFrame:

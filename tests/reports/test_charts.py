@@ -118,6 +118,10 @@ def test_guides_have_the_slopes_of_the_fitted_orders():
         assert ends["dt"].between(0.01 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
         assert ends["error"].between(1e-8 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
     assert figures.order_guides(errors, fits.iloc[:0]).empty
+    for ends, texts in ((fits, 1), (fits.iloc[:0], 0)):
+        spec = figures.convergence(errors.assign(family=errors["name"]), ends, "s").to_dict()
+        # In one list: the page removes the legend of each layer, and adds the filter of its buttons.
+        assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == texts
 
 
 def test_the_cost_of_a_recommendation_is_in_microseconds():

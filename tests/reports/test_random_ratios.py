@@ -11,6 +11,7 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
 from conservative.reports.charts import figures
+from conservative.reports.document import SVG_MARK
 from conservative.reports.document.cells import tolerance
 from conservative.reports.document.model import Section, Table, walk
 from conservative.reports.report import render
@@ -233,7 +234,7 @@ def test_random_bodies_come_before_the_scenes(folder, file, first, then):
     assert "On 2 random bodies in fields" in text
     assert "0.500" in text
     assert ("random_bodies.svg" if file == "report.md" else 'data-figure="random_bodies"') in text
-    assert (folder / "random_bodies.svg").read_text(encoding="utf-8").startswith("<svg")
+    assert (folder / "random_bodies.svg").read_text(encoding="utf-8").startswith(f"{SVG_MARK}\n<svg")
 
 
 def test_a_report_without_random_bodies_does_not_mention_them(tmp_path):
