@@ -24,7 +24,7 @@ from ..measures.measurement import Measurement
 from ..twins.compare import BODIES, Twins, count_twins, twins_of
 from ..twins.pairs import PAIRS, Pair
 from .case import Case
-from .declaration import Declaration, Extent, Named
+from .declaration import Declaration, Named
 from .engine_selection import select_engines
 from .selection import Missing
 from .study import Progress, Study
@@ -101,4 +101,4 @@ def _outcome(twins: Twins) -> tuple[Outcome, str]:
     return OK, detail
 
 
-STUDY = Declaration(findings, Extent.FULL, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))
+STUDY = Declaration(findings, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))
