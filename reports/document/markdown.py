@@ -33,7 +33,7 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
     for block in blocks:
         match block:
             case Links():
-                yield ", ".join(f"[{text}]({file})" for text, file in block.links)
+                yield ", ".join(f"[{escape(text)}]({file})" for text, file in block.links)
             case Section():
                 if content := list(_blocks(block.blocks, level + 1, draw)):  # a section of the page alone has none
                     yield f"{'#' * level} {escape(block.title)}"

@@ -273,7 +273,8 @@ AT_390 = """
       return [row.offsetHeight - Math.max(...heights.slice(0, 2)), row.textContent];
     });
     requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]({
-      columns: new Set(left).size, tables: wide.length, before, after: wide.map(hints), empty: empty.sort(([a], [b]) => b - a)[0],
+      columns: new Set(left).size, tables: wide.length, before, after: wide.map(hints),
+      empty: empty.sort(([a], [b]) => b - a)[0],
     })));
 """
 
