@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import warnings
 
 from ..terminal.interrupts import handle_signals, received
 
@@ -14,6 +15,7 @@ def launch() -> None:
     handle_signals()
     _open_streams()
     _separate_stdout()
+    warnings.showwarning = show_warning
     try:
         from .main import main
 
@@ -23,6 +25,11 @@ def launch() -> None:
             raise
         print("Interrupted", file=sys.stderr)
         sys.exit(received[0].exit_code)
+
+
+def show_warning(message: Warning | str, *place: object, **options: object) -> None:
+    """Print a warning as a line, without the place in our code that issues it."""
+    print(f"Warning: {message}", file=sys.stderr)
 
 
 def _open_streams() -> None:

@@ -14,6 +14,8 @@ from PIL import Image
 from conservative import registry
 from conservative.reports.cli.main import main
 
+from ..environments import run_python
+
 
 def conservative(*arguments):
     """Run a command where tables have room, however wide the terminal is in which the tests were started."""
@@ -427,3 +429,12 @@ def test_a_balance_that_a_method_does_not_sum_has_no_drift(tmp_path):
         assert done.exit_code == 0, done.output
         assert "nan" not in done.output
         assert "–" in done.output
+
+
+def test_a_command_prints_a_warning_as_a_line(tmp_path):
+    (tmp_path / "body.toml").write_text("t_end = 0.1\n[body]\ninertia = [1.0, 1.0, 5.0]\n[start]\nw_WB_B = [0.1, 2.0, 0.1]\n")
+    code = "import sys; sys.argv[0] = 'conservative'\nfrom conservative.reports.cli.launch import launch\nlaunch()"
+    status, out, err = run_python(code, "run", str(tmp_path / "body.toml"), "-m", "moser_veselov", "--json")
+    assert (status, "outcome" in json.loads(out)) == (0, True)
+    assert err.startswith("Warning: No mass distribution has the moments 1, 1, 5 kg m^2")
+    assert err.count("\n") == 1
