@@ -52,7 +52,8 @@ def project_file() -> Path:
 
 def _is_trusted(file: Path) -> bool:
     """Return whether a file can be read: it is of this user, or the user names its folder. Warn if not."""
-    if os.environ.get("CONSERVATIVE_PROJECT") == str(file.parent) or is_own(file):
+    named = os.environ.get("CONSERVATIVE_PROJECT")
+    if (named and Path(named).absolute() == file.parent) or is_own(file):
         return True
     remedy = f"To use its programs, set CONSERVATIVE_PROJECT={file.parent}"
     warnings.warn(f"{file} is not read, because other users can have written it. {remedy}", stacklevel=3)
