@@ -97,7 +97,10 @@ def cell(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
     known, made = deferred_imports.list_entries, {"crossed": row.case, "another": row.other}
 
     def list_entries(group: str) -> Any:
-        builders = {name: SimpleNamespace(load=lambda n=name: lambda: row.scene(made[n], n), value="tests") for name in made}
+        builders = {
+            name: SimpleNamespace(load=lambda n=name: lambda: row.scene(made[n], n), value="tests", module=__name__)
+            for name in made
+        }
         return known(group) | (builders if group == deferred_imports.SCENES else {})
 
     monkeypatch.setattr(deferred_imports, "list_entries", list_entries)

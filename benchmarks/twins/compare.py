@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from time import perf_counter
 
 import numpy as np
 
@@ -37,6 +38,8 @@ PERTURBED = 4
 """Number of starts that are perturbed to measure how an error of rounding grows."""
 ROUNDING = 1.0
 """Errors of rounding that a step may add, in units of that growth, each time. Measured on our methods: at most 0.9."""
+MANY, LONGEST = 1000, 3.0
+"""Number of steps of a body that is left out if a run of it takes longer, s: each pair needs ten runs or more."""
 HALVINGS = 12
 """Halvings of the interval, in powers of ten, that contains a threshold: to 1 % for an interval of nine powers."""
 
@@ -301,6 +304,18 @@ def count_twins(pairs: Sequence[Pair] = PAIRS) -> int:
     return sum(len(pair.bodies) for pair in pairs)
 
 
+def _too_long(machine: Machine, one: Description) -> str:
+    """Return why the pairs of a body are not run: a run of many steps takes too long; "" if it does not."""
+    if one.n_steps < MANY or machine.unsupported(one):
+        return ""
+    start = perf_counter()
+    with suppress(NotAvailable, IntegrationFailed):
+        run, start = machine.model(replace(one, n_steps=MANY // 10, every=MANY // 10)), perf_counter()
+        run()
+    spent = (perf_counter() - start) * one.n_steps / (MANY // 10)
+    return f"{one.n_steps} steps take {spent:.0f} s" if spent > LONGEST else ""
+
+
 def twins_of(method: Method, tell: Callable[[str], object] = lambda _: None, pairs: Sequence[Pair] = PAIRS) -> Iterator[Twins]:
     """Yield the result of every pair of every body, for one engine. `tell` is called with each before it runs.
 
@@ -309,9 +324,10 @@ def twins_of(method: Method, tell: Callable[[str], object] = lambda _: None, pai
     with machine_of(method).closing() as machine:
         engine = Engine(machine)
         for body, one in BODIES.items():
-            for pair in pairs:
-                if body not in pair.bodies:
-                    continue
+            some = [pair for pair in pairs if body in pair.bodies]
+            slow = _too_long(machine, one) if some else ""
+            for pair in some:
                 tell(f"{method.name}: {body}, {pair.name}")
-                yield compare(engine, method.name, body, pair, one)
+                ended = slow and Twins(method.name, body, pair.name, "not available", detail=slow)
+                yield ended or compare(engine, method.name, body, pair, one)
             engine.forget()
