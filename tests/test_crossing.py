@@ -254,6 +254,9 @@ def gate(cell: Cell) -> None:
 
 def run(cell: Cell) -> None:
     cell.check_last(cell.call("run", cell.name, "--dt", "0.004"))
+    chosen = cell.call("run", cell.name)  # method and step, for an error of 1e-6 rad
+    cell.check_last(chosen)
+    assert (chosen["status"], chosen["choice"]["reached"]) == ("ok", True)
 
 
 def run_odd_step(cell: Cell) -> None:
