@@ -26,6 +26,7 @@ from .options import (
 @click.command(
     cls=OutputCommand,
     short_help="Check that two descriptions of one body move equally.",
+    codes={1: "a pair differs, or an engine crashes"},
     epilog=epilog(
         "conservative twins mujoco",
         "conservative twins mujoco@3.13.0 mujoco@3.14.0",

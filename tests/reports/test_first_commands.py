@@ -107,18 +107,23 @@ def importers(shown):
     assert "2 of 2 answers of 2 engines are right" in shown
 
 
+def twins(shown):
+    assert shown.startswith("0 of 70 pairs differ in mujoco")
+
+
 CHECKS = {"new": new, "run": run, "watch": watch, "sweep": sweep, "judge": judge, "importers": importers}
-CHECKS |= {"engines add": add, "recommend": recommend}
+SLOW = {"recommend": recommend, "twins": twins}
+CHECKS |= {"engines add": add} | SLOW
 ELSEWHERE = {"engines install", "gate"}
 """The first is below, the second in `test_versions`, where a package with two commits is."""
 
 
 def test_every_command_of_the_block_is_checked():
     assert set(COMMANDS) == set(CHECKS) | ELSEWHERE
-    assert len(COMMANDS) == 10
+    assert len(COMMANDS) == 11
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "recommend")) for name in CHECKS])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in CHECKS])
 def test_a_command_of_readme_ends_well_and_shows_a_right_motion(name, folder):
     if name == "judge":
         invoke(*COMMANDS["run"])

@@ -27,7 +27,8 @@ GIVEN = {"spread": "attitude=5deg", "body": "brick_flip", "out": "somewhere"}
 """Values of options that are required."""
 LISTS = {"methods": ("gauss:stages=2,tol=1e-9", "mujoco:RK4"), "engines": ("mujoco", "exudyn@1.9"), "scenes": ("a:b=1", "c")}
 VALUES = {"t_end": "3.5", "dt": "0.25", "error": "1e-4", "out": "place", "picture": "picture.svg"} | LISTS
-CELLS = [(name, option) for name, command in COMMANDS.items() for option in command.params if option.name in VOCABULARY]
+OPTIONS = [(name, each) for name, command in COMMANDS.items() for each in command.params if isinstance(each, click.Option)]
+CELLS = [(name, option) for name, option in OPTIONS if option.name in VOCABULARY]
 cells = pytest.mark.parametrize(("name", "option"), CELLS, ids=[f"{name} {option.opts[0]}" for name, option in CELLS])
 
 
@@ -98,7 +99,7 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
 
 
 FAILING = {
-    *("run", "watch", "sweep", "report", "study", "gate", "track", "judge", "importers"),
+    *("run", "watch", "sweep", "report", "study", "gate", "track", "judge", "importers", "twins"),
     *("engines install", "engines check"),
 }
 """Commands that can end with exit code 1."""
