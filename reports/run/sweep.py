@@ -6,6 +6,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -23,12 +24,13 @@ from conservative.integration.many import integrate_many
 from conservative.integration.one import read_method
 from conservative.integration.spread import spread
 from conservative.integration.store import find_ensemble
+from conservative.method import Method
 from conservative.methods.trials import trials_of
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
 from ..terminal.progress import Step
-from .single_run import LARGE, read_error
+from .single_run import COMPARED, LARGE, find_errors, read_error, run_on
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
@@ -203,8 +205,8 @@ def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:
     names = [f"p{100 * share:g}" for share in QUANTILES]
     error = None
     if choice is None:
-        estimate = _estimate(sweep.scene, str(sweep.settings.get("method") or ""), ensemble.grid)
-        error = {"asked": None, "estimate": estimate, "reached": estimate <= LARGE, "bodies": 1}
+        method = read_method(sweep.settings.get("method"), sweep.scene)
+        error = {"asked": None, "bodies": 1, **_own_error(sweep.scene, method, ensemble.grid)}
     else:
         reached, bodies = choice.reached, getattr(choice, "bodies", 1)
         error = {"asked": choice.error, "estimate": choice.estimate, "reached": reached, "bodies": bodies}
@@ -231,14 +233,19 @@ def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:
     }
 
 
-def _estimate(scene: Scene, method: str, grid: Grid) -> float:
-    """Return the estimated attitude error of the scene itself, rad, from a run with twice the step; inf if it is lost."""
-    even = Grid(grid.dt, max(2, grid.n_steps // 4 * 4), 1)
-    return (
-        trials_of(scene)
-        .estimate(read_method(method or None, scene), replace(even, every=math.ceil(even.n_steps / 1000)))[0]
-        .error
-    )
+def _own_error(scene: Scene, method: Method, grid: Grid) -> dict[str, Any]:
+    """Return the attitude error of the scene itself, rad, or None and the reason, and whether it is small.
+
+    It is estimated from a run with twice the step, or measured if both differ completely or the second one fails.
+    """
+    grid, estimate = replace(grid, every=math.ceil(grid.n_steps / COMPARED)), math.inf
+    with suppress(BadInput):  # fewer than four steps, or twice the step is too long for the method
+        estimate = trials_of(scene).estimate(method, replace(grid, n_steps=grid.n_steps // 4 * 4))[0].error
+    if math.isfinite(estimate):
+        return {"estimate": estimate, "reached": estimate <= LARGE}
+    found = find_errors(run_on(scene, method, grid), grid, None, None, None)
+    attitude = found.get("attitude")
+    return {"estimate": attitude, "reached": attitude is not None and attitude <= LARGE, "reason": found.get("reason")}
 
 
 def rate_text(value: float) -> str:

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from conservative.methods.trials import ASYMPTOTIC
-
 from ..document.model import Document, Facts
 from ..run.sweep import rate_text
 
@@ -32,9 +30,11 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "run", run
     error = summary["error"]
     if error["asked"] is None:
-        size = f"{error['estimate']:.2g}" if error["estimate"] < ASYMPTOTIC else f"more than {ASYMPTOTIC:g}"
-        advice = "" if error["reached"] else "; the motions are inaccurate: use --error 1e-6 without --methods and --dt"
-        yield "error", f"{size} rad, estimated for the scene itself{advice}"
+        if error["estimate"] is None:
+            yield "error", error["reason"]
+        else:
+            advice = "" if error["reached"] else "; the motions are inaccurate: use --error 1e-6 without --methods and --dt"
+            yield "error", f"{error['estimate']:.2g} rad, of the scene itself{advice}"
     else:
         reached = "" if error["reached"] else ", so the target is not reached"
         estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
