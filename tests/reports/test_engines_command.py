@@ -83,6 +83,7 @@ COMMANDS = {
     "run": ("brick_flip", "--methods", "{}"),
     "study": ("motion", "--methods", "{}"),
     "sweep": ("brick_flip", "--spread", "rate=1%", "--starts", "2", "--methods", "{}"),
+    "twins": ("{}",),
     "watch": ("brick_flip", "--methods", "{}", "--out", "motion.html"),
 }
 """Commands that take an engine with a version, and their arguments."""
