@@ -231,7 +231,6 @@ def error_option(help: str, **kind: Any) -> Callable[[Any], Any]:
     return option("error", help, type=float, metavar="RAD", **kind)
 
 
-CHOSEN = "default: the method and step that `--error 1e-6` chooses"
 target_option = error_option(
     "Target attitude error, rad. Chooses the method and the step; not with --methods.  [default: 1e-6]"
 )
