@@ -10,9 +10,11 @@ import pytest
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.versions.causes import UNKNOWN, find_causes
 from conservative.benchmarks.versions.project import judge, judge_values
+from conservative.benchmarks.versions.version import Checkout, Version
 from conservative.programs import Program
 from conservative.references.environments.programs import program_class
 from conservative.registry import scene
+from conservative.version import VERSION
 
 from .made_up import comparison, row
 from .rewrites import MISTAKES, build, rewrite
@@ -54,3 +56,17 @@ def test_a_right_motion_has_no_cause_and_an_unknown_mistake_no_name(method):
     assert find_causes(method("-DEULER").solve) == ("", "")
     wrong = {"k[1] = (a * x + c * z - d * v) / 2;": "k[1] = (a * x - c * z + d * v) / 2;"}
     assert find_causes(method(changes=wrong).solve) == (UNKNOWN, UNKNOWN)
+
+
+def test_identical_programs_of_two_commits_are_said(tmp_path):
+    versions = []
+    for name, text in (("was", "1"), ("same", "1"), ("other", "2")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "program").write_text(text)
+        (tmp_path / name / "conservative.toml").write_text('[engines]\nmine = "./program --fast"\n')
+        versions.append(Version(name, name, Checkout("conservative", VERSION, tmp_path / name, "", ())))
+    was, same, other = versions
+    (note,) = judge(comparison((row(), row(), None), base=was, head=same)).notes
+    assert note.startswith("mine: both versions run identical files")
+    assert judge(comparison((row(), row(), None), base=was, head=other)).notes == ()
+    assert judge(comparison((row(), row(), None), base=was, head=was)).notes == ()  # of one commit
