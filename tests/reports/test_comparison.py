@@ -4,6 +4,7 @@ import json
 import math
 import re
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -203,9 +204,17 @@ def test_a_file_of_somebody_else_is_not_replaced(gate, tmp_path, option):
 
 
 def test_the_action_and_the_workflow_use_options_that_there_are():
-    known = {option for parameter in main.commands["gate"].params for option in parameter.opts}
+    known = {option for name in ("gate", "track") for parameter in main.commands[name].params for option in parameter.opts}
     for path in (".github/actions/gate/action.yml", "tests/example_package/pull_request.yml"):
         text = re.sub(r"(?m)^.*\b(git|pip|gh|echo)\b.*$", "", (ROOT / path).read_text())
         used = set(re.findall(r"(?<= )--[a-z-]+", text))
         assert used
         assert used <= known, used - known
+
+
+def test_a_row_of_another_motion_and_an_accepted_price_have_their_standing():
+    lost = replace(row(attitude_error_max=3.1), cause="no torque")
+    slow = ((row(), row(), timed((1.1, 1.08, 1.12), (1.1, 1.08, 1.12))),)
+    moved = comparison((row(), lost, None))
+    assert [str(cells[2]) for cells in table(moved, judge(moved).violations).rows] == [f"✗ {Standing.MOTION}"]
+    assert [str(cells[2]) for cells in table(comparison(*slow), ()).rows] == [Standing.PAID]

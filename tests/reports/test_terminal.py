@@ -92,3 +92,10 @@ def test_no_word_is_broken_and_no_line_too_long(width, monkeypatch, capsys):
 
 def test_a_wide_terminal_shows_every_cell_in_a_line():
     assert fit_columns([HEADER, *ROWS], 200) == [17, 23, 15, 19]
+
+
+def test_a_table_in_a_log_of_continuous_integration_has_at_most_100_columns(monkeypatch, capsys):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    monkeypatch.setenv("CI", "true")
+    print_table(Table([f"a column {i}" for i in range(30)], [["some words"] * 30]))
+    assert 80 < max(len(line.rstrip()) for line in capsys.readouterr().out.splitlines()) <= 100
