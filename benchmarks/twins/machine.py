@@ -18,10 +18,12 @@ from conservative.references.environments.environment import new_worker
 from conservative.references.environments.plain_numbers import join_numbers, read_states
 from conservative.references.samples import to_body_axes
 from conservative.references.worker.calls import python_worker, run_within
-from conservative.references.worker.client import Worker
+from conservative.references.worker.client import EngineTimeout, Worker, time_limit
 
 from .pairs import Description, Samples
 
+RUN_LIMIT = 20.0
+"""Wall time in s of a run of an engine, which takes at most a twentieth of that in the usual description."""
 LIMIT = 600.0
 """Wall time in s that a run in a new process may take."""
 
@@ -117,9 +119,12 @@ class EngineMachine(Machine):
 
         def samples() -> Any:
             try:
-                answer = run()
+                with time_limit(RUN_LIMIT):
+                    answer = run()
             except NotImplementedError as error:
                 raise NotAvailable(str(error)) from None
+            if isinstance(answer, EngineTimeout):  # such as of steps that become tiny, which is no other motion
+                raise NotAvailable(f"the run had not ended after {RUN_LIMIT:g} s")
             if isinstance(answer, IntegrationFailed):
                 worker.close()  # it may have lost its memory, as an aborted program of WebAssembly has
                 raise answer
