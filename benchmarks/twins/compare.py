@@ -38,6 +38,8 @@ PERTURBED = 4
 """Number of starts that are perturbed to measure how an error of rounding grows."""
 ROUNDING = 1.0
 """Errors of rounding that a step may add, in units of that growth, each time. Measured on our methods: at most 0.9."""
+LATER = 1000.0
+"""Another initial time in s, in adapters."""
 LONGEST = 1.0
 """A body is left out if a run of it takes longer, s: all pairs together need eighty runs or more."""
 HALVINGS = 12
@@ -179,6 +181,8 @@ def _apart(engine: Engine, pair: Pair, one: Description, size: float | None) -> 
     apart = difference(samples, pair.back(raw, *scale))
     if pair.same_bits:
         return Apart(apart)
+    if pair.way == "time":  # which is rounded, and so is each step
+        allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(one.w0)) * one.n_steps
     if allowed < apart and pair.way in OF_INERTIA:
         allowed = max(allowed, engine.rounding(twin, raw))
     return Apart(apart, allowed, "", size)
@@ -220,19 +224,33 @@ def _explain(engine: Engine, pair: Pair, one: Description, apart: Apart, told: C
         return False
 
     def stays(each: Description) -> bool:  # with shorter steps
-        if lost or (pair.exact and not pair.sizes) or engine.machine.adaptive:
+        if lost or (pair.exact and not pair.sizes):
             return True
         with suppress(NotAvailable, IntegrationFailed):
             coarse, fine = (_apart(engine, pair, some, size).value for some in (each, _finer(each, 4)))
             return not fine < coarse / 2
         return True
 
-    threshold = "" if size is None else _threshold(pair, one, size, wrong)
+    adaptive = engine.machine.adaptive and not lost and not pair.same_bits
+    threshold = "" if size is None or adaptive else _threshold(pair, one, size, wrong)
     if not stays(one):
         return told("same limit", detail="the difference falls with the step", threshold=threshold)
+    if adaptive:
+        return _with_tolerance(engine, pair, one, apart, told)
     first = _shrink(one, lambda each: wrong(each) and stays(each))
     detail = apart.failure or _words(engine, pair, first, size)
     return told("differs", detail=detail, threshold=threshold, first=first, size=size)
+
+
+def _with_tolerance(engine: Engine, pair: Pair, one: Description, apart: Apart, told: Callable[..., Twins]) -> Twins:
+    """Return the result of a pair that differs in an engine that chooses its steps: they may, as far as its tolerance allows."""
+    looser = engine.machine.looser()
+    if looser is None:
+        return told("not available", detail="it chooses its steps by a tolerance that is not known here")
+    with looser.closing(), suppress(NotAvailable, IntegrationFailed):
+        if _apart(Engine(looser), pair, one, apart.size).value > 2 * apart.value:
+            return told("same limit", detail="the difference falls with the tolerance")
+    return told("differs", detail=_words(engine, pair, one, apart.size), first=one, size=apart.size)
 
 
 def _words(engine: Engine, pair: Pair, one: Description, size: float | None) -> str:

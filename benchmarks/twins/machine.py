@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -40,11 +40,20 @@ class Machine:
     """
 
     def __init__(self, method: Method) -> None:
-        self.method, self.adaptive = method, method.order is None
+        self.method, self.adaptive, self._tolerances = method, method.order is None, tuple[str, ...]()
         self.precision = float(np.finfo("f4" if getattr(method, "precision", "f64") == "f32" else "f8").eps)
         if self.adaptive:
-            names = (getattr(getattr(method, "data", None), "tolerance", ""), "rtol", "tol")
-            self.precision = max([self.precision, *(getattr(method, name, 0.0) or 0.0 for name in names if name)])
+            own = getattr(getattr(method, "data", None), "tolerance", "")
+            self._tolerances = tuple(filter(None, (own, "rtol", "tol")))
+            self.precision = max([self.precision, *(getattr(method, name, 0.0) or 0.0 for name in self._tolerances)])
+
+    def looser(self) -> Machine | None:
+        """Return the machine of the method with a hundred times its tolerance; None if it has none that is known."""
+        name = next((name for name in self._tolerances if getattr(self.method, name, 0.0)), "")
+        if not self.adaptive or not name:
+            return None
+        tolerance = {name: min(100 * getattr(self.method, name), 0.1)}
+        return machine_of(replace(cast("Any", self.method), **tolerance))
 
     def has(self, way: str) -> bool:
         """Return whether the engine can be told about a body in a way."""

@@ -71,6 +71,9 @@ def prepare(given):
         try:
             context.SetTime(begin)
             start()
+            if given.integrator != "discrete":
+                simulator.get_mutable_integrator().Reset()  # it would begin with the step at which the last run ended
+                _choose(drake, simulator, given)
             simulator.Initialize()
             for sample, time in enumerate(times.tolist()):
                 if sample:  # AdvanceTo(0) would update a discrete plant

@@ -25,12 +25,12 @@ SHOWN = {  # of the table of several methods: the values have different sizes, s
 
 def summary(method, factor):
     return {
-        **{"scene": "body", "t_end": 1.0, "dt": 0.1, "method": method, "label": method, "outcome": OK},
+        **{"scene": "body", "t_end": 1.0, "dt": 0.1, "method": method, "label": method, "typed": method, "outcome": OK},
         "drift": {name: factor * value for name, value in DRIFTS.items()},
         "error": {"attitude": factor * 4e-4, "rate": factor * 5e-5},
         "counters": {"steps": int(factor * 6e6)},
         "wall_time": factor * 7e-7,
-        **{"orthonormality": 0.0, "last": None},
+        **{"orthonormality": 0.0, "last": None, "choice": None},
     }
 
 
@@ -45,8 +45,9 @@ def test_each_value_of_a_run_is_in_the_column_of_its_name_and_the_row_of_its_met
 def test_angles_of_a_sweep_are_in_the_unit_beside_them():
     angles = {"t": 1.0, "p5": 0.1, "p50": 0.5, "p95": 1.5}
     shown = {"scene": "body", "label": "a", "bodies": 3, "outcomes": {"ok": 3}, "spread": {}, "seed": 1, "failures": []}
-    shown |= {"t_end": 1.0, "steps": 10, "dt": 0.1, "samples": 2, "error": None, "found_before": 0, "wall_time": 1.0}
-    shown |= {"bodies_per_second": 1.0, "body_steps_per_second": 1.0, "drift": {}, "angle_from_mean": [angles]}
+    shown |= {"t_end": 1.0, "steps": 10, "dt": 0.1, "samples": 2, "found_before": 0, "wall_time": 1.0}
+    shown |= {"error": {"asked": None, "estimate": None, "reason": "not estimated"}, "angle_from_mean": [angles]}
+    shown |= {"bodies_per_second": 1.0, "body_steps_per_second": 1.0, "drift": {}}
     (facts,) = sweep.build(shown | {"out": None, "picture": None}).blocks
     assert isinstance(facts, Facts)
     (text,) = (value for name, value in facts.facts if name == "  at t = 1 s")
