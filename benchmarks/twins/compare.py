@@ -243,7 +243,7 @@ def _explain(engine: Engine, pair: Pair, one: Description, apart: Apart, told: C
 
 
 def _with_tolerance(engine: Engine, pair: Pair, one: Description, apart: Apart, told: Callable[..., Twins]) -> Twins:
-    """Return the result of a pair that differs in an engine that chooses its steps: they may, as far as its tolerance allows."""
+    """Return the result of a pair that differs in an engine that chooses its steps, which may be by its tolerance."""
     looser = engine.machine.looser()
     if looser is None:
         return told("not available", detail="it chooses its steps by a tolerance that is not known here")

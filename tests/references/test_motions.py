@@ -295,7 +295,7 @@ def test_the_study_reports_failures_and_refuses_other_scenes():
             studies.findings(Study("motions", (cv.registry.scene("brick_flip"),), engines[:1]), lambda *call: seen.append(call))
         )
     (_, table) = section(with_names(frame(found.values())), None).blocks
-    assert [row[1:5] for row in table.rows] == [["2", "0", "0", "0"], ["0", "0", "2", "0"], ["0", "0", "2", "0"]]
+    assert [row[1:5] for row in table.rows] == [["2 of 2", "0", "0", "–"], ["0 of 0", "2", "0", "–"], ["0 of 0", "2", "0", "–"]]
 
 
 HELD_OUT = ("reduced", "rattle", "lie_variational", "gauss", "splitting:order=2", "taylor:order=8", "textbook:spiers", "scipy")
