@@ -91,6 +91,8 @@ def _build_free(bullet, given):
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
     arm = given.R0 @ given.com if hasattr(given, "p_WB0") else np.zeros(3)
     place = (getattr(given, "p_WB0", 0) + arm).tolist()
+    if way_of(given) == "file" and maximal:
+        raise NotImplementedError("the file has no shape, which a body in maximal coordinates needs")
     if way_of(given) == "file":
         with NamedTemporaryFile("w", suffix=".urdf") as file:
             file.write(write_urdf(given))
