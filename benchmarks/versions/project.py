@@ -298,17 +298,19 @@ def _conserved(row: Row) -> dict[str, float]:
 
 def _moves(was: Row, now: Row) -> bool:
     """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
-    if was.status is not Status.PASSED or now.status is Status.SKIPPED or was.definition != now.definition:
+    if Status.SKIPPED in (was.status, now.status) or was.status is Status.ERROR or was.definition != now.definition:
         return False
-    return (now.cause not in ("", was.cause)) or error_of(was) <= LOST < OTHER < error_of(now)
+    if now.cause not in ("", was.cause):  # also where the motion is lost in both
+        return True
+    return was.status is Status.PASSED and error_of(was) <= LOST < OTHER < error_of(now)
 
 
 def _moved(was: Row, now: Row) -> Violation:
     """Return the violation by another motion, with its cause."""
+    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.reason})"
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
     cause = now.cause if now.cause not in ("", was.cause) else "no mistake that `engines check` knows explains it"
-    texts = f"{error_of(was):.3g} rad from that of the scene", f"{size}. {cause}"
-    return Violation(MOTION, now.scene, now.method, *texts, "")
+    return Violation(MOTION, now.scene, now.method, before, f"{size}. {cause}", "")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
