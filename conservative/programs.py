@@ -5,7 +5,7 @@
 
 The project's file is in the working directory, or in the nearest folder above it in the same repository or in the home folder;
 CONSERVATIVE_PROJECT names another folder to start from. A file that other users could have written is not read, because its
-programs would run: only that of the folder which CONSERVATIVE_PROJECT names is, whoever wrote it. The user's file is in the
+programs would run. The one in the folder that CONSERVATIVE_PROJECT names is read, whoever wrote it. The user's file is in the
 configuration folder of platformdirs. A name in the project's file takes precedence over one in the user's.
 """
 

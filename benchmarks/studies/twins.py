@@ -91,7 +91,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def _ratio(twins: Twins) -> float:
-    return 0.0 if twins.outcome in ("same bits", "same limit") else twins.factor
+    if twins.outcome == "same limit":  # which rounding need not explain
+        return np.nan
+    return 0.0 if twins.outcome == "same bits" else twins.factor
 
 
 def _outcome(twins: Twins) -> tuple[Outcome, str]:

@@ -37,7 +37,7 @@ BODIES = {"body": BODY, "top": TOP, "needle": NEEDLE, "thin rod": ROD, "rod abou
 PERTURBED = 4
 """Number of starts that are perturbed to measure how an error of rounding grows."""
 ROUNDING = 1.0
-"""Errors of rounding that a step may add, in units of that growth, each time. Measured on our methods: at most 0.9."""
+"""Errors of rounding that a step may add, in units of that growth. Right engines differ by at most 0.77 of the sum."""
 LATER = 1000.0
 """Another initial time in s, in adapters."""
 LONGEST = 1.0

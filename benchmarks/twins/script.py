@@ -17,7 +17,7 @@ from .compare import Twins
 from .pairs import PAIRS, Description
 
 MARK = "conservative twins: "
-"""What the first line of a script has."""
+"""Text in the first line of every script, by which an earlier one is recognized."""
 SCRIPTS_OF_NODE = ("rapier_js", "jolt")
 FOLDER = Path(__file__).with_name("scripts")
 SAME = {"rapier_deterministic": "rapier_js"}

@@ -173,7 +173,7 @@ def worker_of(environment: Environment, precision: str = "f64") -> Worker:
 
 
 def new_worker(environment: Environment, precision: str = "f64") -> Worker:
-    """Return a worker of an environment that nobody else uses."""
+    """Return a new worker of an environment, which the caller closes."""
     cache = environment.folder / "home" / ".cache" / "jax"
     jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64")), "JAX_COMPILATION_CACHE_DIR": str(cache)}
     return environment.start_worker(jax)

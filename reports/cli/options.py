@@ -31,7 +31,7 @@ VOCABULARY: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxy
         "picture": (("--picture",), ()),
     }
 )
-"""What several commands ask for: its names, and those of the last release, which work with a note until the next one."""
+"""Options of several commands: their names, and those of the last release, which work with a note until the next one."""
 FAILED = "a run failed"
 EXIT_CODES = {
     0: "done",

@@ -1,4 +1,4 @@
-"""What commands show: values under the names of their columns, angles in the unit beside them, and the faster one as faster."""
+"""Commands show values under the names of their columns, angles in the unit beside them, and the faster one as faster."""
 
 import math
 
