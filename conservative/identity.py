@@ -1,30 +1,104 @@
 """When two values are the same: a digest of all that their behaviour depends on, the same in every process.
 
-A frozen dataclass is represented by its fields, without those that are declared with `NOT_OF_MOTION`. A function is represented
-by its code and the values and functions that it uses, because pickle's bytes of equal functions differ between processes.
+A value is followed by its parts. Functions of Python are their code and all that the code reads: globals, attributes of modules,
+closures and defaults (`conservative.code_reads`). Objects are their class, their attributes, and the parts that pickle would
+store, which covers objects of C such as bound methods. Libraries whose functions depend on their arguments only (`PURE`) are
+followed by name. Frozen dataclasses of this package are their fields, without those declared with `NOT_OF_MOTION`.
+
+One rule covers everything else: a value of which any part cannot be followed equals itself only, and nothing is cached by it.
+Examples are open files, generators, random numbers, environment variables, pointers, modules that are passed on, functions that
+write to variables outside of themselves, and code that keeps earlier values of what it reads (numba, `lru_cache`).
 """
 
 from __future__ import annotations
 
+import builtins
 import hashlib
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
-from functools import cache, partial
-from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, cached_property
+from types import CodeType, FunctionType, GetSetDescriptorType, MappingProxyType, MemberDescriptorType, MethodType, ModuleType
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
-_LIBRARIES = sys.stdlib_module_names | {"conservative", "numpy", "scipy"}
-"""Packages whose classes are represented by their names."""
+from .code_reads import LOCAL, MISSING, Reads, reads_of, resolve
+
+_PACKAGE = __name__.partition(".")[0]
+PURE = frozenset(
+    f"{_PACKAGE} abc bisect builtins cmath collections collections.abc contextlib copy copyreg dataclasses datetime decimal enum "
+    "fractions functools heapq itertools math numbers numpy operator scipy statistics types typing "
+    "_bisect _collections _collections_abc _functools _heapq _operator".split()
+)
+"""Packages whose functions depend on their arguments only, and whose functions and classes are represented by their names."""
+_NOT_PURE = frozenset(
+    "builtins.open builtins.input builtins.eval builtins.exec builtins.compile builtins.globals builtins.__import__ "
+    "builtins.hash builtins.id builtins.breakpoint datetime.datetime.now numpy.random numpy.load numpy.loadtxt numpy.genfromtxt "
+    "numpy.fromfile numpy.fromregex numpy.memmap numpy.lib numpy.ctypeslib scipy.io scipy.datasets scipy.stats.rv_generic".split()
+)
+"""Their parts that read files, the state of the interpreter, or random numbers."""
+_HIDDEN = frozenset("__globals__ __closure__ __code__ __self__ __func__ f_globals f_locals tb_frame now today".split())
+"""Attributes that read something else than parts of a value."""
+_NOT_OF_BEHAVIOUR = frozenset(
+    "__dict__ __weakref__ __doc__ __module__ __annotations__ __firstlineno__ __static_attributes__ __annotate__ __annotate_func__ "
+    "__annotations_cache__ __abstractmethods__ _abc_impl __parameters__ __orig_bases__ __dataclass_fields__ __dataclass_params__ "
+    "__match_args__ __slots__ __slotnames__ __hash__ __repr__ __eq__ __replace__ __qualname__".split()
+)
+"""Attributes of a class on which the behaviour of its instances does not depend, or that repeat others."""
+_OF_CONSTRUCTION = frozenset(
+    "__init__ __new__ __post_init__ __init_subclass__ __set_name__ __del__ __reduce__ __reduce_ex__ __getstate__ __setstate__ "
+    "__getnewargs__ __copy__ __deepcopy__ __setattr__ __delattr__ __str__ __class_getitem__".split()
+)
+"""Methods that make or copy an instance, which matter if its class is called."""
+_NUMBERS = frozenset({bool, int, float, complex, str, bytes, type(None), type(...), type(NotImplemented)})
+_OF_KERNELS = "_callback"
+"""Attribute that kernels add to a value (`conservative.potentials.callback`)."""
+_MOST_PARTS = 10_000
+"""Largest number of parts, 0.2 s of work: a table of another package can lead to all of its code."""
 NOT_OF_MOTION = {"of motion": False}
 """Metadata of a field that does not change the motion, such as a name."""
 
 
+class _NotFollowed(Exception):
+    """A part cannot be followed. The argument names it."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The identity of a value.
+
+    Attributes
+    ----------
+    text
+        Equal for values with the same behaviour; another one at each call if `unknown`.
+    unknown
+        The part that cannot be followed, in words, or "".
+    fixed
+        True if the value cannot change: it contains numbers and texts, and no functions or objects that refer to others.
+    """
+
+    text: str
+    unknown: str
+    fixed: bool
+
+
+def identify(value: object) -> Identity:
+    """Return the identity of a value as it is now."""
+    walk = _Walk()
+    try:
+        return Identity(walk.follow(value), "", walk.fixed)
+    except _NotFollowed as part:
+        return Identity(f"unknown {uuid4().hex}", str(part), False)
+    except Exception as error:  # a class of a user whose attributes raise an exception; or RecursionError
+        return Identity(f"unknown {uuid4().hex}", f"{type(value).__name__} ({type(error).__name__})", False)
+
+
 def digest(value: object) -> str:
-    """Return a text that is equal for values with the same behaviour."""
-    return hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()
+    """Return a text that is equal for values with the same behaviour; another one at each call if it cannot be followed."""
+    return identify(value).text
 
 
 @cache
@@ -33,51 +107,270 @@ def fields_of_motion(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.metadata.get("of motion", True))
 
 
-def _list_parts(value: Any, above: list[object]) -> Any:  # noqa: PLR0912  # a branch for each kind of value
-    """Return nested lists with the same `repr` in every process. `above` are the values around this one: cycles end."""
-    value = getattr(value, "py_func", value)  # a function that numba has compiled
-    kind, inner = f"{type(value).__module__}.{type(value).__qualname__}", [*above, value]
-    if value is None or value is ... or isinstance(value, bool | int | float | complex | str | bytes):
-        return [kind, repr(value)]
-    if isinstance(value, np.ndarray | np.generic) and value.dtype != object:
-        return [kind, value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
-    if any(each is value for each in above):
-        return [kind]
-    if isinstance(value, CodeType):
-        parts: list[Any] = [value.co_code, value.co_names, value.co_varnames, value.co_consts]
-    elif isinstance(value, FunctionType):
-        known = value.__globals__
-        used = {name: known[name] for name in sorted({*_names(value.__code__)}) if name in known}
-        cells = [cell.cell_contents for cell in value.__closure__ or ()]
-        parts = [value.__code__, value.__defaults__, value.__kwdefaults__, used, cells]
-    elif isinstance(value, type) and value.__module__.partition(".")[0] not in _LIBRARIES:
-        own = {name: each for name, each in vars(value).items() if not name.startswith("__") or name == "__call__"}
-        parts = [value.__qualname__, value.__bases__, own]
-    elif isinstance(value, ModuleType | type | BuiltinFunctionType | np.ufunc):
-        parts = [getattr(value, "__module__", ""), getattr(value, "__qualname__", value.__name__)]
-    elif isinstance(value, MethodType):
-        parts = [value.__func__, value.__self__]
-    elif isinstance(value, partial):
-        parts = [value.func, value.args, value.keywords]
-    elif isinstance(value, Mapping):
-        parts = [[key, value[key]] for key in sorted(value, key=repr)]
-    elif isinstance(value, set | frozenset):
-        parts = sorted(value, key=repr)
-    elif isinstance(value, list | tuple | np.ndarray):
-        parts = list(value)
-    elif is_dataclass(value):
-        kind_of: Any = type(value)
-        named = [(repr(name), getattr(value, name)) for name in fields_of_motion(kind_of)]
-        return [kind, [["builtins.list", [["builtins.str", name], _list_parts(part, inner)]] for name, part in named]]
-    else:  # an object: its class and attributes; one of C, without attributes, equals itself only
-        slots = {name: getattr(value, name, None) for base in type(value).__mro__ for name in getattr(base, "__slots__", ())}
-        parts = [type(value), slots | value.__dict__ if hasattr(value, "__dict__") else slots or id(value)]
-    return [kind, [_list_parts(part, inner) for part in parts]]
+def _top(module: object) -> str:
+    return module.partition(".")[0] if isinstance(module, str) else ""
 
 
-def _names(code: CodeType) -> Iterator[str]:
-    """Yield the names that a function and the functions in it use."""
-    yield from code.co_names
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _names(each)
+def _is_pure(name: str) -> bool:
+    """Return whether a dotted name is in a library that is followed by name."""
+    parts = name.split(".")
+    return parts[0] in PURE and not any(".".join(parts[:n]) in _NOT_PURE for n in range(1, len(parts) + 1))
+
+
+def _hash(parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+class _Walk:
+    """One digest. `path` are the values around the current one: a cycle is a reference to its place there.
+
+    Texts of values that were followed are in `known`, and the values in `kept`, so that their ids stay valid.
+    """
+
+    def __init__(self) -> None:
+        self.path: list[int] = []
+        self.known: dict[int, str] = {}
+        self.kept: list[object] = []
+        self.fixed = True
+        self.reads = 0
+        self.in_library = False
+
+    def follow(self, value: Any) -> str:
+        """Return the text of a value. Raise `_NotFollowed`."""
+        kind = type(value)
+        if kind in _NUMBERS:
+            return repr(value)
+        if kind is np.ndarray or isinstance(value, np.generic):
+            return self._follow_array(value)
+        if id(value) in self.known:
+            return self.known[id(value)]
+        if id(value) in self.path:
+            return f"cycle {self.path.index(id(value))}"
+        self.path.append(id(value))
+        self.kept.append(value)
+        if len(self.kept) > _MOST_PARTS:
+            raise _NotFollowed(f"more than {_MOST_PARTS} parts, the last a {kind.__name__}")
+        text = _hash([f"{kind.__module__}.{kind.__qualname__}", *self._list_parts(value)])
+        self.path.pop()
+        self.known[id(value)] = text
+        return text
+
+    def _all(self, values: Iterable[Any]) -> list[str]:
+        return [self.follow(each) for each in values]
+
+    def _follow_array(self, value: Any) -> str:
+        if value.dtype.hasobject:
+            self.fixed = False
+            return _hash(["objects", value.shape, self._all(value.ravel().tolist())])
+        if isinstance(value, np.ndarray) and value.flags.writeable:
+            self.fixed = False
+        kind = f"{type(value).__module__}.{type(value).__qualname__}"
+        return _hash([kind, np.lib.format.dtype_to_descr(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()])
+
+    def _list_parts(self, value: Any) -> Iterator[Any]:
+        """Yield the texts of the parts of a value that is neither a number, a text nor an array."""
+        kind: Any = type(value)
+        if kind is tuple:
+            yield self._all(value)
+            return
+        if kind is frozenset:
+            yield sorted(self._all(value))
+            return
+        if is_dataclass(kind) and _top(kind.__module__) == _PACKAGE and "<" not in kind.__qualname__:
+            yield [(name, self.follow(getattr(value, name))) for name in fields_of_motion(kind)]
+            return
+        self.fixed = False
+        if kind is CodeType:
+            raise _NotFollowed("code that is passed on")
+        if kind is list:
+            yield self._all(value)
+        elif kind in (dict, MappingProxyType):
+            yield [(self.follow(key), self.follow(each)) for key, each in value.items()]
+        elif kind is set:
+            yield sorted(self._all(value))
+        elif isinstance(value, ModuleType):
+            if not (self.in_library and _is_pure(value.__name__)):
+                raise _NotFollowed(f"the module {value.__name__}, which is passed on")
+            yield value.__name__
+        elif (name := _library_name(value)) is not None:
+            yield name
+        elif kind is FunctionType:
+            yield from self._list_of_function(value)
+        elif kind is MethodType:
+            yield self.follow(value.__func__)
+            yield self.follow(value.__self__)
+        elif kind in (staticmethod, classmethod):
+            yield self.follow(value.__func__)
+        elif kind is property:
+            yield self._all((value.fget, value.fset, value.fdel))
+        elif kind is cached_property:
+            yield self.follow(value.func)
+        elif kind in (MemberDescriptorType, GetSetDescriptorType):
+            yield [self.follow(value.__objclass__), value.__name__]
+        elif isinstance(value, type):
+            yield from self._list_of_class(value, called=True)
+        elif _keeps_values(kind):
+            yield from self._list_of_keeper(value)
+        else:
+            yield from self._list_of_object(value)
+
+    # ------------------------------------------------------------------------------------------------ functions
+
+    def _list_of_function(self, value: Any) -> Iterator[Any]:
+        before, self.in_library = self.in_library, _is_pure(f"{value.__module__}.{value.__qualname__}")
+        code, cells = value.__code__, {}
+        for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True):
+            try:
+                cells[name] = cell.cell_contents
+            except ValueError:  # a variable that has no value yet
+                cells[name] = MISSING
+        yield self._follow_code(code, value.__globals__, cells)
+        yield self._all((value.__defaults__, value.__kwdefaults__))
+        yield [(name, self.follow(each)) for name, each in sorted(vars(value).items()) if name != "__wrapped__"]
+        self.in_library = before
+
+    def _follow_code(self, code: CodeType, known: Mapping[str, Any], cells: Mapping[str, Any]) -> str:
+        """Return the text of code with globals `known`; `cells` has the variables of enclosing functions, or `LOCAL`."""
+        reads: Reads = reads_of(code)
+        if reads.writes_global or any(cells.get(name, MISSING) is not LOCAL for name in reads.written):
+            raise _NotFollowed(f"{code.co_name}, which writes to a variable outside of itself")
+        if hidden := _HIDDEN.intersection(code.co_names):
+            raise _NotFollowed(f"{code.co_name}, which reads .{min(hidden)}")
+        parts: list[Any] = [code.co_code, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars, code.co_flags]
+        parts += [code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_exceptiontable]
+        for read in reads.reads:
+            found, name = resolve(read, known, cells, _is_pure)
+            if found is LOCAL:
+                continue
+            if found is MISSING and (read.imported or "." in name):  # not yet imported, or made by the module when it is read
+                raise _NotFollowed(f"{code.co_name}, which reads {name}")
+            self.reads += not (found is MISSING or _library_name(found) is not None)
+            if isinstance(found, ModuleType) and not self.in_library:
+                raise _NotFollowed(f"{code.co_name}, which passes on the module {name}")
+            if name == "__class__":  # for `super`
+                parts.append((name, self._follow_class(found, called=False)))
+            else:
+                parts.append((name, "missing" if found is MISSING else self.follow(found)))
+        inside = {**cells, **dict.fromkeys(code.co_cellvars, LOCAL)}
+        for name, read in reads.bound.items():
+            if name in code.co_cellvars:
+                inside[name] = resolve(read, known, cells, _is_pure)[0]
+        for each in code.co_consts:
+            parts.append(self._follow_code(each, known, inside) if isinstance(each, CodeType) else self.follow(each))
+        return _hash(parts)
+
+    def _list_of_keeper(self, value: Any) -> Iterator[Any]:
+        """Follow compiled code or a cache, which have earlier values of what their function reads: it may read libraries only."""
+        function = next((found for name in ("py_func", "__wrapped__") if (found := getattr(value, name, None))), None)
+        if not isinstance(function, FunctionType):
+            raise _NotFollowed(f"a {type(value).__name__}")
+        reads, self.reads = self.reads, 0
+        text = self.follow(function)
+        defaults = *(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()
+        if self.reads or function.__closure__ or not all(type(each) in _NUMBERS for each in defaults):
+            raise _NotFollowed(f"{function.__name__}, a {type(value).__name__}, which keeps earlier values of what it reads")
+        self.reads += reads
+        yield text
+
+    # ------------------------------------------------------------------------------------------------ classes and objects
+
+    def _list_of_class(self, value: Any, called: bool) -> Iterator[Any]:
+        """Yield the parts of a class, with its constructors if it is `called`."""
+        yield value.__qualname__
+        metaclass = type(value)
+        yield metaclass.__qualname__ if metaclass is type else self._follow_class(metaclass, called=True)
+        yield [self._follow_class(base, called) for base in value.__bases__]
+        left_out = _NOT_OF_BEHAVIOUR if called else _NOT_OF_BEHAVIOUR | _OF_CONSTRUCTION
+        if "__dataclass_fields__" in vars(value):
+            described = [(each.name, each.init, each.kw_only, each.default, each.default_factory) for each in fields(value)]
+            yield [self._all(each) for each in described]
+            made = getattr(vars(value).get("__init__"), "__code__", None)
+            left_out |= {"__init__", "__setattr__", "__delattr__"} if made and made.co_filename == "<string>" else set()
+        own = ((name, each) for name, each in sorted(vars(value).items()) if name not in left_out)
+        slots = MemberDescriptorType, GetSetDescriptorType
+        yield [(name, "a slot" if isinstance(each, slots) else self.follow(each)) for name, each in own]
+
+    def _follow_class(self, value: Any, called: bool) -> str:
+        """Return the text of a class: its name in a library, otherwise its parts."""
+        if called:
+            return self.follow(value)
+        if (name := _library_name(value)) is not None:
+            return name
+        if _top(value.__module__) in sys.stdlib_module_names and _top(value.__module__) != "__main__":
+            raise _NotFollowed(f"a {value.__module__}.{value.__qualname__}")
+        if id(value) in self.path:
+            return f"cycle {self.path.index(id(value))}"
+        self.path.append(id(value))
+        text = _hash(list(self._list_of_class(value, called=False)))
+        self.path.pop()
+        return text
+
+    def _list_of_object(self, value: Any) -> Iterator[Any]:
+        """Yield class, attributes, slots and, for what else it may consist of, the parts that pickle stores."""
+        kind: Any = type(value)
+        name = f"{kind.__module__}.{kind.__qualname__}"
+        if hasattr(kind, "__next__") or not _is_pure(name) and _top(name) in PURE:
+            raise _NotFollowed(f"a {name}")
+        yield self._follow_class(kind, called=False)
+        before, self.in_library = self.in_library, _is_pure(name)
+        derived = _derived_names(kind)
+        attributes = getattr(value, "__dict__", {})
+        yield [(key, self.follow(each)) for key, each in sorted(attributes.items()) if key not in derived and key != _OF_KERNELS]
+        for base in kind.__mro__:
+            for key, slot in sorted(vars(base).items()):
+                if isinstance(slot, MemberDescriptorType):
+                    with suppress(AttributeError):  # a slot without a value
+                        yield key, self.follow(slot.__get__(value))
+        if not derived:
+            try:
+                reduced = value.__reduce_ex__(4)
+            except Exception:
+                raise _NotFollowed(f"a {name}") from None
+            if isinstance(reduced, str):
+                raise _NotFollowed(f"{reduced}, a {name}")
+            make, arguments, state, *others = (*reduced, None, None, None)[:5]
+            yield ["its class" if each is kind else self.follow(each) for each in (make, *arguments)]
+            yield self.follow(state)
+            yield [self.follow(list(each)) for each in others if each is not None]
+        self.in_library = before
+
+
+def _library_name(value: Any) -> str | None:
+    """Return the name of a function or class of a library that is followed by name; None for another value."""
+    module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
+    if isinstance(value, type):
+        full = f"{module}.{name}"
+        return full if _is_pure(full) else None
+    if isinstance(value, np.ufunc):
+        module, name = next((each for each in ("numpy", "scipy.special") if _is_in(each, value.__name__, value)), ""), value.__name__
+    owner = getattr(value, "__self__", None)
+    if isinstance(owner, ModuleType):
+        module = owner.__name__
+    elif owner is not None or not callable(value):
+        return None
+    full = f"{module}.{name}"
+    if not isinstance(module, str) or not isinstance(name, str) or not _is_pure(full) or not _is_in(module, name, value):
+        return None
+    return full
+
+
+def _is_in(module: str, name: str, value: object) -> bool:
+    """Return whether a module that was imported has the value under a dotted name."""
+    found: Any = builtins if module == "builtins" else sys.modules.get(module)
+    for each in name.split("."):
+        found = getattr(found, each, None)
+    return found is value
+
+
+def _keeps_values(kind: type) -> bool:
+    """Return whether values of a class have compiled or cached results of a function of Python."""
+    return _top(kind.__module__) == "numba" or kind.__name__ == "_lru_cache_wrapper"
+
+
+@cache
+def _derived_names(kind: Any) -> frozenset[str]:
+    """Return the attributes of a frozen dataclass that follow from its fields: cached properties, and those not of motion."""
+    if not is_dataclass(kind) or not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        return frozenset()
+    cached = {name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property)}
+    return frozenset(cached | {each.name for each in fields(kind)} - {*fields_of_motion(kind)})

@@ -223,4 +223,5 @@ class Method(ABC):
         BadInput
             dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
         """
+        scene = scene.now()
         return self.solve(scene, grid_for(scene, dt, t_end, sample_every))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 
@@ -20,15 +20,16 @@ from .check import (
     finite_array,
     positive_number,
     printable_text,
+    replace_unchecked,
     require_size,
     rotation,
     set_fields,
 )
 from .errors import BadInput
 from .flight import Flight, read_flight
-from .identity import NOT_OF_MOTION, digest
+from .identity import NOT_OF_MOTION, Identity, identify
 from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
-from .needs import LOADS, Needs, needs_of
+from .needs import LOADS, Need, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.smoothness import SMOOTH, Smoothness, examine
@@ -165,6 +166,8 @@ class Scene(PickledByFields):
             require_size(body.inertia)
         for varying in self.loads:
             varying.require(end, self.R_WB0)  # for its exception
+        if self.changeable and not self.identity.unknown:
+            vars(self)["_current"] = self.key, None
 
     @cached_property
     def needs(self) -> Needs:
@@ -172,10 +175,48 @@ class Scene(PickledByFields):
         parts = self.body, self.potential, self.torque, self.damping, self.flight
         return frozenset().union(*map(needs_of, parts))
 
-    @cached_property
+    @property
     def key(self) -> str:
-        """A text that is equal for scenes with the same motion: a digest of all fields except name, dt, group and source."""
-        return digest(self)
+        """A text that is equal for scenes with the same motion: a digest of all fields except name, dt, group and source.
+
+        Functions are compared as they are now, with all that they read, such as global variables. A scene with a part that
+        cannot be followed, such as an open file, has a key of its own: it equals itself only (`conservative.identity`).
+        """
+        return self.identity.text
+
+    @property
+    def identity(self) -> Identity:
+        """The key, and the part that cannot be followed, if there is one."""
+        known: Identity | None = vars(self).get("_identity")
+        if known is not None:
+            return known
+        now = identify(self)
+        if now.fixed:
+            vars(self)["_identity"] = now
+        return replace(now, text=vars(self).setdefault("_alone", now.text)) if now.unknown else now
+
+    @cached_property
+    def changeable(self) -> bool:
+        """True if functions or classes of a user act, which may change with what they read."""
+        fields_of_users = {Need.FIELD, Need.FUNCTION, Need.TIME}
+        return not self.needs.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
+
+    def now(self) -> Scene:
+        """Return the scene as its functions are now: itself, or a copy without caches if they changed, or may have.
+
+        Break points, scales and compiled code are cached with a scene and its parts. Functions that read a global variable are
+        others when it changes, and those that cannot be followed may be others in each call.
+        """
+        if not self.changeable:
+            return self
+        identity, (key, copy) = self.identity, vars(self).get("_current", ("", None))
+        if key == identity.text:
+            return copy or self
+        fresh: Scene = _copy(self)
+        if not identity.unknown:
+            vars(self)["_current"] = identity.text, fresh
+            vars(fresh)["_current"] = identity.text, None
+        return fresh
 
     @property
     def free(self) -> bool:
@@ -196,7 +237,7 @@ class Scene(PickledByFields):
     @property
     def breaks(self) -> Array:
         """Times (n,) above 0 at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
-        return self.smoothness().breaks
+        return self.now().smoothness().breaks
 
     def smoothness(self, t_end: float = 0.0) -> Smoothness:
         """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
@@ -297,3 +338,10 @@ class Scene(PickledByFields):
         start = f"R_WB0={self.R_WB0.tolist()}, w_WB_B0={self.w_WB_B0.tolist()}"
         flight = f", flight={self.flight!r}" if self.flight else ""
         return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r}{flight})"
+
+
+def _copy(value: Any) -> Any:
+    """Return a copy of a frozen dataclass of this package, and of those in it, without caches; another value itself."""
+    if not is_dataclass(value) or not type(value).__module__.startswith(f"{__package__}."):
+        return value
+    return replace_unchecked(value, **{each.name: _copy(getattr(value, each.name)) for each in fields(value)})

@@ -93,6 +93,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     MissingEngine
         A package that a solution needs is not installed.
     """
+    scene = scene.now()
     if scene.loaded and Need.FUNCTION not in scene.needs:
         return _confirm_loads(scene, grid)
     first, second, allowed = _pair(scene)
@@ -118,6 +119,7 @@ def solve(scene: Scene, grid: Grid) -> Trajectory:
 
     Raise `MissingEngine` if a package that it needs is not installed.
     """
+    scene = scene.now()
     first = _pair(scene)[0]
     return (Precise(BITS) if isinstance(first, Precise) else first).solve(scene, grid)
 

@@ -106,6 +106,7 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
+    scene = scene.now()
     flight, scene = scene.flight, rotation_only(scene)
     _check_options(threads, progress, path, resume)
     only_scene = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None

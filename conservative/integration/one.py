@@ -119,6 +119,7 @@ def integrate(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
+    scene = scene.now()
     choice("on_failure", on_failure, ("raise", "return"))
     if progress is not None and not callable(progress):
         raise BadInput("progress", describe(progress), "a function of a Progress, such as print, or None")

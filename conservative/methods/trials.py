@@ -125,8 +125,12 @@ class Trials:
 
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
-    """Return the trial runs of a scene, including cached ones; `progress` is called as `integrate` describes."""
-    return Trials(scene, recall(scene.key), (lambda method, grid: None) if progress is None else throttle(progress))
+    """Return the trial runs of a scene, including cached ones; `progress` is called as `integrate` describes.
+
+    Nothing is cached for a scene that cannot be followed (`Scene.key`).
+    """
+    known = {} if (identity := scene.identity).unknown else recall(identity.text)
+    return Trials(scene, known, (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)

@@ -1,0 +1,140 @@
+"""What the code of a function reads from outside: globals, variables of enclosing functions, and imports, with their attributes.
+
+`gains.k` and `import gains` inside of a function are read through modules: the value is the attribute `k` as it is now. Bytecode
+is read, because the source of a function is often not available.
+"""
+
+from __future__ import annotations
+
+import builtins
+import dis
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import CodeType, MappingProxyType, ModuleType
+from typing import Any, NamedTuple
+
+LOCAL: Any = type("Local", (), {"__repr__": lambda self: "LOCAL"})()
+"""A variable of a call, which is not read from outside."""
+MISSING: Any = type("Missing", (), {"__repr__": lambda self: "MISSING"})()
+"""A name without a value."""
+_SKIPPED = frozenset("RESUME NOP PUSH_NULL EXTENDED_ARG PRECALL COPY_FREE_VARS MAKE_CELL NOT_TAKEN CACHE".split())
+_WHILE_IMPORTING = frozenset("POP_TOP SWAP ROT_TWO".split())
+
+
+class Read(NamedTuple):
+    """A read of the variable `name`, or of the module `name` if `imported` (with the level of a relative import), and `attributes`.
+
+    Attributes are read as long as the value is a module. If `free`, the name may be a variable of an enclosing function.
+    """
+
+    name: str
+    attributes: tuple[str, ...] = ()
+    free: bool = False
+    imported: bool = False
+    level: int = 0
+
+
+@dataclass(frozen=True)
+class Reads:
+    """The `reads` of a code; its variables that are `bound` by imports; variables of enclosing functions that are `written`."""
+
+    reads: tuple[Read, ...]
+    bound: Mapping[str, Read]
+    written: frozenset[str]
+    writes_global: bool
+
+
+@lru_cache(maxsize=1024)
+def reads_of(code: CodeType) -> Reads:
+    """Return the reads of a code, without the functions in it."""
+    steps = [each for each in dis.get_instructions(code) if each.opname not in _SKIPPED]
+    bound, imports = _list_imports(steps)
+    reads, written, writes_global = list(imports), set[str](), False
+    for i, step in enumerate(steps):
+        kind, argument = step.opname, step.argval
+        if kind in ("STORE_GLOBAL", "DELETE_GLOBAL"):
+            writes_global = True
+        elif kind in ("STORE_DEREF", "DELETE_DEREF") and argument in code.co_freevars:
+            written.add(argument)
+        elif kind.startswith("LOAD_"):
+            names = argument if isinstance(argument, tuple) else (argument,)
+            attributes = _attributes_after(steps, i)
+            for j, name in enumerate(names):
+                after = attributes if j == len(names) - 1 else ()  # of the last one, which is on top
+                if name in bound and ("FAST" in kind or "DEREF" in kind) and "CLOSURE" not in kind:
+                    origin = bound[name]
+                    reads.append(origin._replace(attributes=origin.attributes + after))
+                elif kind in ("LOAD_GLOBAL", "LOAD_NAME") or "DICT_OR_GLOBALS" in kind:
+                    reads.append(Read(name, after))
+                elif ("DEREF" in kind or "CLASSDEREF" in kind) and name in code.co_freevars:
+                    reads.append(Read(name, after, free=True))
+    return Reads(tuple(dict.fromkeys(reads)), MappingProxyType(bound), frozenset(written), writes_global)
+
+
+def _attributes_after(steps: list[dis.Instruction], i: int) -> tuple[str, ...]:
+    found = []
+    for step in steps[i + 1 :]:
+        if step.opname not in ("LOAD_ATTR", "LOAD_METHOD"):
+            break
+        found.append(step.argval)
+    return tuple(found)
+
+
+def _list_imports(steps: list[dis.Instruction]) -> tuple[dict[str, Read], list[Read]]:
+    """Return the variables that imports bind, and reads of those that are more than modules."""
+    bound: dict[str, Read] = {}
+    reads: list[Read] = []
+    current = item = None
+    for i, step in enumerate(steps):
+        kind = step.opname
+        if kind == "IMPORT_NAME":
+            level, names = (_constant(steps[i - 2]), _constant(steps[i - 1]))
+            whole = step.argval if names or level else step.argval.partition(".")[0]
+            current, item, direct = Read(whole, imported=True, level=level or 0), None, names is None
+        elif current is None:
+            continue
+        elif kind == "IMPORT_FROM":
+            item = current._replace(attributes=(*current.attributes, step.argval))
+            current = item if direct else current
+        elif kind.startswith("STORE_") and isinstance(step.argval, str):
+            bound[step.argval] = item or current
+            if item is not None and not direct:
+                reads.append(item)
+        elif kind not in _WHILE_IMPORTING:
+            current = None
+    return bound, reads
+
+
+def _constant(step: dis.Instruction) -> Any:
+    return step.argval if step.opname.startswith("LOAD_") else None
+
+
+def resolve(
+    read: Read, known: Mapping[str, Any], cells: Mapping[str, Any], is_library: Callable[[str], bool]
+) -> tuple[Any, str]:
+    """Return the value of a read in a function with globals `known` and variables `cells`, and its dotted name.
+
+    The value is `LOCAL` for a variable of a call, and `MISSING` without one. Modules that are libraries may make attributes
+    when they are read, as they do to import lazily.
+    """
+    name = read.name
+    if read.imported:
+        if read.level:
+            package = str(known.get("__package__") or known.get("__name__", "")).split(".")
+            name = ".".join([*package[: len(package) - read.level + 1], *filter(None, [name])])
+        value = sys.modules.get(name, MISSING)
+    elif read.free:
+        value = cells.get(name, MISSING)
+    else:
+        value = known.get(name, MISSING)
+        value = getattr(builtins, name, MISSING) if value is MISSING else value
+    for attribute in read.attributes:
+        if not isinstance(value, ModuleType):
+            break
+        inside = f"{value.__name__}.{attribute}"
+        own = vars(value).get(attribute, sys.modules.get(inside, MISSING))
+        value = getattr(value, attribute, MISSING) if own is MISSING and is_library(value.__name__) else own
+        name = f"{name}.{attribute}"
+    return value, name
