@@ -1,7 +1,7 @@
-"""What the code of a function reads from outside: globals, variables of enclosing functions, and imports, with their attributes.
+"""What the code of a function reads from outside: globals, variables of enclosing functions, imports, and their attributes.
 
-`gains.k` and `import gains` inside of a function are read through modules: the value is the attribute `k` as it is now. Bytecode
-is read, because the source of a function is often not available.
+`gains.k` and `import gains` inside of a function are read through modules: the value is the attribute `k` as it is now. The
+bytecode is read, because the source of a function is often not available.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ LOCAL: Any = type("Local", (), {"__repr__": lambda self: "LOCAL"})()
 """A variable of a call, which is not read from outside."""
 MISSING: Any = type("Missing", (), {"__repr__": lambda self: "MISSING"})()
 """A name without a value."""
-_SKIPPED = frozenset("RESUME NOP PUSH_NULL EXTENDED_ARG PRECALL COPY_FREE_VARS MAKE_CELL NOT_TAKEN CACHE".split())
-_WHILE_IMPORTING = frozenset("POP_TOP SWAP ROT_TWO".split())
+_SKIPPED = frozenset(["RESUME", "NOP", "PUSH_NULL", "EXTENDED_ARG", "PRECALL", "COPY_FREE_VARS", "MAKE_CELL", "NOT_TAKEN"])
+_WHILE_IMPORTING = frozenset(["POP_TOP", "SWAP"])
 
 
 class Read(NamedTuple):
-    """A read of the variable `name`, or of the module `name` if `imported` (with the level of a relative import), and `attributes`.
+    """A read of the variable `name`, or of the module `name` if `imported`, and then of `attributes` as long as it is a module.
 
-    Attributes are read as long as the value is a module. If `free`, the name may be a variable of an enclosing function.
+    `level` is that of a relative import. If `free`, the name is a variable of an enclosing function.
     """
 
     name: str

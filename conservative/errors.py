@@ -241,6 +241,17 @@ class LoadNotResolved(UserWarning):
         )
 
 
+class SceneNotCompared(UserWarning):
+    """A stored ensemble may be of another scene than the one given. Attributes: `scene`, its name, and `part`, not compared."""
+
+    def __init__(self, scene: str, part: str) -> None:
+        self.scene, self.part = scene, part
+        super().__init__(
+            f"The scene {scene!r} was not compared completely with the scene of the stored run, because it has {part}. "
+            "Energies and momenta are computed with this scene: make sure that it is the scene of the run"
+        )
+
+
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka", "lxml"),

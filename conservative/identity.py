@@ -1,9 +1,9 @@
 """When two values are the same: a digest of all that their behaviour depends on, the same in every process.
 
-A value is followed by its parts. Functions of Python are their code and all that the code reads: globals, attributes of modules,
-closures and defaults (`conservative.code_reads`). Objects are their class, their attributes, and the parts that pickle would
-store, which covers objects of C such as bound methods. Libraries whose functions depend on their arguments only (`PURE`) are
-followed by name. Frozen dataclasses of this package are their fields, without those declared with `NOT_OF_MOTION`.
+A value is followed by its parts. Functions of Python are their code and all that the code reads: globals, attributes of
+modules, closures and defaults (`conservative.code_reads`). Objects are their class, their attributes, and the parts that pickle
+would store, which covers objects of C such as bound methods. Libraries whose functions depend on their arguments only (`PURE`)
+are followed by name. Frozen dataclasses of this package are their fields, without those declared with `NOT_OF_MOTION`.
 
 One rule covers everything else: a value of which any part cannot be followed equals itself only, and nothing is cached by it.
 Examples are open files, generators, random numbers, environment variables, pointers, modules that are passed on, functions that
@@ -28,30 +28,36 @@ import numpy as np
 from .code_reads import LOCAL, MISSING, Reads, reads_of, resolve
 
 _PACKAGE = __name__.partition(".")[0]
-PURE = frozenset(
-    f"{_PACKAGE} abc bisect builtins cmath collections collections.abc contextlib copy copyreg dataclasses datetime decimal enum "
-    "fractions functools heapq itertools math numbers numpy operator scipy statistics types typing "
-    "_bisect _collections _collections_abc _functools _heapq _operator".split()
-)
+
+
+def _names(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+PURE = _names(f"""
+    {_PACKAGE} abc bisect builtins cmath collections contextlib copy copyreg dataclasses datetime decimal enum fractions
+    functools heapq itertools math numbers numpy operator scipy statistics types typing
+    _bisect _collections _collections_abc _functools _heapq _operator
+""")
 """Packages whose functions depend on their arguments only, and whose functions and classes are represented by their names."""
-_NOT_PURE = frozenset(
-    "builtins.open builtins.input builtins.eval builtins.exec builtins.compile builtins.globals builtins.__import__ "
-    "builtins.hash builtins.id builtins.breakpoint datetime.datetime.now numpy.random numpy.load numpy.loadtxt numpy.genfromtxt "
-    "numpy.fromfile numpy.fromregex numpy.memmap numpy.lib numpy.ctypeslib scipy.io scipy.datasets scipy.stats.rv_generic".split()
-)
+_NOT_PURE = _names("""
+    builtins.open builtins.input builtins.eval builtins.exec builtins.compile builtins.globals builtins.__import__ builtins.hash
+    builtins.id builtins.breakpoint numpy.random numpy.load numpy.loadtxt numpy.genfromtxt numpy.fromfile numpy.fromregex
+    numpy.memmap numpy.lib numpy.ctypeslib scipy.io scipy.datasets
+""")
 """Their parts that read files, the state of the interpreter, or random numbers."""
-_HIDDEN = frozenset("__globals__ __closure__ __code__ __self__ __func__ f_globals f_locals tb_frame now today".split())
+_HIDDEN = _names("__globals__ __closure__ __code__ __self__ __func__ f_globals f_locals tb_frame now today utcnow")
 """Attributes that read something else than parts of a value."""
-_NOT_OF_BEHAVIOUR = frozenset(
-    "__dict__ __weakref__ __doc__ __module__ __annotations__ __firstlineno__ __static_attributes__ __annotate__ __annotate_func__ "
-    "__annotations_cache__ __abstractmethods__ _abc_impl __parameters__ __orig_bases__ __dataclass_fields__ __dataclass_params__ "
-    "__match_args__ __slots__ __slotnames__ __hash__ __repr__ __eq__ __replace__ __qualname__".split()
-)
+_NOT_OF_BEHAVIOUR = _names("""
+    __dict__ __weakref__ __doc__ __module__ __annotations__ __firstlineno__ __static_attributes__ __annotate__
+    __annotate_func__ __annotations_cache__ __abstractmethods__ _abc_impl __parameters__ __orig_bases__ __dataclass_fields__
+    __dataclass_params__ __match_args__ __slots__ __slotnames__ __hash__ __repr__ __eq__ __replace__ __qualname__
+""")
 """Attributes of a class on which the behaviour of its instances does not depend, or that repeat others."""
-_OF_CONSTRUCTION = frozenset(
-    "__init__ __new__ __post_init__ __init_subclass__ __set_name__ __del__ __reduce__ __reduce_ex__ __getstate__ __setstate__ "
-    "__getnewargs__ __copy__ __deepcopy__ __setattr__ __delattr__ __str__ __class_getitem__".split()
-)
+_OF_CONSTRUCTION = _names("""
+    __init__ __new__ __post_init__ __init_subclass__ __set_name__ __del__ __reduce__ __reduce_ex__ __getstate__ __setstate__
+    __getnewargs__ __copy__ __deepcopy__ __setattr__ __delattr__ __str__ __class_getitem__
+""")
 """Methods that make or copy an instance, which matter if its class is called."""
 _NUMBERS = frozenset({bool, int, float, complex, str, bytes, type(None), type(...), type(NotImplemented)})
 _OF_KERNELS = "_callback"
@@ -91,9 +97,14 @@ def identify(value: object) -> Identity:
     try:
         return Identity(walk.follow(value), "", walk.fixed)
     except _NotFollowed as part:
-        return Identity(f"unknown {uuid4().hex}", str(part), False)
+        return equal_to_nothing(str(part))
     except Exception as error:  # a class of a user whose attributes raise an exception; or RecursionError
-        return Identity(f"unknown {uuid4().hex}", f"{type(value).__name__} ({type(error).__name__})", False)
+        return equal_to_nothing(f"{type(value).__name__} ({type(error).__name__})")
+
+
+def equal_to_nothing(part: str) -> Identity:
+    """Return the identity of a value with a part that cannot be followed."""
+    return Identity(uuid4().hex, part, False)
 
 
 def digest(value: object) -> str:
@@ -165,9 +176,10 @@ class _Walk:
         if isinstance(value, np.ndarray) and value.flags.writeable:
             self.fixed = False
         kind = f"{type(value).__module__}.{type(value).__qualname__}"
-        return _hash([kind, np.lib.format.dtype_to_descr(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()])
+        content = hashlib.sha256(value.tobytes()).hexdigest()
+        return _hash([kind, np.lib.format.dtype_to_descr(value.dtype), value.shape, content])
 
-    def _list_parts(self, value: Any) -> Iterator[Any]:
+    def _list_parts(self, value: Any) -> Iterator[Any]:  # noqa: C901, PLR0912  # a branch for each kind of value
         """Yield the texts of the parts of a value that is neither a number, a text nor an array."""
         kind: Any = type(value)
         if kind is tuple:
@@ -260,15 +272,15 @@ class _Walk:
         return _hash(parts)
 
     def _list_of_keeper(self, value: Any) -> Iterator[Any]:
-        """Follow compiled code or a cache, which have earlier values of what their function reads: it may read libraries only."""
+        """Follow compiled code or a cache, with earlier values of what their function reads: it may read libraries only."""
         function = next((found for name in ("py_func", "__wrapped__") if (found := getattr(value, name, None))), None)
         if not isinstance(function, FunctionType):
-            raise _NotFollowed(f"a {type(value).__name__}")
+            raise _NotFollowed(f"a value of type {type(value).__name__}")
         reads, self.reads = self.reads, 0
         text = self.follow(function)
         defaults = *(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()
         if self.reads or function.__closure__ or not all(type(each) in _NUMBERS for each in defaults):
-            raise _NotFollowed(f"{function.__name__}, a {type(value).__name__}, which keeps earlier values of what it reads")
+            raise _NotFollowed(f"{function.__name__}, which keeps earlier values of what it reads ({type(value).__name__})")
         self.reads += reads
         yield text
 
@@ -297,7 +309,7 @@ class _Walk:
         if (name := _library_name(value)) is not None:
             return name
         if _top(value.__module__) in sys.stdlib_module_names and _top(value.__module__) != "__main__":
-            raise _NotFollowed(f"a {value.__module__}.{value.__qualname__}")
+            raise _NotFollowed(f"a value of type {value.__module__}.{value.__qualname__}")
         if id(value) in self.path:
             return f"cycle {self.path.index(id(value))}"
         self.path.append(id(value))
@@ -309,13 +321,13 @@ class _Walk:
         """Yield class, attributes, slots and, for what else it may consist of, the parts that pickle stores."""
         kind: Any = type(value)
         name = f"{kind.__module__}.{kind.__qualname__}"
-        if hasattr(kind, "__next__") or not _is_pure(name) and _top(name) in PURE:
-            raise _NotFollowed(f"a {name}")
+        if hasattr(kind, "__next__") or (not _is_pure(name) and _top(name) in PURE):
+            raise _NotFollowed(f"a value of type {name}")
         yield self._follow_class(kind, called=False)
         before, self.in_library = self.in_library, _is_pure(name)
         derived = _derived_names(kind)
-        attributes = getattr(value, "__dict__", {})
-        yield [(key, self.follow(each)) for key, each in sorted(attributes.items()) if key not in derived and key != _OF_KERNELS]
+        attributes = sorted(getattr(value, "__dict__", {}).items())
+        yield [(key, self.follow(each)) for key, each in attributes if key not in derived and key != _OF_KERNELS]
         for base in kind.__mro__:
             for key, slot in sorted(vars(base).items()):
                 if isinstance(slot, MemberDescriptorType):
@@ -325,9 +337,9 @@ class _Walk:
             try:
                 reduced = value.__reduce_ex__(4)
             except Exception:
-                raise _NotFollowed(f"a {name}") from None
+                raise _NotFollowed(f"a value of type {name}") from None
             if isinstance(reduced, str):
-                raise _NotFollowed(f"{reduced}, a {name}")
+                raise _NotFollowed(f"{reduced}, a value of type {name}")
             make, arguments, state, *others = (*reduced, None, None, None)[:5]
             yield ["its class" if each is kind else self.follow(each) for each in (make, *arguments)]
             yield self.follow(state)
@@ -342,7 +354,8 @@ def _library_name(value: Any) -> str | None:
         full = f"{module}.{name}"
         return full if _is_pure(full) else None
     if isinstance(value, np.ufunc):
-        module, name = next((each for each in ("numpy", "scipy.special") if _is_in(each, value.__name__, value)), ""), value.__name__
+        name = value.__name__
+        module = next((each for each in ("numpy", "scipy.special") if _is_in(each, name, value)), "")
     owner = getattr(value, "__self__", None)
     if isinstance(owner, ModuleType):
         module = owner.__name__

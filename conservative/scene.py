@@ -27,7 +27,7 @@ from .check import (
 )
 from .errors import BadInput
 from .flight import Flight, read_flight
-from .identity import NOT_OF_MOTION, Identity, identify
+from .identity import NOT_OF_MOTION, Identity, equal_to_nothing, identify
 from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
 from .needs import LOADS, Need, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
@@ -164,10 +164,7 @@ class Scene(PickledByFields):
         )
         if self.needs:
             require_size(body.inertia)
-        for varying in self.loads:
-            varying.require(end, self.R_WB0)  # for its exception
-        if self.changeable and not self.identity.unknown:
-            vars(self)["_current"] = self.key, None
+        self._call_loads()
 
     @cached_property
     def needs(self) -> Needs:
@@ -201,6 +198,16 @@ class Scene(PickledByFields):
         fields_of_users = {Need.FIELD, Need.FUNCTION, Need.TIME}
         return not self.needs.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
 
+    def _call_loads(self) -> None:
+        """Raise `BadInput` unless the loads have values; keep the key, for `now`, unless functions change what they read."""
+        before = self.key if self.changeable else ""
+        for load in self.loads:
+            load.require(self.t_end, self.R_WB0)
+        if self.changeable and before != self.key:
+            vars(self)["_identity"] = equal_to_nothing("a function that changes what it reads when it is called")
+        elif self.changeable and not self.identity.unknown:
+            vars(self)["_current"] = before, None
+
     def now(self) -> Scene:
         """Return the scene as its functions are now: itself, or a copy without caches if they changed, or may have.
 
@@ -213,7 +220,9 @@ class Scene(PickledByFields):
         if key == identity.text:
             return copy or self
         fresh: Scene = _copy(self)
-        if not identity.unknown:
+        if identity.unknown:
+            vars(fresh)["_identity"] = identity
+        else:
             vars(self)["_current"] = identity.text, fresh
             vars(fresh)["_current"] = identity.text, None
         return fresh

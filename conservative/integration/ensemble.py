@@ -24,7 +24,7 @@ from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
 from .blocks import BlockResult
-from .store import open_store, write_store
+from .store import Store, open_store, write_store
 
 if TYPE_CHECKING:
     import altair
@@ -261,9 +261,16 @@ def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
         The folder contains no ensemble, or blocks are missing or damaged; or the scene is missing, or another one.
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
+    SceneNotCompared
+        A warning: the scene has a function that cannot be compared with the function of the run.
     """
     store = open_store(path)
-    bodies, (drifts, failures), record = store.read_bodies(scene), store.read_results(), store.record
+    return read_ensemble(store, store.read_bodies(scene))
+
+
+def read_ensemble(store: Store, bodies: Batch) -> Ensemble:
+    """Return the ensemble of bodies in a complete store."""
+    (drifts, failures), record = store.read_results(), store.record
     grid = Grid(record["dt"], record["n_steps"], record["sample_every"])
     samples = store.arrays["R_WB"], store.arrays["w_WB_B"]
     return Ensemble(bodies, grid, *samples, drifts, record["method"], failures, supplied=store.arrays.get("supplied"))

@@ -18,15 +18,19 @@ from ..method import Method
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import list_blocks, run_blocks, start_workers
-from .ensemble import Ensemble, ensemble_of_one, open_ensemble
+from .ensemble import Ensemble, ensemble_of_one, read_ensemble
 from .inputs import read_bodies
 from .memory import Memory, write_memory
 from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
 from .shared_choice import choose_for_all, require_steps
-from .store import write_store
+from .store import open_store, write_store
 
 if TYPE_CHECKING:
     from distributed import Client
+_COMPARED = (
+    "such a part cannot be compared with that of the earlier run. To resume runs, give it as numbers or as a table (times, "
+    "values), or as a function that reads numbers and arrays only"
+)
 
 
 def integrate_many(
@@ -83,7 +87,8 @@ def integrate_many(
         in memory. The returned ensemble reads them from there, as `open_ensemble(path)` does later.
     resume
         True if the folder may contain some blocks of the same run. Missing and damaged blocks are then computed. The result is
-        the same, byte for byte, as that of an uninterrupted run.
+        the same, byte for byte, as that of an uninterrupted run. Functions of the scene have to be such that they can be
+        compared (`conservative.identity`).
     client
         A `dask.distributed.Client`, on whose workers the blocks run instead of threads of this process.
 
@@ -107,6 +112,9 @@ def integrate_many(
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     scene = scene.now()
+    if resume and (unknown := scene.identity.unknown):
+        got = f"True, for the scene {scene.name!r} with {unknown}"
+        raise BadInput("resume", got, f"False: {_COMPARED}")
     flight, scene = scene.flight, rotation_only(scene)
     _check_options(threads, progress, path, resume)
     only_scene = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
@@ -135,9 +143,10 @@ def integrate_many(
         with start_workers(client, threads, len(blocks)) as workers, target as store:
             left = [first for first in blocks if not store.is_whole(first)]
             run_blocks(chosen, bodies, grid, workers, left, store.write, progress)
-        return replace(
-            store.ensemble() if isinstance(store, Memory) else open_ensemble(store.place, flying.scene), choice=choice
-        )
+        if isinstance(store, Memory):
+            return replace(store.ensemble(), choice=choice)
+        whole = open_store(store.place)
+        return replace(read_ensemble(whole, whole.read_bodies(flying.scene, compare=False)), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # if it is the failure itself, it keeps its own cause
 

@@ -1,12 +1,15 @@
 """A scene as JSON: numbers and texts, and a digest for everything else, such as the functions of a `FunctionPotential`.
 
-A digest shows whether two scenes are the same, but a scene cannot be restored from it.
+A digest shows whether two scenes are the same, but a scene cannot be restored from it. Digests of another interpreter or of an
+earlier version of this package cannot be compared, nor can those of values that cannot be followed (`conservative.identity`).
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any
@@ -14,21 +17,23 @@ from typing import Any
 import numpy as np
 
 from ..check import build_unchecked, describe, read_only
-from ..errors import BadInput
+from ..errors import BadInput, SceneNotCompared
 from ..flight import rotation_only
-from ..identity import digest, fields_of_motion
+from ..identity import fields_of_motion, identify
 from ..scene import Scene
 
 _PACKAGE = __name__.partition(".")[0]
 _NOT_OF_MOTION = {field.name for field in fields(Scene)} - {"name", *fields_of_motion(Scene)} | {"t_end"}
 """Fields of a scene that do not change the motion of its bodies on a given grid."""
+_BY = f"2 {sys.implementation.cache_tag}"
+"""What digests of functions depend on besides the function: the rules of `identity`, and the bytecode of the interpreter."""
 
 
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     """Return `scene` if the record describes it; if it is None, restore the scene from the record.
 
-    Raise `BadInput` if the record describes another scene; or if `scene` is None, and the record contains digests or cannot be
-    restored.
+    Warn if the record has functions that cannot be compared with those of the scene (`SceneNotCompared`). Raise `BadInput` if
+    the record describes another scene; or if `scene` is None, and the record contains digests or cannot be restored.
     """
     if scene is None:
         try:
@@ -46,15 +51,37 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
         scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
     if "flight" not in record["fields"]:  # as earlier versions wrote it
         scene = rotation_only(scene)
-    if not is_same_motion(record, record_scene(scene)):
-        raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
+    given = record_scene(scene)
+    stored = json.loads(json.dumps(record))
+    if unknown := list(_adopt(stored, given)):
+        warnings.warn(SceneNotCompared(scene.name, unknown[0]), stacklevel=4)
+    if different := list_differences(stored, given):
+        got = f"{scene.name!r}, with another {', '.join(different)}"
+        raise BadInput("scene", got, f"the scene of the run, {record['fields']['name']!r}")
     return scene
 
 
-def is_same_motion(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Return whether two records are of scenes whose bodies have the same motion on the same grid."""
-    a, b = (json.loads(json.dumps({**each["fields"], **dict.fromkeys(_NOT_OF_MOTION)})) for each in (one, other))
-    return bool(a == b)
+def _adopt(stored: Any, given: Any) -> Iterator[str]:
+    """Replace digests that cannot be compared with those of another record by these, and yield the reasons."""
+    if not (isinstance(stored, dict) and isinstance(given, dict)):
+        if isinstance(stored, list) and isinstance(given, list):
+            for pair in zip(stored, given, strict=False):
+                yield from _adopt(*pair)
+    elif "digest" in stored and "digest" in given:
+        unknown = stored.get("unknown") or given.get("unknown")
+        if unknown or stored.get("by") != given["by"]:
+            yield unknown or "functions that another version of Python or of this package wrote"
+            stored.clear()
+            stored.update(given)
+    else:
+        for name in stored.keys() & given.keys():
+            yield from _adopt(stored[name], given[name])
+
+
+def list_differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Return the fields in which two records differ; without one, their bodies have the same motion on the same grid."""
+    a, b = (json.loads(json.dumps(each["fields"])) for each in (one, other))
+    return [name for name in a | b if name not in _NOT_OF_MOTION and a.get(name) != b.get(name)]
 
 
 def record_scene(value: Any) -> Any:
@@ -71,7 +98,8 @@ def record_scene(value: Any) -> Any:
         given = ((field, getattr(value, field.name)) for field in fields(value))
         named = {field.name: record_scene(each) for field, each in given if each is not None or field.default is not None}
         return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
-    return {"digest": digest(value)[:16]}
+    found = identify(value)
+    return {"digest": found.text[:16], "by": _BY} | ({"unknown": found.unknown} if found.unknown else {})
 
 
 def _restore(record: Any) -> Any:

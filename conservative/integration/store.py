@@ -59,7 +59,7 @@ from ..scene import Scene
 from ..version import VERSION
 from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, list_blocks
 from .inputs import list_parameters
-from .scene_record import find_scene, is_same_motion, record_scene
+from .scene_record import find_scene, list_differences, record_scene
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
 NEW_FOLDER = "a new folder, in a folder that can be written, on a disk with enough space"
@@ -149,16 +149,18 @@ class Store:
             got = f"{str(self.place)!r}, an ensemble that is damaged ({type(error).__name__}: {error})"
             raise BadInput("path", got, _WHOLE) from None
 
-    def read_bodies(self, scene: Scene | None) -> Batch:
+    def read_bodies(self, scene: Scene | None, compare: bool = True) -> Batch:
         """Return the bodies. Their initial states and parameters stay on the disk.
 
-        Raise `BadInput` if the scene is missing, or another one (`open_ensemble`), or does not have the parameters.
+        The scene is not compared if the caller has just written it. Raise `BadInput` if the scene is missing, or another one
+        (`open_ensemble`), or does not have the parameters.
         """
         inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
         for name in self.record["digests"]:
             group, _, own = name.partition("/")
             inputs[group][own] = _OnDisk(self.arrays[name])
-        scene, start, n = find_scene(self.record["scene"], scene), inputs["start"], self.record["bodies"]
+        scene = find_scene(self.record["scene"], scene) if compare or scene is None else scene
+        start, n = inputs["start"], self.record["bodies"]
         known = list_parameters(static_part(scene.potential))
         for name, values in inputs["parameters"].items():
             if known.get(name) != values.shape[1:]:
@@ -204,8 +206,8 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
         plain = ("version", "method", "dt", "n_steps", "sample_every", "bodies", "block")
         values = ((name, stored.get(name), record[name]) for name in plain)
         differences = [f"{name} {before!r} there, {now!r} here" for name, before, now in values if before != now]
-        if not is_same_motion(stored["scene"], record["scene"]):
-            differences.append("another scene")
+        if fields := list_differences(stored["scene"], record["scene"]):
+            differences.append(f"another scene ({', '.join(fields)})")
         before, now = stored["digests"], record["digests"]
         differences += [f"another {name.partition('/')[2]}" for name in before | now if before.get(name) != now.get(name)]
         if differences:
