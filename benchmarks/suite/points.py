@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -13,9 +13,7 @@ import numpy as np
 
 from conservative.attitude import rotation_about
 from conservative.grid import Grid, grid_for
-from conservative.identity import digest
 from conservative.method import Method, Role
-from conservative.potentials.potential import depends_on_time, energy_at
 from conservative.scene import Scene
 
 from ..measures import errors
@@ -24,6 +22,7 @@ from ..measures.measure import Measure
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, attempt
 from ..studies.study import FindTruth, remember_truths
+from .description import describe
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
@@ -90,15 +89,10 @@ class Point:
     @property
     def definition(self) -> str:
         """Hash of scene, method and steps: measures of two definitions cannot be compared."""
-        words = [self.scene.name, self.method.name, *(invariant.name for invariant in self.scene.invariants)]
+        found = describe(self.scene, np.array(PROBES))
+        words = [self.scene.name, self.method.name, *found["invariants"]]
         # The empty text once described how times were taken. Without it, every definition in every baseline would change.
-        return _hash([words, motion_numbers(self.scene), ""])
-
-
-def define_scene(scene: Scene) -> str:
-    """Return a hash of a scene: name, motion, steps and invariants."""
-    loads = [digest(part) for part in (scene.torque, scene.damping, scene.body.motor) if part is not None]
-    return _hash([[scene.name, *(invariant.name for invariant in scene.invariants), *loads], motion_numbers(scene)])
+        return _hash([words, [_digits(each) for each in arrange(found, self.grid.n_steps)], ""])
 
 
 def define(words: list[str], values: Iterable[object]) -> str:
@@ -106,19 +100,11 @@ def define(words: list[str], values: Iterable[object]) -> str:
     return _hash([words, [_digits(each) for each in values]])
 
 
-def motion_numbers(scene: Scene) -> list[list[float]]:
-    """Return the numbers that define the motion of a scene: body, start, steps, and energies of the field."""
-    grid = grid_for(scene, scene.dt)
-    times = np.linspace(0, scene.t_end, len(PROBES)) if depends_on_time(scene.potential) else np.zeros(len(PROBES))
-    energies = (
-        [] if scene.potential is None else [float(energy_at(scene.potential, *at)) for at in zip(PROBES, times, strict=True)]
-    )
-    values: tuple[Any, ...] = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
-    if scene.body.rotor_momentum is not None:
-        values = (*values, scene.body.rotor_momentum)
-    if flight := scene.flight:
-        values = (*values, [flight.mass, flight.g], flight.com_B, flight.p_WB0, flight.v_WB0)
-    return [_digits(each) for each in values]
+def arrange(description: Mapping[str, Any], *more: float) -> list[Any]:
+    """Return the numbers of a description (`describe`), with more numbers beside the duration and the step."""
+    start = [description[each] for each in ("inertia", "R_WB0", "w_WB_B0")]
+    parts = [each for each in description["parts"] if len(each)]
+    return [*start, [*description["ends"], *more], description["energies"], *parts]
 
 
 def _hash(content: object) -> str:

@@ -24,8 +24,6 @@ from conservative.potentials.uniform_gravity import UniformGravity
 
 Answer = dict[str, Any]
 Array = np.ndarray[Any, Any]
-LOADED = 7
-"""Number of times at which loads are described."""
 _scene = lru_cache(maxsize=64)(registry.scene)
 
 
@@ -66,31 +64,6 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         return {"name": method.name, "label": method.label, "engine": engine, **numbers}
 
     return {"methods": [describe(method) for method in methods]}
-
-
-def describe_scene(scene: str, probes: Array) -> Answer:
-    """Describe the motion of a scene: its parts, and its energies in J at the attitudes `probes` (n, 3, 3)."""
-    built = _scene(scene)
-    potential: Any = built.potential  # a version may be older than the protocols of potentials
-    if potential is None:
-        energies = []
-    elif getattr(potential, "time_dependent", False):
-        energies = [float(potential.energy_at(R, t)) for t in (0.0, built.t_end) for R in probes]
-    else:
-        energies = [float(potential.energy(R)) for R in probes]
-    rotor = getattr(built.body, "rotor_momentum", None)
-    loads: list[Any] = [getattr(built, "torque", None), getattr(built, "damping", None), getattr(built.body, "motor", None)]
-    times = np.linspace(0.0, built.t_end, LOADED).tolist()
-    values = [np.ravel(load.at(t)).tolist() for load in loads if hasattr(load, "at") for t in times]
-    return {
-        "parts": [[] if rotor is None else rotor.tolist(), *values],
-        "inertia": built.body.inertia,
-        "R_WB0": built.R_WB0,
-        "w_WB_B0": built.w_WB_B0,
-        "ends": [built.t_end, built.dt],
-        "energies": energies,
-        "invariants": [invariant.name for invariant in built.invariants],
-    }
 
 
 def describe_pair(scene: str, method: str) -> Answer:

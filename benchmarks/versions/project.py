@@ -36,7 +36,7 @@ from ..gate.results import Results, Row, Status, find_runaway
 from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
-from ..suite import points
+from ..suite import description, points
 from . import inside
 from .causes import find_causes
 from .comparison import Comparison, Line, compare
@@ -51,7 +51,7 @@ LOST, OTHER, FAR = 0.1, 1.0, 3.0
 than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
 SLOW = 1.0
 """Duration of a run, s, above which a row is measured with fewer points."""
-_ADAPTER = str(Path(inside.__file__).resolve())
+_ADAPTER, _DESCRIPTION = (str(Path(each.__file__).resolve()) for each in (inside, description))
 
 ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]
@@ -77,9 +77,9 @@ class ProjectSide:
         """End the process; the next call starts another one."""
         self._worker.close()
 
-    def ask(self, function: str, **values: Any) -> dict[str, Any]:
-        """Return the result of a function of `inside`. Raise `IntegrationFailed` if the version cannot answer."""
-        return self._worker.ask("call", adapter=_ADAPTER, function=function, **values)
+    def ask(self, function: str, file: str = _ADAPTER, **values: Any) -> dict[str, Any]:
+        """Return the result of a function of a file, by default `inside`. Raise `IntegrationFailed` without an answer."""
+        return self._worker.ask("call", adapter=file, function=function, **values)
 
     @cached_property
     def settings(self) -> list[dict[str, Any]]:
@@ -93,7 +93,7 @@ class ProjectSide:
             row_id = f"{scene} / {each['name']}"
             rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
         try:
-            there = define_scene(scene, partial(self.ask, "describe_scene"))
+            there = define_scene(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
         except IntegrationFailed as failure:
             yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
             return
@@ -193,11 +193,13 @@ class Remote(StandIn):
         return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, failure)
 
 
-def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:
-    """Return the hash of a scene, by default as this process has it. Raise `BadInput` if it does not have the scene."""
+def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = description.describe_scene) -> str:
+    """Return the hash of the motion of a registered scene, by default as this process has it, whatever its name is.
+
+    Raise `BadInput` if it does not have the scene.
+    """
     answer = describe(scene=name, probes=np.array(points.PROBES))
-    numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")] + [*answer["parts"]]
-    return points.define([name, *answer["invariants"]], numbers)
+    return points.define(answer["invariants"], points.arrange(answer))
 
 
 def judge_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:

@@ -18,7 +18,6 @@ from typing import Any
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies.study import Finding
-from conservative.benchmarks.suite.points import define_scene
 from conservative.errors import BadInput
 from conservative.files import remove_leftovers, write_text
 
@@ -141,6 +140,12 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
         return fresh
     if path is None:
         raise BadInput("resume", f"no {str(fresh.path)!r}", "the folder --out of a report that was interrupted")
+    for scene in plan.scenes:
+        if unknown := scene.identity.unknown:
+            got = (
+                f"True, for the scene {scene.name!r} with {unknown}, which cannot be compared with that of the earlier process"
+            )
+            raise BadInput("resume", got, "no --resume, to start again, or scenes made of numbers, tables and pure functions")
     command, before, results = read(path)
     if different := list(differences(before, json.loads(json.dumps(fresh.terms)))):
         more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
@@ -154,7 +159,7 @@ def terms(plan: Plan, source: Provenance) -> dict[str, dict[str, Any]]:
     """Return the terms of measurements as JSON values, in groups."""
     return {
         "studies": dict.fromkeys(plan.names, ""),
-        "scenes": {scene.name: define_scene(scene) for scene in plan.scenes},
+        "scenes": {scene.name: f"{scene.key[:16]}, step {scene.dt:g} s" for scene in plan.scenes},
         "methods": {method.name: method.label for method in plan.methods},
         "engines": {method.name: method.label for method in plan.engines},
         "environments": {lock.name: ", ".join(lock.packages) for lock in plan.locks},
