@@ -51,6 +51,8 @@ class Cell:
     folder: Path
     name: str
     other: str
+    copy: str = ""
+    without: str = ""
     program: Path = Path()
 
     def call(self, *arguments: str, codes: tuple[int, ...] = (0,)) -> Any:
@@ -89,23 +91,24 @@ def cell(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
     """Return the cell of a member of `Need`; scenes that no file can have are registered for the time of the test."""
     row, names = ROWS[request.param], []
     monkeypatch.chdir(tmp_path)
-    for name, case in (("crossed", row.case), ("another", row.other)):
+    cases = {"crossed": row.case, "another": row.other, "copy": row.case, "without": row.without}
+    for name, case in cases.items():
         if row.in_file:
             names.append(str(write_file(tmp_path / f"{name}.toml", case)))
         else:
             names.append(name)
-    known, made = deferred_imports.list_entries, {"crossed": row.case, "another": row.other}
+    known = deferred_imports.list_entries
 
     def list_entries(group: str) -> Any:
         builders = {
-            name: SimpleNamespace(load=lambda n=name: lambda: row.scene(made[n], n), value="tests", module=__name__)
-            for name in made
+            name: SimpleNamespace(load=lambda n=name: lambda: row.scene(cases[n], n), value="tests", module=__name__)
+            for name in cases
         }
         return known(group) | (builders if group == deferred_imports.SCENES else {})
 
     monkeypatch.setattr(deferred_imports, "list_entries", list_entries)
     monkeypatch.setattr(registry, "list_entries", list_entries)
-    return Cell(row, tmp_path, *names, program)
+    return Cell(row, tmp_path, *names, program=program)
 
 
 # Entry points in Python
@@ -245,8 +248,8 @@ def protocol(cell: Cell) -> None:
 
 def gate(cell: Cell) -> None:
     """Two versions of a project are compared on the same scene only."""
-    assert define_scene(cell.name) == define_scene(cell.name)
-    assert define_scene(cell.name) != define_scene(cell.other)
+    assert define_scene(cell.name) == define_scene(cell.copy)
+    assert len({define_scene(each) for each in (cell.name, cell.other, cell.without)}) == 3
 
 
 # Commands

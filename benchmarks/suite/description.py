@@ -31,8 +31,7 @@ def describe(built: Any, probes: Array) -> Answer:
     """Describe the motion of a scene: its parts, and its energies in J at the attitudes `probes` (n, 3, 3)."""
     rotor, flight = getattr(built.body, "rotor_momentum", None), getattr(built, "flight", None)
     places = [] if flight is None else [flight.com_B.tolist(), flight.p_WB0.tolist(), flight.v_WB0.tolist()]
-    damping = getattr(built, "damping", None)
-    loads = [getattr(built, "torque", None), getattr(damping, "of_time", damping), getattr(built.body, "motor", None)]
+    loads: list[Any] = [getattr(built, "torque", None), getattr(built, "damping", None), getattr(built.body, "motor", None)]
     return {
         "parts": [
             [] if rotor is None else rotor.tolist(),
@@ -60,9 +59,10 @@ def _describe_load(load: Any, t_end: float, probes: Array) -> Iterator[list[floa
     """Yield 1 for world axes, a table, and values at some times; those of a function of the attitude also at the probes."""
     if hasattr(load, "at"):
         yield [float(getattr(load, "frame", "body") == "world")]
-        value = getattr(load, "value", None)
+        varying = getattr(load, "of_time", load)  # of a damping
+        value = getattr(varying, "value", None)
         if isinstance(value, tuple):
             yield from (np.ravel(each).tolist() for each in value)
+        attitudes = [(R,) for R in probes] if getattr(varying, "of_attitude", False) else [()]
         for t in np.linspace(0.0, t_end, TIMES).tolist():
-            attitudes = [(R,) for R in probes] if getattr(load, "of_attitude", False) else [()]
             yield from (np.ravel(load.at(t, *at)).tolist() for at in attitudes)
