@@ -21,7 +21,7 @@ from .blocks import list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, read_ensemble
 from .inputs import read_bodies
 from .memory import Memory, write_memory
-from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
+from .one import interrupt_of, read_error, read_method, read_step, read_target, require_support, warn_of_loads
 from .shared_choice import choose_for_all, require_steps
 from .store import open_store, write_store
 
@@ -69,7 +69,7 @@ def integrate_many(
     dt, t_end
         Step size and duration, s, as in `integrate`. All bodies have the same steps.
     method
-        A method, or its name, as in `integrate`.
+        A method, or its name. Without a method and a step, both are chosen as for `error=1e-6`, as in `integrate`.
     sample_every
         Store every `sample_every`-th step, and the first and last state.
     error
@@ -121,10 +121,11 @@ def integrate_many(
     bodies = scene.derive(Batch.of) if only_scene else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     flying = bodies if flight is None else replace(bodies, scene=bodies.scene.rename(bodies.scene.name, flight=flight))
     choice: ChoiceForMany | None = None
+    error = read_error(error, method, dt)
     try:
         if error is None:
             chosen = read_method(method, bodies.first)
-            grid = grid_for(bodies.first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
+            grid = grid_for(bodies.first, read_step(bodies.first, dt, t_end), t_end, sample_every)
             require_support(chosen, bodies.first)
             warn_of_loads(bodies.first, chosen, grid.dt)
             if len(bodies) > 1:  # the run of a single body raises the error itself

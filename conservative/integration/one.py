@@ -22,8 +22,8 @@ from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Trajectory
 
-DEFAULT_DT = 0.01
-"""Default step size, s: the paper's."""
+TARGET = 1e-6
+"""Attitude error, rad, for which the method and the step are chosen if neither is given."""
 
 
 def require_support(method: Method, scene: Scene) -> None:
@@ -75,10 +75,11 @@ def integrate(
     scene
         The scene.
     dt
-        Step size, s; default 0.01. For adaptive methods, and with `error`, the sampling interval.
+        Step size, s; default: the scene's (`Scene.dt`). For adaptive methods, and with `error`, the sampling interval.
     method
-        A method, or its name, for example `"mujoco@3.6.0:RK4"`. Default: `Reduced()`, the paper's integrator in three
-        unknowns; in fields that depend on time, the first candidate of the automatic choice.
+        A method, or its name, for example `"mujoco@3.6.0:RK4"`. Without a method and a step, both are chosen as for
+        `error=1e-6`. With a step alone it is `Reduced()`, the paper's integrator in three unknowns; in fields that depend on
+        time, the first candidate of the automatic choice.
     t_end
         Duration, s; default: the scene's. The run ends with the first step at or after it.
     sample_every
@@ -86,7 +87,8 @@ def integrate(
     error
         Target for the attitude error over the run, rad. The method and the step size are then chosen automatically and
         stored in `trajectory.choice`, together with the estimated error. If round-off prevents that error, the warning
-        `AccuracyNotReached` is issued. Trial runs are cached: the next call for the same scene makes one run only.
+        `AccuracyNotReached` is issued. Trial runs are cached: the next call for the same scene makes one run only, unless it
+        contains a function that cannot be compared (`Scene.key`). Default: 1e-6 without a method and a step.
     on_failure
         "raise", or "return" to return the samples before the failure; `trajectory.outcome` then describes the failure.
     t_eval
@@ -129,13 +131,14 @@ def integrate(
             allowed = "1, the default, together with t_eval, which has the samples"
             raise BadInput("sample_every", describe(sample_every), allowed)
         at = read_times(t_eval, read_end(scene, t_end))
+    error = read_error(error, method, dt)
     try:
         if error is not None:
             end, samples = read_target(scene, error, method, dt, t_end, sample_every, at)
             trajectory = integrate_to_error(scene, error, end, samples, progress)
         else:
             method = read_method(method, scene)
-            grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every if at is None else MOST_STEPS)
+            grid = grid_for(scene, read_step(scene, dt, t_end), t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
             warn_of_loads(scene, method, grid.dt)
             if at is None:
@@ -156,6 +159,16 @@ def interrupt_of(failure: SystemError) -> BaseException:
     while isinstance(reason, SystemError):
         reason = reason.__cause__ or reason.__context__
     return reason if isinstance(reason, KeyboardInterrupt) else failure
+
+
+def read_error(error: float | None, method: object, dt: object) -> float | None:
+    """Return the target for the attitude error, rad: `TARGET` if neither an error nor a method nor a step is given."""
+    return TARGET if error is None and method is None and dt is None else error
+
+
+def read_step(scene: Scene, dt: float | None, t_end: float | None) -> float:
+    """Return the step, s: by default the scene's, at most the duration."""
+    return dt if dt is not None else min(scene.dt, read_end(scene, t_end))
 
 
 def read_end(scene: Scene, t_end: float | None) -> float:

@@ -18,6 +18,7 @@ from conservative import registry
 from conservative.attitude import angle_between, orthonormality
 from conservative.errors import AccuracyNotReached, BadInput, MissingEngine
 from conservative.grid import Grid, grid_for
+from conservative.integration import one
 from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_loads
 from conservative.invariants import sizes
 from conservative.method import Method
@@ -46,8 +47,6 @@ TURNS = 1000.0
 """Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
 LARGE = 0.1
 """Attitude error, rad, above which a run is called inaccurate and another method or step is looked for."""
-TARGET = 1e-6
-"""Attitude error, rad, for which commands choose the method and the step if neither is given."""
 PARTS, MOST_TRIED = (1, 10, 100), 10**6
 """Parts into which steps are divided in the search for an accurate run, and the largest number of steps of a run there."""
 
@@ -70,11 +69,11 @@ class Planned:
 def read_error(error: float | None, dt: float | None, names: Sequence[str]) -> float | None:
     """Return the attitude error, rad, for which a command chooses the method and the step, or None if it does not.
 
-    Without an error, a step and names of methods it is `TARGET`. Raise `BadInput` for an error and a method.
+    The default is that of `integrate`. Raise `BadInput` for an error and a method.
     """
     if error is not None and names:
         raise BadInput("methods", ", ".join(names), "none together with --error, which chooses the method")
-    return TARGET if error is None and dt is None and not names else error
+    return one.read_error(error, names or None, dt)
 
 
 def plan_runs(scene: Scene, names: Sequence[str], dt: float | None, t_end: float | None, usual: bool = False) -> list[Planned]:
@@ -251,15 +250,27 @@ def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_e
     return best
 
 
+def attitude_error(summary: dict[str, Any]) -> float | None:
+    """Return the attitude error of a run, rad, or its estimate; None if neither is known."""
+    choice = summary.get("choice")
+    error: float | None = summary["error"].get("attitude", choice["estimate"] if choice else None)
+    return error
+
+
+def is_right(summary: dict[str, Any]) -> bool:
+    """Return whether a run reached its end and is not known to be inaccurate."""
+    attitude = attitude_error(summary)
+    return bool(summary["outcome"].ok and (attitude is None or attitude <= LARGE))
+
+
 def status_of(summary: dict[str, Any]) -> str:
     """Return the status of a run in words: its outcome, or that it is inaccurate or may be."""
     if not summary["outcome"].ok:
         return str(summary["outcome"])
-    choice = summary.get("choice")
-    attitude = summary["error"].get("attitude", choice["estimate"] if choice else None)
+    choice, attitude = summary.get("choice"), attitude_error(summary)
     if attitude is None:
         return "ok, but its attitude error is not known"
-    if not attitude <= LARGE:
+    if not is_right(summary):
         return f"inaccurate: the attitude error is {attitude:.1e} rad"
     if choice and not choice["reached"] and not summary["error"].get("attitude", math.inf) <= choice["error"]:
         return f"less accurate than asked for: the attitude error is {attitude:.1e} rad"

@@ -10,7 +10,7 @@ from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH
 from ..document.model import Block, Document, Facts, Items, Table
-from ..run.single_run import status_of
+from ..run.single_run import is_right, status_of
 
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:
@@ -22,7 +22,7 @@ def build(summaries: Sequence[dict[str, Any]]) -> Document:
     if len(summaries) > 1:
         advice = dict.fromkeys(f"More accurate: {_advice(each['error'])}" for each in summaries if "better" in each["error"])
         blocks = [_table(summaries, title), *([Items.of(list(advice))] if advice else [])]
-    failed = [f"{each['label']} on {each['scene']}: {each['outcome']}" for each in summaries if not each["outcome"].ok]
+    failed = [f"{each['label']} on {each['scene']}: {status_of(each)}" for each in summaries if not is_right(each)]
     return Document("conservative run", title, blocks, data=data[0] if len(data) == 1 else data, failures=failed)
 
 
