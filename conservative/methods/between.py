@@ -17,7 +17,7 @@ from ..attitude import Array, to_quaternion
 from ..check import describe, real_array
 from ..deferred_imports import kernels
 from ..errors import BadInput, Diverged
-from ..grid import SAMPLE_BYTES, Grid, most_samples
+from ..grid import ROUNDING, SAMPLE_BYTES, Grid, count_whole_steps, most_samples
 from ..method import Method
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
@@ -94,7 +94,7 @@ def _require_count(n: int, least: int, allowed: str) -> None:
 def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
     """Return the grid of steps dt, s, from which samples at times t (n,), s, are computed."""
     dt = divide_step(scene, method, dt)
-    n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
+    n_steps = max(1, count_whole_steps(float(t[-1]), dt))
     return Grid(dt, n_steps, stride_of(n_steps))
 
 
