@@ -17,6 +17,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..grid import ROUNDING, Grid
+from ..scene import Scene
 
 MOST_PARTS = 64
 """Largest number of steps into which a part of a step is divided."""
@@ -38,16 +39,16 @@ class Piece(NamedTuple):
     rows: range
 
 
-def list_pieces(grid: Grid, breaks: Sequence[float]) -> list[Piece]:
-    """Return the pieces of a run with break points, s, in order."""
+def list_pieces(grid: Grid, breaks: Array) -> list[Piece]:
+    """Return the pieces of a run with increasing break points above 0, s, in order."""
     dt, n, every, pieces = grid.dt, grid.n_steps, grid.every, list[Piece]()
-    parts, done, t, before = count_parts(grid, breaks), 0, 0.0, -math.inf
+    parts, done, t, before = count_parts(grid, count_inside(grid, breaks)), 0, 0.0, -math.inf
 
     def rows_at(step: int) -> range:
         row = -(-step // every)
         return range(row, row + (step % every == 0 or step == n))
 
-    for point in (*breaks, math.inf):
+    for point in (*breaks.tolist(), math.inf):
         place, window = min(point / dt, n + 1.0), (before, point)
         nearest = round(place)
         at_end = abs(place - nearest) <= ROUNDING * place
@@ -71,10 +72,22 @@ def list_pieces(grid: Grid, breaks: Sequence[float]) -> list[Piece]:
     return pieces
 
 
-def count_parts(grid: Grid, breaks: Sequence[float]) -> int:
-    """Return the number of steps into which each part of a step is divided: so few that the work is thrice as much at most."""
-    inside = sum(0 < each < grid.n_steps * grid.dt for each in breaks)
-    return min(MOST_PARTS, max(1, math.ceil(grid.n_steps / (inside + 1))))
+def count_parts(grid: Grid, inside: int) -> int:
+    """Return the number of steps into which each part of a step is divided, with so many break points inside of the run."""
+    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # with fewer points than steps, thrice the work at most
+
+
+def count_most_steps(scene: Scene, grid: Grid) -> int:
+    """Return the largest number of steps that a run can take: the steps of the grid, and two parts for each break point."""
+    if not scene.loads:
+        return grid.n_steps
+    inside = count_inside(grid, scene.smoothness(grid.last).breaks)
+    return grid.n_steps + 2 * inside * count_parts(grid, inside)
+
+
+def count_inside(grid: Grid, breaks: Array) -> int:
+    """Return the number of increasing break points, s, before the end of a run."""
+    return int(np.searchsorted(breaks, grid.n_steps * grid.dt))
 
 
 def _split(first: int, last: int, every: int) -> list[int]:
