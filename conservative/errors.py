@@ -230,15 +230,25 @@ class LargeEnsemble(UserWarning):
 
 
 class LoadNotResolved(UserWarning):
-    """Steps are too long for a function of time. Attributes: `dt`, the longest step, `step`, and the `interval`, all s."""
+    """Steps are too long for a function of time or a table.
 
-    def __init__(self, dt: float, step: float, interval: tuple[float, float]) -> None:
-        self.dt, self.step, self.interval = dt, step, interval
-        super().__init__(
-            f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: its "
-            f"integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at which "
-            "the function is not smooth: breaks=(...)"
-        )
+    Attributes: `dt`, the longest step, `step`, and the `interval`, all s; `corners`, their number in a table, 0 for a function.
+    """
+
+    def __init__(self, dt: float, step: float, interval: tuple[float, float], corners: int = 0) -> None:
+        self.dt, self.step, self.interval, self.corners = dt, step, interval, corners
+        said = f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: "
+        if corners:
+            said += (
+                f"its table has {corners} corners, more than there are steps. Steps are divided at the corners, so samples are "
+                f"not affected, but they do not show the motion in between. Use steps of at most {step:g} s to see it"
+            )
+        else:
+            said += (
+                f"its integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at "
+                "which the function is not smooth: breaks=(...)"
+            )
+        super().__init__(said)
 
 
 class SceneNotCompared(UserWarning):

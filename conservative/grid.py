@@ -22,6 +22,8 @@ MEMORY_SHARE = 0.5
 """Share of a machine's memory that the samples of a run may take."""
 USUAL_MEMORY = 4 * 2**30
 """Memory, bytes, assumed where the system does not report its size."""
+ROUNDING = 2.0**-50
+"""Times that differ by less than this share are equal: rounding of two times and of their quotient makes up to 1.5 * 2^-52."""
 
 
 @dataclass(frozen=True, init=False)
@@ -100,8 +102,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         step = positive_number("dt", dt, allowed)
         if step > end:
             raise BadInput("dt", f"{step:g}", allowed)
-    # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
-    n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
+    n_steps = count_steps(end, step)
     if n_steps > MOST_STEPS:
         raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
     for load in scene.loads:
@@ -109,6 +110,19 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
     return _recall_grid(dt=step, n_steps=n_steps, every=every)
+
+
+def count_steps(t_end: float, dt: float) -> int:
+    """Return the number of steps dt, s, 1 or more, of a run that ends with the first one at or after t_end, s.
+
+    A step that ends before t_end by no more than rounding ends at it: 0.7 / 0.1 s are 7 steps.
+    """
+    return max(1, math.ceil(t_end / dt * (1 - ROUNDING)))
+
+
+def count_whole_steps(t: float, dt: float) -> int:
+    """Return the number of steps dt that have ended at a time t, both in s, to rounding."""
+    return math.floor(t / dt * (1 + ROUNDING))
 
 
 _recall_grid = lru_cache(maxsize=16)(partial(build_unchecked, Grid))

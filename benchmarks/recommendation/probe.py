@@ -17,7 +17,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
-from conservative.grid import Grid
+from conservative.grid import Grid, count_steps
 from conservative.integration.one import integrate
 from conservative.method import Method
 from conservative.methods.search import SAFETY, find_cheapest
@@ -207,8 +207,8 @@ class Conditions(Question):
         length = min(self.duration, affordable, self.truth_until if long else self.short)
         if length >= LEAST_SAMPLES * math.lcm(least, FINER) * self.spacing:
             least = math.lcm(least, FINER)
-        sampling = least * max(1, math.ceil(length / (LONG_SAMPLES * least * self.spacing) * (1 - 1e-9)))
-        n = max(LEAST_SAMPLES, math.ceil(length / (sampling * self.spacing) * (1 - 1e-9)))
+        sampling = least * count_steps(length, LONG_SAMPLES * least * self.spacing)
+        n = max(LEAST_SAMPLES, count_steps(length, sampling * self.spacing))
         return Grid(sampling * self.spacing, n)
 
     def probe(self, method: Method, dt: float, cost: float, long: bool, before: Sequence[Probe] = ()) -> Probe:
@@ -302,7 +302,7 @@ def prepare_conditions(asked: Question) -> Conditions:
     power = math.floor(math.log10(widest))
     digit = max(digit for digit in (1, 2, 5) if digit <= widest / 10.0**power * (1 + 1e-9))
     spacing = float(f"{digit}e{power}") / FINER
-    samples = math.ceil(length / spacing * (1 - 1e-9))
+    samples = count_steps(length, spacing)
     # Runs with steps longer than the spacing end up to a quarter later.
     truth = reference(scene, Grid(spacing, samples + samples // LEAST_SAMPLES + 1))
 

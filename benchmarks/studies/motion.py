@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from conservative.attitude import Array, to_quaternion
-from conservative.grid import Grid, grid_for
+from conservative.grid import ROUNDING, Grid, grid_for
 from conservative.invariants import sizes
 from conservative.method import Method, Role
 from conservative.outcome import Outcome
@@ -81,7 +81,7 @@ def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
         some = np.unique(np.linspace(0, len(values) - 1, count).round().astype(int))
         return case.samples(quantity, trajectory.t[some], values[some])
 
-    begin = head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - 1e-9))))
+    begin = head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - ROUNDING))))
     states = np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
     yield from (line(quantity, values, FRAMES + 1) for quantity, values in zip(STATES, states.T, strict=True))
     for invariant in case.scene.invariants:

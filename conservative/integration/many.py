@@ -127,7 +127,7 @@ def integrate_many(
             chosen = read_method(method, bodies.first)
             grid = grid_for(bodies.first, read_step(bodies.first, dt, t_end), t_end, sample_every)
             require_support(chosen, bodies.first)
-            warn_of_loads(bodies.first, chosen, grid.dt)
+            warn_of_loads(bodies.first, chosen, grid)
             if len(bodies) > 1:  # the run of a single body raises the error itself
                 require_steps(chosen, bodies, grid)
         else:

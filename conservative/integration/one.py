@@ -12,13 +12,14 @@ from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
 from ..errors import BadInput, LoadNotResolved, Unsupported
-from ..grid import MOST_STEPS, grid_for
+from ..grid import MOST_STEPS, Grid, grid_for
 from ..method import Method
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced
 from ..methods.search import candidates
 from ..outcome import Progress
+from ..potentials.smoothness import find_unresolved
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -33,10 +34,15 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
-def warn_of_loads(scene: Scene, method: Method, dt: float) -> None:
-    """Warn if fixed steps, s, are too long for a function of time; adaptive methods are told the longest step."""
-    if scene.loads and method.order is not None and dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(dt, *scene.smoothness()[1:]), stacklevel=3)
+def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
+    """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
+    if not scene.loads or method.order is None:
+        return
+    if grid.dt > scene.smoothness().step:
+        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:]), stacklevel=3)
+    for load in scene.loads:
+        if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
+            warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=3)
 
 
 _REDUCED = Reduced()
@@ -109,7 +115,8 @@ def integrate(
     Unsupported
         The method does not support the scene.
     LoadNotResolved
-        A warning: the steps are too long for a torque, damping or motor that is a function of time without `breaks`.
+        A warning: the steps are too long for a torque, damping or motor that is a function of time without `breaks`, or a
+        table with more corners than steps. Steps are divided at the corners of a table, so its samples are right.
     NotConverged
         The equations of a step could not be solved.
     Diverged
@@ -140,7 +147,7 @@ def integrate(
             method = read_method(method, scene)
             grid = grid_for(scene, read_step(scene, dt, t_end), t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
-            warn_of_loads(scene, method, grid.dt)
+            warn_of_loads(scene, method, grid)
             if at is None:
                 trajectory = method.solve(scene, grid)
             else:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import AccuracyNotReached, BadInput
-from ..grid import Grid, require_memory
+from ..grid import Grid, count_steps, require_memory
 from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
@@ -97,7 +97,7 @@ def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Gr
     if samples.spacing is None:
         require_memory("sample_every", math.ceil(t_end / dt), samples.every)
         return even_grid(t_end, dt, samples.every, parts)
-    each = parts * max(1, math.ceil(samples.spacing / dt / parts * (1 - 1e-9)))
-    n = each * math.ceil(t_end / samples.spacing * (1 - 1e-9))
+    each = parts * count_steps(samples.spacing, parts * dt)
+    n = each * count_steps(t_end, samples.spacing)
     require_memory("sample_every", n, min(each * samples.every, n))
     return Grid(samples.spacing / each, n, min(each * samples.every, n))

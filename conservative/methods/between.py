@@ -17,7 +17,7 @@ from ..attitude import Array, to_quaternion
 from ..check import describe, real_array
 from ..deferred_imports import kernels
 from ..errors import BadInput, Diverged
-from ..grid import SAMPLE_BYTES, Grid, most_samples
+from ..grid import ROUNDING, SAMPLE_BYTES, Grid, count_whole_steps, most_samples
 from ..method import Method
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
@@ -26,8 +26,6 @@ from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import invariant_scales, principal_start
 from .units import bound_rate, convert_scene, find_units
 
-SAME = 1e-9
-"""A sample that is closer to a step than this share of the step size is the state of that step."""
 RADIANS = 0.5
 """First substep across a gap, as the largest possible rotation, rad."""
 LONGEST = 6.0
@@ -94,7 +92,7 @@ def _require_count(n: int, least: int, allowed: str) -> None:
 def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
     """Return the grid of steps dt, s, from which samples at times t (n,), s, are computed."""
     dt = divide_step(scene, method, dt)
-    n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
+    n_steps = max(1, count_whole_steps(float(t[-1]), dt))
     return Grid(dt, n_steps, stride_of(n_steps))
 
 
@@ -115,9 +113,9 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     """
     if not len(found):
         return found
-    row = np.searchsorted(found.t, t + SAME * grid.dt, side="right") - 1
+    row = np.searchsorted(found.t, t * (1 + ROUNDING), side="right") - 1
     gaps = t - found.t[row]
-    gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
+    gaps[np.abs(gaps) <= ROUNDING * t] = 0.0
     n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
     row, gaps = row[:n], gaps[:n]
     supplied = None if found.supplied is None else found.supplied[row]
@@ -156,18 +154,21 @@ def move(
     limits, times = (invariant_scales(scene)[1], RADIANS / bound_rate(scene)), t[far] / units.time
     breaks = scene.smoothness(float(times[-1])).breaks
     now, left, edges = times.copy(), gaps[far] / units.time, np.concatenate([[-math.inf], breaks, [math.inf]])
-    moved, waiting = len(far), np.arange(len(far))
+    moved, waiting, last = len(far), np.arange(len(far)), np.searchsorted(times, times, side="right") - 1
     while len(waiting):  # once, or once more for each break point in a gap
-        place = np.searchsorted(edges, now[waiting] * (1 + SAME), side="right")
+        place = np.searchsorted(edges, now[waiting] * (1 + ROUNDING), side="right")
         for i in np.unique(place).tolist():
             some = waiting[place == i]
+            lead, of, ahead = some, np.arange(len(some)), now[some] + left[some] >= edges[i]
+            if ahead.any():  # samples after the same step have the same state at a break point: one is moved there for all
+                lead, of = np.unique(np.where(ahead, last[some], some), return_inverse=True)
             if scene.loaded:
                 field = field._replace(clock=(0.0, float(edges[i - 1]), float(edges[i])))
-            gap, of_q, of_L = np.minimum(left[some], edges[i] - now[some]), q[some], L[some]
-            good = kernels("between").move(start.J_inverse, start.rotor, field, *table, *limits, now[some], gap, of_q, of_L)
-            of_L[:, 3:] += L[some, 3:]
-            q[some], L[some], now[some], left[some] = of_q, of_L, now[some] + gap, left[some] - gap
-            moved = moved if good == len(some) else min(moved, int(some[good]))
+            at, gap, of_q, of_L = now[lead], np.minimum(left[lead], edges[i] - now[lead]), q[lead], L[lead]
+            good = kernels("between").move(start.J_inverse, start.rotor, field, *table, *limits, at, gap, of_q, of_L)
+            of_L[:, 3:] += L[lead, 3:]
+            q[some], L[some], now[some], left[some] = of_q[of], of_L[of], (at + gap)[of], left[some] - gap[of]
+            moved = moved if good == len(lead) else min(moved, int(some[of >= good].min()))
         waiting = waiting[left[waiting] > 0]
     moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
     kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)

@@ -13,6 +13,7 @@ from ..grid import Grid
 from ..method import Method
 from ..scene import Scene
 from ..trajectory import Bounds
+from .pieces import count_most_steps
 
 EPSILON = sys.float_info.epsilon
 LOOSEST = 1e-3
@@ -33,6 +34,7 @@ def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float 
 
     If `orthonormality` is None, it has the same bound as the invariants.
     """
-    rounding = ROUNDING * EPSILON * (10 + grid.n_steps) * scene.body.condition
-    drift = min(LOOSEST, rounding + SOLVER * tol * grid.n_steps)
+    n_steps = count_most_steps(scene, grid)
+    rounding = ROUNDING * EPSILON * (10 + n_steps) * scene.body.condition
+    drift = min(LOOSEST, rounding + SOLVER * tol * n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)

@@ -16,68 +16,87 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..attitude import Array
-from ..grid import Grid
-
-SAME = 1e-9
-"""A break point that is closer to the end of a step, in steps, is at that end."""
+from ..grid import ROUNDING, Grid
+from ..scene import Scene
 
 MOST_PARTS = 64
 """Largest number of steps into which a part of a step is divided."""
 
 
 class Piece(NamedTuple):
-    """Steps of length h from a time t, both s, after `done` whole steps of the grid: `n` steps.
+    """A run of n steps of length h from a time t, both s, after `done` whole steps of the grid.
 
-    They are whole steps of the grid, or parts of one; the piece ends when `after` whole steps are done. `window` has the break
-    points before and after it, s.
+    `whole` is True for steps of the grid, and False for parts of one. `window` has the break points before and after it, s.
+    `rows` are the samples that it fills, at equal distances up to its end. If they are several, it starts at the sample before.
     """
 
     t: float
     h: float
-    done: int
-    after: int
     n: int
     window: tuple[float, float]
+    done: int
+    whole: bool
+    rows: range
 
 
-def list_pieces(grid: Grid, breaks: Sequence[float]) -> list[Piece]:
-    """Return the pieces of a run with break points, s, in order; each has its samples after its last step, or after all."""
-    dt, n, pieces = grid.dt, grid.n_steps, list[Piece]()
-    done, t, before = 0, 0.0, -math.inf
-    inside = sum(0 < each < n * dt for each in breaks)
-    parts = min(MOST_PARTS, max(1, math.ceil(n / (inside + 1) * (1 - SAME))))  # steps between points: thrice the work at most
+def list_pieces(grid: Grid, breaks: Array) -> list[Piece]:
+    """Return the pieces of a run with increasing break points above 0, s, in order."""
+    dt, n, every, pieces = grid.dt, grid.n_steps, grid.every, list[Piece]()
+    parts, done, t, before = count_parts(grid, count_inside(grid, breaks)), 0, 0.0, -math.inf
 
-    def divide(end: float, after: int) -> None:
-        pieces.append(Piece(t, (end - t) / parts, done, after, parts, window))
+    def rows_at(step: int) -> range:
+        row = -(-step // every)
+        return range(row, row + (step % every == 0 or step == n))
 
-    for point in (*breaks, math.inf):
-        place = min(point / dt, n + 1.0)
-        window, nearest = (before, point), round(place)
-        last = nearest if abs(place - nearest) <= SAME else math.floor(place)
-        if t > done * dt:  # within a step
-            end, after = ((done + 1) * dt, done + 1) if last > done else (point, done)
-            divide(end, after)
-            done, t = after, end
-        for steps in _split(done, min(last, n), grid):
-            pieces.append(Piece(done * dt, dt, done, done + steps, steps, window))
+    for point in (*breaks.tolist(), math.inf):
+        place, window = min(point / dt, n + 1.0), (before, point)
+        nearest = round(place)
+        at_end = abs(place - nearest) <= ROUNDING * place
+        last = nearest if at_end else math.floor(place)
+        if t > done * dt and last > done:  # the rest of a step
+            end = (done + 1) * dt
+            pieces.append(Piece(t, (end - t) / parts, parts, window, done, False, rows_at(done + 1)))
+            done, t = done + 1, end
+        for steps in _split(done, min(last, n), every):
+            even = done % every == steps % every == 0
+            rows = range(done // every + 1, (done + steps) // every + 1) if even else rows_at(done + steps)
+            pieces.append(Piece(done * dt, dt, steps, window, done, True, rows))
             done += steps
             t = done * dt
         if done >= n:
             break
-        if point > t and place - last > SAME:
-            divide(point, done)
+        if not at_end:
+            pieces.append(Piece(t, (point - t) / parts, parts, window, done, False, range(0)))
             t = point
         before = point
     return pieces
 
 
-def _split(first: int, last: int, grid: Grid) -> list[int]:
-    """Return numbers of steps from `first` to `last`: samples are at the end of each, or evenly spaced from its start."""
-    every, parts = grid.every, []
-    if first < last and first % every:
-        parts.append(min(last, first + every - first % every) - first)
-    whole = (last - first - sum(parts)) // every * every
-    return [each for each in (*parts, whole, last - first - sum(parts) - whole) if each > 0]
+def count_parts(grid: Grid, inside: int) -> int:
+    """Return the number of steps into which each part of a step is divided, with so many break points inside of the run."""
+    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # with fewer points than steps, thrice the work at most
+
+
+def count_most_steps(scene: Scene, grid: Grid) -> int:
+    """Return the largest number of steps that a run can take: the steps of the grid, and two parts for each break point."""
+    if not scene.loads:
+        return grid.n_steps
+    inside = count_inside(grid, scene.smoothness(grid.last).breaks)
+    return grid.n_steps + 2 * inside * count_parts(grid, inside)
+
+
+def count_inside(grid: Grid, breaks: Array) -> int:
+    """Return the number of increasing break points, s, before the end of a run."""
+    return int(np.searchsorted(breaks, grid.n_steps * grid.dt))
+
+
+def _split(first: int, last: int, every: int) -> list[int]:
+    """Return numbers of steps from `first` to `last`: up to the first sample, from there to the last one, and the rest."""
+    if first >= last:
+        return []
+    begin = min(last, -(-first // every) * every) - first
+    whole = (last - first - begin) // every * every
+    return [each for each in (begin, whole, last - first - begin - whole) if each > 0]
 
 
 def march_pieces(
@@ -91,22 +110,23 @@ def march_pieces(
     L: Array,
 ) -> tuple[int, int, int, int | None, float, bool]:
     """Take the steps of all pieces as `enter` of a kernel takes those of a run, and fill the samples q and L."""
-    state, supplied = (model.q, model.L), np.zeros(4)
-    two_q, two_L, every = np.empty((2, 4)), np.empty((2, 7)), grid.every
+    state, supplied, ends = (model.q, model.L), np.zeros(4), (np.empty((2, 4)), np.empty((2, 7)))
     stages, corrections, evaluations, size = 0, 0, None, 0.0
     q[0], L[0, :3], L[0, 3:] = model.q, model.L, 0.0
-    for t, h, done, after, n, window in pieces:
+    for t, h, n, window, done, whole, rows in pieces:
         start = model._replace(q=state[0], L=state[1], field=model.field._replace(clock=(t, *window)))
-        many, row = after - done >= every and (after - done) % every == 0 and n == after - done, done // every
-        to = (q[row : row + n // every + 1], L[row : row + n // every + 1]) if many else (two_q, two_L)
-        found = kernel.enter(*start, *find_coefficients(h), n, every if many else n, pause, *to)
+        # A kernel also writes its start, which is a sample only if several follow at equal distances.
+        several = len(rows) > 1
+        to_q, to_L = (each[rows.start - 1 : rows.stop] for each in (q, L)) if several else ends
+        every = n // len(rows) if several else n
+        found = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L)
         stages, corrections, size = stages + found[1], corrections + found[2], found[4]
         evaluations = None if found[3] is None else (evaluations or 0) + found[3]
+        to_L[: 1 + found[0] // every, 3:] += supplied
         if found[0] < n:
-            return done + (found[0] if n == after - done else 0), stages, corrections, evaluations, size, found[5]
-        to[1][:, 3:] += supplied
-        supplied = to[1][-1, 3:].copy()
-        state = tuple(to[0][-1].tolist()), tuple(to[1][-1, :3].tolist())
-        if after > done and not many and (after % every == 0 or after == grid.n_steps):
-            q[-(-after // every)], L[-(-after // every)] = two_q[1], two_L[1]
+            return done + found[0] * whole, stages, corrections, evaluations, size, found[5]
+        supplied = to_L[-1, 3:].copy()
+        state = tuple(to_q[-1].tolist()), tuple(to_L[-1, :3].tolist())
+        if len(rows) == 1:
+            q[rows.start], L[rows.start] = to_q[1], to_L[1]
     return grid.n_steps, stages, corrections, evaluations, size, False

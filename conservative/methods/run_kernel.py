@@ -53,7 +53,7 @@ def prepare_run(
     bound = kernel.bind(model, coefficients) if hasattr(kernel, "bind") else partial(kernel.enter, *model, *coefficients)
     enter, to_body_axes = partial(bound, n_steps, grid.every), kernels("samples").to_body_axes
     if find_coefficients and len(breaks := scene.smoothness(grid.last).breaks):
-        enter = partial(march_pieces, list_pieces(grid, breaks.tolist()), kernel, model, find_coefficients, grid)
+        enter = partial(march_pieces, list_pieces(grid, breaks), kernel, model, find_coefficients, grid)
     turn = start.J_inverse, start.spin, start.R_BP
     counts: tuple[int, int, int, int | None] | None = None
     counters = _NO_COUNTERS

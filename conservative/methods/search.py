@@ -23,7 +23,7 @@ import numpy as np
 
 from .. import registry
 from ..errors import MissingEngine
-from ..grid import Grid
+from ..grid import Grid, count_steps
 from ..method import Method, Role
 from ..needs import Need
 from ..scene import Scene
@@ -234,7 +234,7 @@ def _settings_of(family: type[Method]) -> tuple[Method, ...]:
 
 def even_grid(t_end: float, dt: float, sample_every: int, parts: int = 2) -> Grid:
     """Return a grid of a multiple of `parts` steps of at most dt up to t_end, both in s, for runs at twice the step."""
-    n = parts * max(1, math.ceil(t_end / dt / parts * (1 - 1e-9)))
+    n = parts * count_steps(t_end, parts * dt)
     return Grid(t_end / n, n, min(sample_every, n))
 
 

@@ -106,3 +106,56 @@ def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[f
             return result[0], (float(times[worst * size]), float(times[(worst + 1) * size]))
         result, size = (size * step, result[1]), 2 * size
     return math.inf, result[1]
+
+
+class Unresolved(NamedTuple):
+    """A table that steps do not resolve: the longest step that does, s, the step that differs most, s, and its corners."""
+
+    step: float
+    interval: tuple[float, float]
+    corners: int
+
+
+def find_unresolved(load: Any, dt: float, n_steps: int) -> Unresolved | None:
+    """Return what n steps dt, s, do not resolve of a table: corners, of which there are more than steps, and which show.
+
+    They show if Simpson's rule over each step and the integral of the table differ as in `examine`. So they do not in a smooth
+    function that is sampled densely.
+    """
+    if not isinstance(load.value, tuple):
+        return None
+    end = n_steps * dt
+    corners = int(np.count_nonzero((load.breaks > 0) & (load.breaks < end)))
+    if corners <= n_steps:
+        return None
+    times, rows = load.value[0], load.value[1].reshape(len(load.value[0]), -1)
+    off = _compare(times, rows, dt, n_steps)
+    worst, step, n = int(off.argmax()), dt, n_steps
+    while corners > n and off.mean() > AGREED:
+        step, n = step / 2, 2 * n
+        off = _compare(times, rows, step, n)
+    return Unresolved(step, (worst * dt, (worst + 1) * dt), corners) if n > n_steps else None
+
+
+def _compare(times: Array, rows: Array, dt: float, n_steps: int) -> Array:
+    """Return the difference (n,) of Simpson's rule from the mean of a table in each of n steps dt, s, relative to its size.
+
+    A table is linear between its times and held after them; at a jump a step has the value of its own side.
+    """
+    ends = dt * np.arange(n_steps + 1)
+    sums = np.vstack([np.zeros(rows.shape[1]), np.cumsum(np.diff(times)[:, None] * (rows[1:] + rows[:-1]) / 2, axis=0)])
+
+    def at(t: Array, side: Any) -> tuple[Array, Array]:
+        """Return the values at times and the integrals up to them."""
+        i = np.clip(np.searchsorted(times, t, side) - 1, 0, len(times) - 2)
+        gap, after = times[i + 1] - times[i], (t - times[i])[:, None]
+        share = np.divide(after, gap[:, None], out=np.ones_like(after), where=gap[:, None] > 0)
+        value = rows[i] + np.minimum(share, 1.0) * (rows[i + 1] - rows[i])
+        inside = np.minimum(after, gap[:, None])
+        return value, sums[i] + inside * (rows[i] + value) / 2 + (after - inside) * value
+
+    (first, low), (last, high) = at(ends[:-1], "right"), at(ends[1:], "left")
+    middle = at((ends[1:] + ends[:-1]) / 2, "right")[0]
+    mean, rule = (high - low) / np.diff(ends)[:, None], (first + 4 * middle + last) / 6
+    size = np.maximum(np.abs(mean), np.abs(rule)).mean(axis=0).max()
+    return np.abs(rule - mean).max(axis=1) / (size or 1.0)

@@ -171,7 +171,7 @@ def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None
 
 def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
     """Return the trajectory on a grid; a failure ends it early."""
-    warn_of_loads(scene, method, grid.dt)
+    warn_of_loads(scene, method, grid)
     try:
         return method.solve(scene, grid)
     except SystemError as failure:
