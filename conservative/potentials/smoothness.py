@@ -1,8 +1,9 @@
 """Where functions of time are not smooth, and which steps resolve them.
 
-The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps and corners between two of them are found by
-bisection; steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the sum over all
-times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be missed.
+The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps and corners between two of them are found
+by bisection; steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the
+sum over all times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be
+missed.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ SCANNED = 2**16
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
 ATTITUDE, OTHER = (read_only(rotation_about(axis, angle)) for axis, angle in (((1.0, 2.0, 3.0), 1.0), ((-3.0, 1.0, 2.0), 2.0)))
-"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. What is found is not smooth in time if the function is
+"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. What is found belongs to the time if the function is
 not smooth at the `OTHER` attitude either."""
 STEEP, MOST_JUMPS = 10.0, 1000
 """An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
