@@ -43,7 +43,7 @@ MOST_TRIES = 5_000
 """Largest number of steps that are tried: 180,000 calls of a function, some ten seconds."""
 SAME = 1e-12
 """A sample that is closer to a break point, relative to the time, is at it."""
-ROUGH = 1e-3
+ROUGH = 3e-3
 """A step that is shorter than this share of the median shows a corner or a jump."""
 
 

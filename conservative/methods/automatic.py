@@ -25,7 +25,7 @@ from ..scene import Scene
 from ..trajectory import Choice, Trajectory
 from .between import SampleTimes, divide_step, sample_between, stride_of
 from .projected import Projected
-from .search import GIVEN_UP, adaptive_method, adaptive_spacing, even_grid, find_cheapest, step_factor, stops_falling
+from .search import adaptive_method, adaptive_spacing, even_grid, find_cheapest, step_factor, stops_falling
 from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
 
 ATTEMPTS = 12
@@ -84,7 +84,7 @@ def best_of(tried: Sequence[Attempt]) -> Attempt:
 
 
 def find_rough(tried: Sequence[Attempt]) -> float | None:
-    """Return a time, s, near which the motion is not smooth, as the last attempt shows that does; None if none does."""
+    """Return a time, s, near which the motion is not smooth, by the last attempt that shows one; None if none does."""
     return next((each.estimate.rough for each in reversed(tried) if each.estimate.rough is not None), None)
 
 
@@ -163,7 +163,7 @@ def cut_step(
         within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
         if run.error <= within or rounding >= ASYMPTOTIC or len(tried) == ATTEMPTS:
             return tried
-        if sum(each.estimate.rough is not None for each in tried) >= GIVEN_UP:
+        if run.rough is not None:  # an adaptive method is faster
             return tried
         if stops_falling([each.estimate.total for each in tried]):
             return tried

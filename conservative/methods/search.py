@@ -6,7 +6,7 @@ next, with a shorter step, and the search ends when that candidate already has a
 2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
-Fixed steps are given up as soon as two of one candidate show that the motion is not smooth: then an adaptive method follows.
+Fixed steps are given up as soon as those of one candidate show that the motion is not smooth: an adaptive method follows.
 
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
@@ -44,8 +44,6 @@ MOST_PROBED = 10**7
 """Largest number of steps of a trial run: a second by the fastest method."""
 MOST_CALLING = 20_000
 """Largest number of steps of a trial run that calls functions of Python: ten seconds."""
-GIVEN_UP = 2
-"""A motion is not smooth if the differences of so many attempts of a candidate do not fall in order."""
 MOST_COMPARED = 10**5
 """Largest number of samples of a trial run."""
 LENIENCY = 3.0
@@ -85,7 +83,7 @@ class Candidate:
     most_steps
         Largest number of steps of a trial run.
     rough
-        Number of attempts whose differences do not fall in order.
+        True if the last attempt shows that the motion is not smooth.
     """
 
     method: Method
@@ -98,7 +96,7 @@ class Candidate:
     sensitivity: float = 0.0
     runs: float = 1.0
     most_steps: int = MOST_PROBED
-    rough: int = 0
+    rough: bool = False
 
     @property
     def reached(self) -> bool:
@@ -135,7 +133,7 @@ class Candidate:
             attempts=(*self.attempts, (grid.dt, trial.error)),
             step_work=trial.work / grid.n_steps,
             sensitivity=(trial.sensitivity or 0.0) if lost else 0.0,
-            rough=self.rough + (trial.rough is not None),
+            rough=trial.rough is not None,
         )
         return after if after.settled else replace(after, dt=grid.dt * step_factor(trial.error, self.error, self.method))
 
@@ -174,7 +172,7 @@ def find_cheapest(
         if running[i].settled or running[i].hopeless or (len(running) == 1 and running[i].method.order is None):
             return running[i].method, running[i].dt
         running[i] = running[i].advance(trials)
-        if running[i].rough >= GIVEN_UP and not running[i].reached and not methods:
+        if running[i].rough and not running[i].reached and not methods:
             return adaptive_method(error), adaptive_spacing(t_end)
         if running[i].sensitivity > error:  # no step of any method helps
             return running[i].method, running[i].attempts[-1][0]

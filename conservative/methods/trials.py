@@ -45,6 +45,10 @@ HALVINGS = 3
 SHOWN, ALIKE = 0.5, 2.0**0.75
 """Differences fall in order if each is smaller by this share of what the order says, and the factors of both halvings are as
 alike as this."""
+LOW, RESOLVED = 0.25, 0.05
+"""A function is not smooth if differences below so many rad fall, in two halvings, by less than this share of the order each."""
+MAGNIFIED = 2.0**20
+"""Factor on the change of a scene that represents rounding, for adaptive methods; the effect is divided by it."""
 LOOSER = 30.0
 """Factor between the tolerances of the two runs of an adaptive method."""
 NEAR = 0.1
@@ -135,11 +139,17 @@ class Trials:
         work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
         moved = 0.0 if sensitivity else None
         if sensitivity and coarse is not None:  # otherwise the step is too long to measure the sensitivity
-            scene, (other, longer) = nearby_scene(self.scene), coarser(method, grid)
-            if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
-                scene = scene.rename(scene.name, body=self.scene.body)
-            nearby = _solve(other, self.scene, longer, scene)
-            moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max())
+            other, longer = coarser(method, grid)
+            # Steps of a tolerance are not the same in both runs, so that the change has to be larger than their errors.
+            factors = (MAGNIFIED, 1.0) if coarse.control is not None else (1.0,)
+            for factor in factors:
+                scene = nearby_scene(self.scene, factor * ROUNDED)
+                if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
+                    scene = scene.rename(scene.name, body=self.scene.body)
+                nearby = _solve(other, self.scene, longer, scene) if factor == 1.0 else _solve(other, scene, longer)
+                moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max()) / factor
+                if factor * moved < RESOLVED:
+                    break
         estimate = Estimate(error, work, moved, rough)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
@@ -196,7 +206,7 @@ def run_twice(method: Method, scene: Scene, grid: Grid) -> Runs:
     other, longer = coarser(method, grid)
     coarse = _solve(other, scene, longer)
     if not fine.ok or coarse is None:
-        return Runs(math.inf, fine, None, None)
+        return Runs(math.inf, fine, None, fine.control and fine.control.rough)
     difference, rough = _largest_difference(fine, coarse), None
     if fine.control is not None:
         error, rough = max(difference, fine.control.local), fine.control.rough
@@ -236,9 +246,11 @@ def _by_shown_order(
         factors = [min(most, second / first) if first > 0 else most for first, second in pairwise(seen)]
         if min(factors) >= SHOWN * most and max(factors) <= ALIKE * min(factors):
             return seen[0] / (min(factors) - 1), None
-    # As far as rounding explains the differences, they say nothing about the function.
+    # As far as rounding explains the differences, they say nothing about the function; long steps do not show an order, either.
     floor = NOTHING * (1.0 + float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * float(fine.t[-1]))
-    return max(seen), _roughest(fine, coarse) if len(seen) == HALVINGS and min(seen) > floor else None
+    shown = len(seen) == HALVINGS and min(seen) > floor and max(seen) < RESOLVED
+    rough = shown and seen[-1] < (LOW * (convergence_factor(method) + 1)) ** 2 * seen[0]
+    return max(seen), _roughest(fine, coarse) if rough else None
 
 
 def _roughest(fine: Trajectory, coarse: Trajectory) -> float:
@@ -288,8 +300,8 @@ def _solve(method: Method, scene: Scene, grid: Grid, nearby: Scene | None = None
     return trajectory if trajectory.ok else None
 
 
-def nearby_scene(scene: Scene) -> Scene:
-    """Return the scene with inertia, attitude and rates changed by `ROUNDED`, as rounding them may change them.
+def nearby_scene(scene: Scene, by: float = ROUNDED) -> Scene:
+    """Return the scene with inertia, attitude and rates changed by a share, as rounding them may change them.
 
     If the tensor is diagonal, no axes have to be computed and zeros stay zeros, so a spin about a principal axis remains one.
     Equal moments stay equal, because they are the same number: rounding it does not make a rod a body of three moments.
@@ -300,12 +312,12 @@ def nearby_scene(scene: Scene) -> Scene:
     sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
     equal = [_SIGNS[0][int(np.argmax(body.moments == each))] for each in body.moments]  # such as those of a rod stay equal
     signs = np.diag(equal) if diagonal else _AXES_TOO
-    moved = body.R_BP @ (ROUNDED * sizes * signs) @ body.R_BP.T
+    moved = body.R_BP @ (by * sizes * signs) @ body.R_BP.T
     return replace_unchecked(
         scene,
         body=replace_unchecked(body, inertia=body.inertia + (moved + moved.T) / 2),
-        R_WB0=scene.R_WB0 * (1 + ROUNDED * _SIGNS),
-        w_WB_B0=w + ROUNDED * rates * _SIGNS[0],
+        R_WB0=scene.R_WB0 * (1 + by * _SIGNS),
+        w_WB_B0=w + by * rates * _SIGNS[0],
     )
 
 
