@@ -28,6 +28,13 @@ if TYPE_CHECKING:
     import xarray
 
 
+class StepControl(NamedTuple):
+    """The sum of the local errors of all steps, rad, and a time, s, near which functions are not smooth; None if they are."""
+
+    local: float
+    rough: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """Samples of a motion.
@@ -51,6 +58,8 @@ class Trajectory:
         them; None for scenes without them and for methods that do not provide it.
     frame
         Positions (n, 3), m, and velocities (n, 3), m/s, as an engine integrated them in free flight, otherwise None.
+    control
+        What the steps of a tolerance show, for methods that provide it, otherwise None.
     """
 
     scene: Scene
@@ -63,6 +72,7 @@ class Trajectory:
     choice: Choice | None = None
     supplied: Array | None = None
     frame: tuple[Array, Array] | None = None
+    control: StepControl | None = None
 
     @property
     def outcome(self) -> Outcome:

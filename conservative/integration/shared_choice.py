@@ -23,10 +23,10 @@ from ..drifts import energy_scales
 from ..errors import AccuracyNotReached, BadInput
 from ..grid import Grid
 from ..method import Method
-from ..methods.automatic import cut_step, grid_of
+from ..methods.automatic import best_of, find_rough, reach
 from ..methods.between import SampleTimes
 from ..methods.search import find_cheapest
-from ..methods.trials import Estimate, parts_for, trials_of
+from ..methods.trials import Estimate, trials_of
 from ..outcome import ChoiceForMany
 
 HARDEST, RANDOM, VERIFIED = 3, 5, 8
@@ -49,24 +49,28 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTim
     method, dt = find_cheapest(trials_of(bodies.take(chosen[0])), error, t_end, bodies=len(bodies))
     if method.order is None:
         dt = min(dt, LONGEST * min(method.longest_step(bodies.take(i)) for i in numbers))
-    attempts, parts = tuple[tuple[float, float], ...](), parts_for(bodies.scene)
+    attempts: tuple[tuple[float, float], ...] = ()
     for _ in range(ROUNDS):
-        tried = cut_step(
+        tried = reach(
+            bodies.scene,
             method,
             dt,
             error,
-            lambda dt: grid_of(dt, t_end, samples, parts),
-            lambda grid: find_worst(bodies, chosen, method, grid)[0],  # noqa: B023  # called in this round only
+            t_end,
+            samples,
+            lambda method, grid: find_worst(bodies, chosen, method, grid)[0],  # noqa: B023  # called in this round only
         )
-        attempts, (dt, estimate) = attempts + tried, tried[-1]
-        grid = grid_of(dt, t_end, samples, parts)
+        attempts += tuple((each.grid.dt, each.estimate.total) for each in tried)
+        method, grid, found = best_of(tried) if best_of(tried).method != method else tried[-1]
+        dt, estimate, rough = grid.dt, found.total, find_rough(tried)
         worst, number = find_worst(bodies, verified, method, grid)
         if worst.total <= error or estimate > error:
             break
         chosen, verified = [*chosen, number], [i for i in verified if i != number]
     choice = ChoiceForMany(method, dt, error, max(worst.total, estimate), attempts, len(numbers), grid)
     if not choice.reached:
-        warnings.warn(AccuracyNotReached(error, choice.estimate), stacklevel=3)
+        rough = worst.rough if rough is None else rough
+        warnings.warn(AccuracyNotReached(error, choice.estimate, rough=rough), stacklevel=3)
     return choice
 
 

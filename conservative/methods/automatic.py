@@ -5,14 +5,17 @@
 2. The chosen method makes the whole run, and repeats it with twice the step (Richardson's step doubling). The difference is the
    reported estimate. Shorter trials cannot provide it, because a scene can amplify errors later. If
    the estimate is above the requested error, the step is cut and the run repeated, unless the cause is rounding of the scene.
+3. If a load or a function of a user acts, and no step reaches the error or the motion is not smooth, an adaptive method
+   follows, whose tolerance is cut in the same way. The run with the smallest estimate is the result.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from ..errors import AccuracyNotReached, BadInput
 from ..grid import Grid, count_steps, require_memory
@@ -21,10 +24,13 @@ from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
 from .between import SampleTimes, divide_step, sample_between, stride_of
-from .search import even_grid, find_cheapest, step_factor, stops_falling
-from .trials import ASYMPTOTIC, Estimate, parts_for, trials_of
+from .projected import Projected
+from .search import adaptive_method, adaptive_spacing, even_grid, find_cheapest, step_factor, stops_falling
+from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
 
 ATTEMPTS = 12
+TOLERANCES, LEAST_TOLERANCE = 5, 1e-14
+"""Largest number of tolerances of an adaptive method that are tried, and the smallest one."""
 MOST_STEPS = 10**10
 """Largest number of steps of a run: about a quarter of an hour by the fastest method."""
 
@@ -42,47 +48,129 @@ def integrate_to_error(
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
-
-    def grid_with(dt: float) -> Grid:
-        return grid_of(dt, t_end, samples, parts_for(scene))
-
     dt = dt if samples.at is None else divide_step(scene, method, dt)
-    attempts = cut_step(method, dt, error, grid_with, lambda grid: trials.estimate(method, grid, sensitivity=True)[0])
-    grid = grid_with(min(reversed(attempts), key=lambda attempt: attempt[1])[0])  # of the smallest error
-    estimated, trajectory = trials.estimate(method, grid, sensitivity=True)
-    choice = Choice(method, grid.dt, error, estimated.total, attempts)
-    trajectory = method.solve(scene, grid) if trajectory is None else trajectory
-    if samples.at is not None:
-        trajectory = sample_between(trajectory, method, grid, samples.at)
+    tried = reach(
+        scene, method, dt, error, t_end, samples, lambda method, grid: trials.estimate(method, grid, sensitivity=True)[0]
+    )
+    method, grid, estimated = best_of(tried)
+    _, trajectory = trials.estimate(method, grid, sensitivity=True)
+    attempts = tuple((each.grid.dt, each.estimate.total) for each in tried)
+    total, rough = estimated.total, find_rough(tried)
+    adaptive = isinstance(method, Projected) and method.tolerance is not None
+    if adaptive and samples.at is not None:
+        trajectory = method.solve_at(scene, grid, samples.at)
+        total = max(total, trajectory.control.local) if trajectory.control else total
+    else:
+        trajectory = method.solve(scene, grid) if trajectory is None else trajectory
+        if samples.at is not None:
+            trajectory = sample_between(trajectory, method, grid, samples.at)
+    choice = Choice(method, grid.dt, error, total, attempts)
     if trajectory.ok and not choice.reached:
-        warnings.warn(AccuracyNotReached(error, estimated.total, estimated.sensitivity or 0.0), stacklevel=3)
+        warnings.warn(AccuracyNotReached(error, total, estimated.sensitivity or 0.0, rough), stacklevel=3)
     return replace(trajectory, choice=choice)
 
 
+class Attempt(NamedTuple):
+    """A run over the whole duration, and its estimate."""
+
+    method: Method
+    grid: Grid
+    estimate: Estimate
+
+
+def best_of(tried: Sequence[Attempt]) -> Attempt:
+    """Return the attempt with the smallest estimate, the last one of equals."""
+    return min(reversed(tried), key=lambda each: each.estimate.total)
+
+
+def find_rough(tried: Sequence[Attempt]) -> float | None:
+    """Return a time, s, near which the motion is not smooth, by the last attempt that shows one; None if none does."""
+    return next((each.estimate.rough for each in reversed(tried) if each.estimate.rough is not None), None)
+
+
+def reach(
+    scene: Scene,
+    method: Method,
+    dt: float,
+    error: float,
+    t_end: float,
+    samples: SampleTimes,
+    estimate: Callable[[Method, Grid], Estimate],
+) -> list[Attempt]:
+    """Return the runs that were tried for an error, rad, up to t_end, s: with a method, from a step dt, s, on.
+
+    `estimate` returns the estimate of a run, including its sensitivity. Raise `BadInput` if the first step makes more steps or
+    samples than are possible.
+    """
+    tried: list[Attempt] = []
+    if getattr(method, "tolerance", None) is None:
+        parts = parts_for(scene)
+        tried = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples, parts), estimate)
+        if presumed_smooth(scene) or method.order is None or best_of(tried).estimate.total <= error:
+            return tried
+    adaptive = adaptive_method(error)
+    return [*tried, *cut_tolerance(adaptive, sampling_grid(t_end, samples), error, lambda *each: estimate(*each))]
+
+
+def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
+    """Return the grid of a run with a tolerance to t_end, s: its steps are the intervals between samples, s."""
+    if samples.at is not None or samples.spacing is None:
+        every = 1 if samples.at is not None else samples.every
+        return even_grid(t_end, adaptive_spacing(t_end), every, 1)
+    n = math.ceil(t_end / samples.spacing * (1 - 1e-9))
+    require_memory("sample_every", n, min(samples.every, n))
+    return Grid(samples.spacing, n, min(samples.every, n))
+
+
+def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Callable[[Method, Grid], Estimate]) -> list[Attempt]:
+    """Cut the tolerance of a method until the estimated error is at most `error`, rad, or smaller ones do not help."""
+    tried: list[Attempt] = []
+    while True:
+        run = estimate(method, grid)
+        tried.append(Attempt(method, grid, run))
+        within = error - run.noise if run.noise < error else run.noise
+        if run.error <= within or run.noise >= ASYMPTOTIC or len(tried) == TOLERANCES:
+            return tried
+        if stops_falling([each.estimate.total for each in tried]):
+            return tried
+        if len(tried) > 1 and math.isinf(run.error):
+            return tried
+        assert method.tolerance is not None
+        factor = min(0.3, max(1e-3, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
+        if method.tolerance <= LEAST_TOLERANCE:
+            return tried
+        method = Projected(tolerance=max(LEAST_TOLERANCE, factor * method.tolerance))
+
+
 def cut_step(
-    method: Method, dt: float, error: float, grid_with: Callable[[float], Grid], estimate: Callable[[Grid], Estimate]
-) -> tuple[tuple[float, float], ...]:
+    method: Method,
+    dt: float,
+    error: float,
+    grid_with: Callable[[float], Grid],
+    estimate: Callable[[Method, Grid], Estimate],
+) -> list[Attempt]:
     """Cut a step dt, s, until the estimated error is at most `error`, rad, or shorter steps do not help.
 
-    Return the steps tried, s, and the estimated total error of each, rad. `grid_with` returns the grid of the whole run for a
-    step, s, and `estimate` the estimate of a run, including its sensitivity. Raise `BadInput` if the first step makes more
-    steps or samples than are possible.
+    `grid_with` returns the grid of the whole run for a step, s, and `estimate` the estimate of a run, including its
+    sensitivity. Raise `BadInput` if the first step makes more steps or samples than are possible.
     """
     grid = grid_with(dt)
-    attempts: tuple[tuple[float, float], ...] = ()
+    tried: list[Attempt] = []
     while True:
-        run = estimate(grid)
-        attempts = (*attempts, (grid.dt, run.total))
+        run = estimate(method, grid)
+        tried.append(Attempt(method, grid, run))
         rounding = run.noise
         within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
-        if run.error <= within or rounding >= ASYMPTOTIC or len(attempts) == ATTEMPTS:
-            return attempts
-        if stops_falling([total for _, total in attempts]):
-            return attempts
+        if run.error <= within or rounding >= ASYMPTOTIC or len(tried) == ATTEMPTS:
+            return tried
+        if run.rough is not None:  # an adaptive method is faster
+            return tried
+        if stops_falling([each.estimate.total for each in tried]):
+            return tried
         try:
             grid = grid_with(grid.dt * step_factor(run.error, within, method))
         except BadInput:  # too many steps or samples: the best run so far is the result
-            return attempts
+            return tried
 
 
 def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Grid:

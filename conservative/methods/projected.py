@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import triple
+from ..attitude import Array, triple
 from ..card import Card, Cost, Structure
+from ..check import positive_number
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, with_balances
@@ -17,11 +18,13 @@ from ..method import Method, Role, Run
 from ..needs import Need
 from ..potentials.turning import Turning
 from ..scene import Scene
-from .bounds import within_round_off
+from ..trajectory import Bounds, Trajectory, cut_at_failure
+from .adaptive import MOST_TRIES, run_adaptively, trajectory_of, walk
+from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
-from .units import in_own_units
+from .units import SI, convert_scene, find_units, in_own_units
 
 
 @dataclass(frozen=True)
@@ -37,12 +40,28 @@ class Projected(Method):
     Fields may depend on time. In a turning field the Jacobi integral replaces the energy. In a field given as functions of
     attitude and time no energy is conserved.
 
+    With a tolerance, steps have any length, and dt is only the distance of samples. A corner or a jump of a function of Python,
+    at a time that depends on the motion, then costs some dozen short steps. Each step is computed twice, the second time as two
+    of half its length, and repeated with a shorter length until both agree (`conservative.methods.adaptive`).
+
     For free bodies use `MoserVeselov`, which has no truncation error.
+
+    Parameters
+    ----------
+    tolerance
+        None for the steps of the grid. Otherwise the largest local error of a step, rad, and relative to the largest momentum
+        that the energy allows.
+
+    Raises
+    ------
+    BadInput
+        tolerance is not a positive number or None.
     """
+
+    tolerance: float | None = None
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
-    order = DORMAND_PRINCE_8.order
     conserves = with_balances("energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis")
     card: ClassVar[Card] = Card(
         rank=2,
@@ -54,7 +73,18 @@ class Projected(Method):
         takes=frozenset(Need) - {Need.FLIGHT},  # free flight is a free body
     )
 
-    bounds = within_round_off
+    def __post_init__(self) -> None:
+        if self.tolerance is not None:
+            positive_number("tolerance", self.tolerance, "a finite number above 0, or None")
+
+    @property
+    def order(self) -> int | None:
+        return DORMAND_PRINCE_8.order if self.tolerance is None else None
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        if self.tolerance is not None:
+            grid = Grid(grid.dt, grid.n_steps + 3 * MOST_TRIES, grid.n_steps + 3 * MOST_TRIES)
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None
@@ -63,7 +93,29 @@ class Projected(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
         find = partial(kernel.Coefficients, *DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
+        if self.tolerance is not None:
+            return run_adaptively(scene, grid, label, start, model, find, self.tolerance)
         return prepare_run(scene, grid, label, start, kernel, model, find(grid.dt), find)
+
+    def solve_at(self, scene: Scene, grid: Grid, t: Array) -> Trajectory:
+        """Return the checked trajectory with samples at increasing times t (n,), s, of a run with a tolerance.
+
+        The grid of a run of the same length has the bounds.
+        """
+        units = find_units(scene, grid.dt)
+        other = scene.derive(convert_scene, units)
+        kernel, (label, start, model) = kernels("projected"), other.derive(convert, self)
+        find = partial(kernel.Coefficients, *DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c))
+        assert self.tolerance is not None
+        first = t[0] == 0
+        times = t / units.time if first else np.append(0.0, t / units.time)
+        found = trajectory_of(other, label, start, walk(other, model, find, self.tolerance, times))
+        found = found if units is SI else units.restore(found, scene, Grid(grid.dt, len(times)))
+        kept = slice(0 if first else 1, len(found))
+        supplied = None if found.supplied is None else found.supplied[kept]
+        samples = {"t": t[: len(found.t[kept])].copy(), "R_WB": found.R_WB[kept], "w_WB_B": found.w_WB_B[kept]}
+        found = replace(found, scene=scene, supplied=supplied, **samples)
+        return cut_at_failure(found, self.conserves, self.bounds(scene, grid))
 
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:

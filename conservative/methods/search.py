@@ -6,6 +6,8 @@ next, with a shorter step, and the search ends when that candidate already has a
 2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
+Fixed steps are given up as soon as those of one candidate show that the motion is not smooth: an adaptive method follows.
+
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
 starts at a step that is likely to be short enough, and ends the search if it is.
@@ -27,6 +29,7 @@ from ..grid import Grid, count_steps
 from ..method import Method, Role
 from ..needs import Need
 from ..scene import Scene
+from .projected import Projected
 from .trials import Trials, convergence_factor, parts_for
 from .units import bound_rate
 
@@ -39,6 +42,8 @@ PROBE_RADIANS = 200.0
 """Duration of trial runs, in radians of the fastest rotation that the energy allows."""
 MOST_PROBED = 10**7
 """Largest number of steps of a trial run: a second by the fastest method."""
+MOST_CALLING = 20_000
+"""Largest number of steps of a trial run that calls functions of Python: ten seconds."""
 MOST_COMPARED = 10**5
 """Largest number of samples of a trial run."""
 LENIENCY = 3.0
@@ -51,6 +56,8 @@ TRIAL = 2e5
 """Time that a trial takes beside its runs, ns."""
 FIRST = 1.5
 """First step, in units of the step that order and rate predict: short enough for 85 % of random bodies."""
+FIRST_TOLERANCE, ADAPTIVE_SAMPLES = 300.0, 64
+"""Requested error over the first tolerance of an adaptive method; samples of its runs, if nobody asks for others."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,10 @@ class Candidate:
         Attitude error caused by rounding the scene, rad, if the last attempt measured it; otherwise 0.
     runs
         Number of runs of that duration for which the method and the step are chosen.
+    most_steps
+        Largest number of steps of a trial run.
+    rough
+        True if the last attempt shows that the motion is not smooth.
     """
 
     method: Method
@@ -84,6 +95,8 @@ class Candidate:
     step_work: float = 0.0
     sensitivity: float = 0.0
     runs: float = 1.0
+    most_steps: int = MOST_PROBED
+    rough: bool = False
 
     @property
     def reached(self) -> bool:
@@ -100,7 +113,7 @@ class Candidate:
     @property
     def hopeless(self) -> bool:
         """True if the candidate is given up."""
-        return not self.settled and (self.duration / self.dt > MOST_PROBED or len(self.attempts) >= ATTEMPTS)
+        return not self.settled and (self.duration / self.dt > self.most_steps or len(self.attempts) >= ATTEMPTS)
 
     @property
     def work(self) -> float:
@@ -120,6 +133,7 @@ class Candidate:
             attempts=(*self.attempts, (grid.dt, trial.error)),
             step_work=trial.work / grid.n_steps,
             sensitivity=(trial.sensitivity or 0.0) if lost else 0.0,
+            rough=trial.rough is not None,
         )
         return after if after.settled else replace(after, dt=grid.dt * step_factor(trial.error, self.error, self.method))
 
@@ -148,7 +162,8 @@ def find_cheapest(
 ) -> tuple[Method, float]:
     """Return the method with the least work for an attitude error, rad, up to t_end, s, and the step that it needs, s.
 
-    `methods` are by default the `candidates` of the scene. The choice is for runs of so many bodies.
+    `methods` are by default the `candidates` of the scene. The choice is for runs of so many bodies. If the motion is not
+    smooth, the method is adaptive, and the step the distance of samples.
     """
     spent = 0.0
     running = [begin(method, trials.scene, error, t_end, bodies) for method in methods or candidates(trials.scene)]
@@ -157,12 +172,24 @@ def find_cheapest(
         if running[i].settled or running[i].hopeless or (len(running) == 1 and running[i].method.order is None):
             return running[i].method, running[i].dt
         running[i] = running[i].advance(trials)
+        if running[i].rough and not running[i].reached and not methods:
+            return adaptive_method(error), adaptive_spacing(t_end)
         if running[i].sensitivity > error:  # no step of any method helps
             return running[i].method, running[i].attempts[-1][0]
         spent += 1.5 * running[i].work + TRIAL
         cheapest = min((each for each in running if each.reached), key=lambda each: each.work, default=None)
         if cheapest and spent > cheapest.work * cheapest.runs:
             return cheapest.method, cheapest.dt
+
+
+def adaptive_method(error: float) -> Method:
+    """Return the adaptive method to try first for an attitude error, rad."""
+    return Projected(tolerance=error / FIRST_TOLERANCE)
+
+
+def adaptive_spacing(t_end: float) -> float:
+    """Return the distance of samples, s, of runs with a tolerance to t_end, s."""
+    return t_end / ADAPTIVE_SAMPLES
 
 
 def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: float = 1.0) -> Candidate:
@@ -178,12 +205,13 @@ def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: floa
     likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
     calling = scene.loads or not scene.needs.isdisjoint((Need.FUNCTION, Need.TIME))
     dt = min(duration / 2, method.card.longest / rate, math.inf if calling else likely)
-    if scene.loads:  # runs at two and four times the step have to differ everywhere (`conservative.methods.pieces`)
+    if scene.loads:  # runs at two to eight times the step have to differ everywhere (`conservative.methods.pieces`)
         breaks, step, _ = scene.smoothness(t_end)
-        dt = min(dt, step, t_end / 4 / (1 + np.count_nonzero(breaks < t_end)))
+        dt = min(dt, step, t_end / parts_for(scene) / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
-    return Candidate(method, error, duration, rate, dt, runs=bodies * t_end / duration)
+    most = MOST_CALLING if calling else MOST_PROBED
+    return Candidate(method, error, duration, rate, dt, runs=bodies * t_end / duration, most_steps=most)
 
 
 def predict_step(method: Method, error: float, rate: float) -> float:

@@ -1,5 +1,10 @@
 """Trial runs: the error of a run is estimated from a second run at twice the step, and cached for later calls.
 
+The order of a method holds for the laws of this package. What a user gives, a function of Python or a load, may have corners
+and jumps, at which differences of runs are small by chance. Runs at four and eight times the step then show whether
+differences fall as the method's order says, twice in a row. Otherwise the largest difference is the estimate. Adaptive methods
+have no step: their second run has a larger tolerance, and the local errors of all steps count as well.
+
 Step doubling (Richardson's extrapolation) cannot show the effect of rounding the scene's own numbers: principal moments of a
 tensor are known only to an ulp of the largest, and chaotic motions or motions near a separatrix amplify that error. A third run
 therefore starts from a scene whose inertia and initial state are changed by an ulp. Its distance from the second run, the
@@ -15,23 +20,40 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import pairwise
 from time import monotonic
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attitude import angle_between
+from ..attitude import Array, angle_between
 from ..check import replace_unchecked
 from ..errors import IntegrationFailed, MissingEngine, Unsupported
 from ..grid import Grid
 from ..method import Method
+from ..needs import Need
 from ..outcome import Progress
+from ..potentials.point_to_point import LinearSpring
+from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
 
 LARGEST_FACTOR = 30.0
 """Largest factor by which halving the step is assumed to reduce the error, for any order, because round-off is not reduced."""
-LEAST_FACTOR = 0.5
-"""Smallest such factor that is measured from three steps: runs that hardly converge are twice as wrong as they differ."""
+HALVINGS = 3
+"""Halvings of the step, and differences of runs, that show the order of a motion that is not presumed smooth."""
+SHOWN, ALIKE = 0.5, 2.0**0.75
+"""Differences fall in order if each is smaller by this share of what the order says, and the factors of both halvings are as
+alike as this."""
+LOW, RESOLVED = 0.25, 0.05
+"""A function is not smooth if differences below so many rad fall, in two halvings, by less than this share of the order each."""
+MAGNIFIED = 2.0**20
+"""Factor on the change of a scene that represents rounding, for adaptive methods; the effect is divided by it."""
+LOOSER = 30.0
+"""Factor between the tolerances of the two runs of an adaptive method."""
+NEAR = 0.1
+"""A spring is not presumed smooth if its points can come as near to each other as this, relative to their distance from the
+pivot: its force has no direction where they meet."""
 NOISE = 4.0
 """Largest effect of rounding in the steps, in units of the sensitivity. After 1,600 steps of order 16, the errors of 5 % of
 random bodies are larger than the estimate, and at most 2.6 times as large; 23 % and 4.2 times without this."""
@@ -41,6 +63,8 @@ MOST_SCENES, MOST_ESTIMATES = 64, 1024
 """Largest numbers of scenes whose trial runs are cached, and of cached trial runs of each."""
 ROUNDED = float(np.finfo(float).eps)
 """Relative change of a scene's numbers that represents rounding."""
+NOTHING = 1e-13
+"""Differences that rounding explains, rad, and for each rad of the motion."""
 _SIGNS = np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
 _AXES_TOO = np.array([[1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]])
 """Signs of the change of a tensor, which also turns its principal axes."""
@@ -55,16 +79,19 @@ class Estimate:
     Attributes
     ----------
     error
-        Attitude error from a run at twice the step, rad; inf if a run failed or both differ completely.
+        Attitude error from runs at longer steps, rad; inf if a run failed or they differ completely.
     work
         Work of the run, ns by `Card.cost`.
     sensitivity
         Attitude error caused by rounding inertia and initial state, rad; None if not measured.
+    rough
+        Time, s, near which differences of runs do not fall in order, so that a function is not smooth there; None if they do.
     """
 
     error: float
     work: float
     sensitivity: float | None = None
+    rough: float | None = None
 
     @property
     def noise(self) -> float:
@@ -96,28 +123,34 @@ class Trials:
     scene: Scene
     known: Known
     observe: Observe
-    last: dict[tuple[Method, Grid], tuple[float, Trajectory, Trajectory | None]] = field(default_factory=dict)
+    last: dict[tuple[Method, Grid], Runs] = field(default_factory=dict)
 
     def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory | None]:
         """Return the estimate of a run, with its `sensitivity` if requested, and its trajectory, or None if no run was made."""
         known = self.known.get((method, grid))
         if known is not None and not (sensitivity and known.sensitivity is None):
-            return known, self.last[method, grid][1] if (method, grid) in self.last else None
+            return known, self.last[method, grid].fine if (method, grid) in self.last else None
         if (method, grid) not in self.last:
             self.last.clear()
             self.observe(method, grid)
             self.last[method, grid] = run_twice(method, self.scene, grid)
-        error, fine, coarse = self.last[method, grid]
+        error, fine, coarse, rough = self.last[method, grid]
         cost, counters = method.card.cost(method), fine.counters
         work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
         moved = 0.0 if sensitivity else None
         if sensitivity and coarse is not None:  # otherwise the step is too long to measure the sensitivity
-            scene = nearby_scene(self.scene)
-            if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
-                scene = scene.rename(scene.name, body=self.scene.body)
-            nearby = _solve(method, self.scene, coarse_grid(grid), scene)
-            moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max())
-        estimate = Estimate(error, work, moved)
+            other, longer = coarser(method, grid)
+            # Steps of a tolerance are not the same in both runs, so that the change has to be larger than their errors.
+            factors = (MAGNIFIED, 1.0) if coarse.control is not None else (1.0,)
+            for factor in factors:
+                scene = nearby_scene(self.scene, factor * ROUNDED)
+                if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
+                    scene = scene.rename(scene.name, body=self.scene.body)
+                nearby = _solve(other, self.scene, longer, scene) if factor == 1.0 else _solve(other, scene, longer)
+                moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max()) / factor
+                if factor * moved < RESOLVED:
+                    break
+        estimate = Estimate(error, work, moved, rough)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
         self.known[method, replace(grid)] = estimate  # a copy, without the times that a grid caches
@@ -154,37 +187,106 @@ def throttle(progress: Callable[[Progress], object], clock: Callable[[], float] 
     return observe
 
 
-def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory, Trajectory | None]:
-    """Return the estimated error of a run, rad, its trajectory, and the trajectory at twice the step.
+def presumed_smooth(scene: Scene) -> bool:
+    """Return whether only laws of this package act on a scene, which are smooth: any error of a method falls with its order.
 
-    With loads a third run at four times the step measures by which factor errors fall: a load that is not smooth at an unknown
-    time reduces the order. If a run fails, the estimate is inf and the last trajectory None.
+    It is False with loads, with functions and compiled fields of a user, and if the points of a spring with a length can meet.
+    """
+    if scene.loaded or not scene.needs.isdisjoint((Need.FUNCTION, Need.FIELD)):
+        return False
+    field: Any = static_part(scene.potential)
+    if not isinstance(field, LinearSpring) or field.rest_length == 0:
+        return True
+    lengths = float(np.linalg.norm(field.point_B)), float(np.linalg.norm(field.anchor_W))
+    return abs(lengths[0] - lengths[1]) > NEAR * max(lengths)
+
+
+def run_twice(method: Method, scene: Scene, grid: Grid) -> Runs:
+    """Return the estimated error of a run, rad, its trajectory, and the trajectory at twice the step, or a larger tolerance.
+
+    If a run fails, the estimate is inf and the last trajectory None. The last value is the time of `Estimate.rough`.
     """
     fine = method.solve(scene, grid)
-    coarse = _solve(method, scene, coarse_grid(grid))
+    other, longer = coarser(method, grid)
+    coarse = _solve(other, scene, longer)
     if not fine.ok or coarse is None:
-        return math.inf, fine, None
-    difference, factor = _largest_difference(fine, coarse), convergence_factor(method)
-    if scene.loaded and grid.n_steps % 4 == 0 and difference < ASYMPTOTIC:  # its order may be lower than the method's
-        third = _solve(method, scene, coarse_grid(coarse_grid(grid)))
-        longer = math.inf if third is None else _largest_difference(coarse, third)
-        factor = max(LEAST_FACTOR, min(factor, longer / difference - 1.0)) if difference > 0 else factor
+        return Runs(math.inf, fine, None, fine.control and fine.control.rough)
+    difference, rough = _largest_difference(fine, coarse), None
+    if fine.control is not None:
+        error, rough = max(difference, fine.control.local), fine.control.rough
+    elif presumed_smooth(scene) or method.order is None:
+        error = difference / convergence_factor(method)
+    else:
+        error, rough = _by_shown_order(method, scene, grid, fine, coarse)
     # Rounding of the angular velocity, which a comparison of two runs cannot show.
     rounding = ROUNDED / 2 * float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * fine.t[-1]
-    estimate = difference / factor + float(rounding)
-    return (estimate if difference < ASYMPTOTIC else math.inf), fine, coarse
+    return Runs(error + float(rounding) if difference < ASYMPTOTIC else math.inf, fine, coarse, rough)
+
+
+class Runs(NamedTuple):
+    """The estimated error of a run, rad; its trajectory and the coarser one, None if a run failed; `Estimate.rough`."""
+
+    error: float
+    fine: Trajectory
+    coarse: Trajectory | None
+    rough: float | None
+
+
+def _by_shown_order(
+    method: Method, scene: Scene, grid: Grid, fine: Trajectory, coarse: Trajectory
+) -> tuple[float, float | None]:
+    """Return the error, rad, by the order that two successive halvings of the step show, and the time of `Estimate.rough`."""
+    differences, before, longer = [_largest_difference(fine, coarse)], coarse, coarse_grid(grid)
+    while len(differences) < HALVINGS and differences[-1] < ASYMPTOTIC and longer.n_steps % 2 == 0:
+        longer = coarse_grid(longer)
+        after = _solve(method, scene, longer)
+        differences.append(math.inf if after is None else _largest_difference(before, after))
+        before = coarse if after is None else after
+    seen = [each for each in differences if each < ASYMPTOTIC]
+    if len(seen) < 2:  # one difference alone may be small by chance
+        return math.inf, None
+    if len(seen) == HALVINGS:
+        most = convergence_factor(method) + 1
+        factors = [min(most, second / first) if first > 0 else most for first, second in pairwise(seen)]
+        if min(factors) >= SHOWN * most and max(factors) <= ALIKE * min(factors):
+            return seen[0] / (min(factors) - 1), None
+    # As far as rounding explains the differences, they say nothing about the function; long steps do not show an order, either.
+    floor = NOTHING * (1.0 + float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * float(fine.t[-1]))
+    shown = len(seen) == HALVINGS and min(seen) > floor and max(seen) < RESOLVED
+    rough = shown and seen[-1] < (LOW * (convergence_factor(method) + 1)) ** 2 * seen[0]
+    return max(seen), _roughest(fine, coarse) if rough else None
+
+
+def _roughest(fine: Trajectory, coarse: Trajectory) -> float:
+    """Return the time of the sample, s, up to which the angle between two runs grows most."""
+    off, t = _differences(fine, coarse), coarse.t
+    grown = np.diff(np.maximum.accumulate(off), prepend=0.0)
+    return float(t[int(grown.argmax())])
+
+
+def coarser(method: Method, grid: Grid) -> tuple[Method, Grid]:
+    """Return the method and the grid of the run with which a run is compared: twice the step, or a larger tolerance."""
+    if getattr(method, "tolerance", None) is None:
+        return method, coarse_grid(grid)
+    changes: Any = {"tolerance": LOOSER * method.tolerance}  # type: ignore[attr-defined]
+    return replace(method, **changes), grid  # type: ignore[type-var]
 
 
 def _largest_difference(fine: Trajectory, coarse: Trajectory) -> float:
     """Return the largest angle between two runs, rad, of which the second may have every other sample of the first."""
+    return float(_differences(fine, coarse).max())
+
+
+def _differences(fine: Trajectory, coarse: Trajectory) -> Array:
+    """Return the angles between two runs at the samples of the second, rad."""
     R_WB, stride = fine.R_WB, max(1, round((len(fine) - 1) / max(1, len(coarse) - 1)))
     same = R_WB[::stride] if (len(R_WB) - 1) % stride == 0 else np.concatenate([R_WB[::stride], R_WB[-1:]])
-    return float(angle_between(same, coarse.R_WB).max())
+    return np.asarray(angle_between(same, coarse.R_WB))
 
 
 def parts_for(scene: Scene) -> int:
-    """Return the number of which the number of steps of a trial run is a multiple: runs at twice and four times the step."""
-    return 4 if scene.loaded else 2
+    """Return the number of which the number of steps of a trial run is a multiple: runs at twice to eight times the step."""
+    return 2 if presumed_smooth(scene) else 2**HALVINGS
 
 
 def coarse_grid(grid: Grid) -> Grid:
@@ -202,22 +304,24 @@ def _solve(method: Method, scene: Scene, grid: Grid, nearby: Scene | None = None
     return trajectory if trajectory.ok else None
 
 
-def nearby_scene(scene: Scene) -> Scene:
-    """Return the scene with inertia, attitude and rates changed by `ROUNDED`, as rounding them may change them.
+def nearby_scene(scene: Scene, by: float = ROUNDED) -> Scene:
+    """Return the scene with inertia, attitude and rates changed by a share, as rounding them may change them.
 
     If the tensor is diagonal, no axes have to be computed and zeros stay zeros, so a spin about a principal axis remains one.
+    Equal moments stay equal, because they are the same number: rounding it does not make a rod a body of three moments.
     Moments and axes of any other tensor are known to an ulp of the largest, rates along its axes to an ulp of the whole rate.
     """
     body, w = scene.body, scene.w_WB_B0
     diagonal = np.array_equal(body.R_BP, np.eye(3))
     sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
-    signs = np.diag(_SIGNS[0]) if diagonal else _AXES_TOO
-    moved = body.R_BP @ (ROUNDED * sizes * signs) @ body.R_BP.T
+    equal = [_SIGNS[0][int(np.argmax(body.moments == each))] for each in body.moments]  # such as those of a rod stay equal
+    signs = np.diag(equal) if diagonal else _AXES_TOO
+    moved = body.R_BP @ (by * sizes * signs) @ body.R_BP.T
     return replace_unchecked(
         scene,
         body=replace_unchecked(body, inertia=body.inertia + (moved + moved.T) / 2),
-        R_WB0=scene.R_WB0 * (1 + ROUNDED * _SIGNS),
-        w_WB_B0=w + ROUNDED * rates * _SIGNS[0],
+        R_WB0=scene.R_WB0 * (1 + by * _SIGNS),
+        w_WB_B0=w + by * rates * _SIGNS[0],
     )
 
 

@@ -85,8 +85,11 @@ class Units:
         w_WB_B = found.w_WB_B / self.time
         supplied = None if found.supplied is None else found.supplied * self.supply
         frame = found.frame and (found.frame[0], found.frame[1] / self.time)
+        control = found.control
+        if control is not None and control.rough is not None:
+            control = control._replace(rough=control.rough * self.time)
         changes: dict[str, Any] = {"w_WB_B": w_WB_B, "failure": failure, "supplied": supplied, "frame": frame}
-        return replace(found, scene=scene, t=grid.t[: len(found)], **changes)
+        return replace(found, scene=scene, t=grid.t[: len(found)], control=control, **changes)
 
 
 SI = Units(1.0, 1.0)

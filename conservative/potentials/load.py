@@ -25,6 +25,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput, TorqueFailed
 from ..needs import Need, Needs
 from .callback import find_address
+from .pointwise import EARLIER
 
 FRAMES = ("body", "world")
 _TIMES = "two or more times (n,), s, that do not decrease; two equal ones are a jump"
@@ -191,9 +192,9 @@ class OfTime(PickledByFields):
         """Return the value at a time, s, and an attitude (3, 3), between two break points. Raise `TorqueFailed` without one."""
         if isinstance(self.value, np.ndarray):
             return self.value
-        inside = t
-        if not window[0] < t < window[1]:  # or at a jump, where the side matters
-            inside = min(max(t, math.nextafter(window[0], math.inf)), math.nextafter(window[1], -math.inf))
+        inside = t if isinstance(self.value, tuple) else t * EARLIER
+        if not window[0] < inside < window[1]:  # or at a jump, where the side matters
+            inside = min(max(inside, math.nextafter(window[0], math.inf)), math.nextafter(window[1], -math.inf))
         if isinstance(self.value, tuple):
             times, values = self.value
             i = int(np.searchsorted(times, inside, side="right"))

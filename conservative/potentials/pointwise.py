@@ -16,6 +16,9 @@ from ..errors import PotentialFailed
 EnergyFunction = Callable[[Array], float] | Callable[[Array, float], float]
 GradientFunction = Callable[[Array], Array] | Callable[[Array, float], Array]
 """Functions of a matrix (3, 3), or of a matrix and a time, s."""
+EARLIER = 1.0 - 2.0**-49
+"""Functions of time are called this much earlier, relative to the time. A sum of steps is above t_end by rounding, where a
+function of a recording has no value."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class _OfAttitude(ABC):
         try:
             if len(t) != self.in_time:
                 raise TypeError(f"it is a function of {'attitude and time' if self.in_time else 'the attitude alone'}")
-            return self._read(self.function(R.copy(), *t))
+            return self._read(self.function(R.copy(), *(each * EARLIER for each in t)))
         except Exception as error:
             raise PotentialFailed(error) from error
 

@@ -1,8 +1,9 @@
 """Where functions of time are not smooth, and which steps resolve them.
 
-The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps between two of them are found by bisection;
-steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the sum over all
-times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be missed.
+The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps and corners between two of them are found
+by bisection; steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the
+sum over all times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be
+missed.
 """
 
 from __future__ import annotations
@@ -22,10 +23,14 @@ SCANNED = 2**16
 """Number of intervals of a scan."""
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
-ATTITUDE = read_only(rotation_about((1.0, 2.0, 3.0), 1.0))
-"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones."""
+ATTITUDE, OTHER = (read_only(rotation_about(axis, angle)) for axis, angle in (((1.0, 2.0, 3.0), 1.0), ((-3.0, 1.0, 2.0), 2.0)))
+"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. What is found belongs to the time if the function is
+not smooth at the `OTHER` attitude either."""
 STEEP, MOST_JUMPS = 10.0, 1000
 """An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
+MOST_CORNERS, LEAST_BEND, NARROW, ZOOM = 4096, 1e-10, 1e-11, 8
+"""More corners are noise. Second differences of a scan that are smaller, relative to the largest value, are no corners. Corners
+are found to a share of t_end, by intervals that are divided into so many parts."""
 
 
 class Smoothness(NamedTuple):
@@ -51,27 +56,38 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
     for load in loads:
-        function = partial(_at_attitude, load.value) if load.of_attitude else load.value
+        function = partial(_at_attitude, load.value, ATTITUDE) if load.of_attitude else load.value
         try:
             values = np.array([function(t) for t in times.tolist()], dtype=float).reshape(SCANNED + 1, -1)
         except Exception:  # a table; or a function that fails, which the run reports
             continue
-        found = _find_jumps(function, times, values)
-        found = [t for t in found if not np.isclose(t, breaks, rtol=1e-12, atol=1e-12 * t_end).any()]
+        other = partial(_at_attitude, load.value, OTHER) if load.of_attitude else None
+        found = _drop_near(_find_jumps(function, times, values, other), breaks, 1e-12 * t_end)
         if found and not load.may_jump:
             raise BadInput(load.name, f"a function that jumps at t = {found[0]:g} s", "a function without jumps")
         breaks = np.union1d(breaks, found)
+        breaks = np.union1d(breaks, _drop_near(_find_corners(function, times, values, other), breaks, 1e-9 * t_end))
         resolved, where = _resolve(times, values, breaks)
         if resolved < step:
             step, interval = resolved, where
     return Smoothness(read_only(breaks[breaks > 0]), step, interval)
 
 
-def _at_attitude(function: Callable[[float, Array], Array], t: float) -> Array:
-    return function(t, ATTITUDE)
+def _at_attitude(function: Callable[[float, Array], Array], R_WB: Array, t: float) -> Array:
+    return function(t, R_WB)
 
 
-def _find_jumps(function: Callable[[float], Array], times: Array, values: Array) -> list[float]:
+def _drop_near(found: list[float], breaks: Array, distance: float) -> list[float]:
+    """Return the times, s, that are not within a distance, s, of known ones (n,), s."""
+    return [t for t in found if not len(breaks) or np.abs(breaks - t).min() > distance]
+
+
+def _value(function: Callable[[float], Array], t: float) -> Array:
+    return np.asarray(function(t), dtype=float).ravel()
+
+
+def _find_jumps(function: Callable[[float], Array], times: Array, values: Array, other: Any) -> list[float]:
+    """Return the times of jumps, s, of a function; of one of attitude, if there is a jump at the `other` one, too."""
     change = np.linalg.norm(np.diff(values, axis=0), axis=1)
     around = np.minimum(np.append(change[1], change[:-1]), np.append(change[1:], change[-2]))
     steep = np.flatnonzero(change > STEEP * around + 1e-9 * np.abs(values).max())
@@ -79,14 +95,58 @@ def _find_jumps(function: Callable[[float], Array], times: Array, values: Array)
     for i in steep.tolist() if len(steep) <= MOST_JUMPS else ():
         a, b, low, high = times[i], times[i + 1], values[i], values[i + 1]
         while (middle := (a + b) / 2) not in (a, b):
-            value = np.ravel(function(float(middle)))
+            value = _value(function, float(middle))
             if np.linalg.norm(value - low) > np.linalg.norm(high - value):
                 b, high = middle, value
             else:
                 a, low = middle, value
         if np.linalg.norm(high - low) > change[i] / 4:
-            jumps.append(float(b))
+            again = 1.0 if other is None else np.linalg.norm(_value(other, float(b)) - _value(other, float(a)))
+            if again > AGREED * change[i]:
+                jumps.append(float(b))
     return jumps
+
+
+def _find_corners(function: Callable[[float], Array], times: Array, values: Array, other: Any) -> list[float]:
+    """Return the times, s, at which the slope of a function jumps; of one of attitude, if it does at the `other` one, too.
+
+    A second difference across a corner is much larger than its neighbours. It is the jump of the slope times the spacing, for
+    any spacing, which distinguishes a corner from noise and from what is smooth in shorter intervals.
+    """
+    largest = float(np.abs(values).max())
+    bend = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=1)  # at times[1:-1]
+    left, right = np.append(0.0, bend[:-1]), np.append(bend[1:], 0.0)
+    around = np.maximum(np.append((0.0, 0.0), bend[:-2]), np.append(bend[2:], (0.0, 0.0)))
+    sharp = (bend > STEEP * around + LEAST_BEND * largest) & (bend >= left) & (bend > right)
+    places = np.flatnonzero(sharp)
+    corners = []
+    for i in places.tolist() if len(places) <= MOST_CORNERS else ():
+        a, b = float(times[i]), float(times[i + 2])
+        turn = float(bend[max(0, i - 1) : i + 2].sum()) / float(times[1])  # of the slope; a corner counts at two times
+        found = _narrow(function, a, b, turn, NARROW * float(times[-1]), largest)
+        if found is not None and other is not None:
+            h = float(times[1]) / 4
+            again = np.linalg.norm(_value(other, found - h) - 2 * _value(other, found) + _value(other, found + h))
+            found = found if again > AGREED * turn * h else None
+        if found is not None:
+            corners.append(found)
+    return corners
+
+
+def _narrow(function: Callable[[float], Array], a: float, b: float, turn: float, width: float, largest: float) -> float | None:
+    """Return the time of a corner between a and b, s, at which the slope changes by `turn`, to a width, s; None without one."""
+    while b - a > width:
+        t = np.linspace(a, b, ZOOM + 1)
+        values = np.array([_value(function, each) for each in t.tolist()])
+        bend = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=1)
+        i, spacing = int(bend.argmax()), float(t[1] - t[0])
+        here = float(bend[max(0, i - 1) : i + 2].sum())
+        if here < turn * spacing / 4:
+            return None
+        a, b = float(t[i]), float(t[i + 2])
+        if here < 1e-12 * largest:  # rounding shows no more
+            break
+    return (a + b) / 2
 
 
 def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[float, float]]:

@@ -91,7 +91,7 @@ def test_the_next_step_follows_from_the_order(estimate, power, expected):
 
 @pytest.mark.parametrize(("every", "n"), [(1, 8), (2, 8), (3, 8), (1, 6), (3, 10), (4, 10)])
 def test_two_runs_are_compared_at_the_times_that_both_have(every, n):
-    estimate, fine, _ = trials.run_twice(Known(size=0.01), SCENE, cv.Grid(0.5, n, every))
+    estimate, fine, *_ = trials.run_twice(Known(size=0.01), SCENE, cv.Grid(0.5, n, every))
     difference = 0.01 * (1.0 - 0.25) * 0.5 * n
     assert estimate == pytest.approx(difference / 3 + 2.0**-53 * 2 * 0.5 * n, rel=1e-9)
     assert (fine.t[-1], len(fine)) == (0.5 * n, len(cv.Grid(0.5, n, every).t))

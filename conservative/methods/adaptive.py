@@ -1,0 +1,160 @@
+"""Steps of any length with control of their local error: for functions of Python, which may have corners and jumps anywhere.
+
+Each step is taken once, and again as two of half its length; both must agree to a tolerance. A corner or a jump in attitude,
+whose time depends on the motion, then costs some dozen short steps, while the error of equal steps falls with the first or
+second power of their length only. Steps also end at samples and at the break points of loads. Source: C. W. Gear, Numerical
+Initial Value Problems in Ordinary Differential Equations (1971), 5.4, on step doubling.
+
+What was tried instead: embedded formulas of order 5 and 3 need fewer calls, but the kernel's stages are in no order that they
+can use; a bisection of every corner in attitude needs to know which part of a function has it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+from ..deferred_imports import kernels
+from ..errors import Diverged, IntegrationFailed, NotConverged
+from ..grid import Grid
+from ..potentials.load import load_field
+from ..potentials.potential import depends_on_time
+from ..scene import Scene
+from ..trajectory import Counters, StepControl, Trajectory
+from .principal_axes import PrincipalStart
+from .units import bound_rate
+
+FIRST, LONGEST, LOOSE = 0.01, 1.5, 1e-2
+"""First step, and the longest one at a `LOOSE` tolerance, in radians of the fastest rotation that the energy allows. At others
+it is proportional to the root of what the tolerance allows, so that no two tolerances take the same steps."""
+SHORTEST = 1e-14
+"""Shortest step, relative to the time of its end: it is accepted whatever its error, because a function jumps within it."""
+GROW, SHRINK, SHARE = 4.0, 0.1, 0.9
+"""Largest and smallest factor between two steps, and share of the step that the tolerance allows."""
+POWER = 1 / 9
+"""Inverse of the power of the step to which its error is proportional, if functions are smooth."""
+MOST_TRIES = 5_000
+"""Largest number of steps that are tried: 180,000 calls of a function, some ten seconds."""
+SAME = 1e-12
+"""A sample that is closer to a break point, relative to the time, is at it."""
+ROUGH = 3e-3
+"""A step that is shorter than this share of the median shows a corner or a jump."""
+
+
+@dataclass
+class Walk:
+    """The states of an adaptive run, principal axes.
+
+    `t` are the times of samples (n,), s; `q` (n, 4) and `L` (n, 3 or 7) the states there, of which `good` are known. `h` and
+    `ends` are the length and the end of each accepted step, s; `local` is the sum of their errors, rad.
+    """
+
+    t: Array
+    q: Array
+    L: Array
+    good: int
+    h: list[float]
+    ends: list[float]
+    local: float = 0.0
+    tries: int = 0
+    corrections: int = 0
+    reason: str = ""
+
+    @property
+    def control(self) -> StepControl:
+        """The sum of local errors, and the time of the shortest step, if it is much shorter than most."""
+        i = int(np.argmin(self.h)) if self.h else -1
+        return StepControl(self.local, self.ends[i] if self.h and self.h[i] < ROUGH * float(np.median(self.h)) else None)
+
+
+def walk(scene: Scene, model: Any, find: Callable[[float], Any], tolerance: float, t: Array, most: int = MOST_TRIES) -> Walk:
+    """Return the states at increasing times t (n,), s, the first 0, of steps with a tolerance; `find` returns coefficients."""
+    kernel, size, rate = kernels("projected"), model.scales[1], bound_rate(scene)
+    if depends_on_time(scene.potential) and not scene.loaded:  # the clock of steps belongs to loads
+        model = model._replace(field=load_field(model.field, None, None, np.eye(3)))
+    clocked, columns = hasattr(model.field, "clock"), 7 if hasattr(model.field, "load") else 3
+    end, found = float(t[-1]), Walk(t, np.empty((len(t), 4)), np.zeros((len(t), columns)), 1, [], [])
+    smooth = scene.smoothness(end)
+    longest = min(LONGEST / rate * min(1.0, (tolerance / LOOSE) ** (POWER / 2)), smooth.step, end)
+    edges = [-math.inf, *smooth.breaks.tolist(), math.inf]
+    q, L, room = model.q, model.L, (np.empty((2, 4)), np.zeros((2, columns)))
+    found.q[0], found.L[0, :3], supplied = q, L, np.zeros(columns - 3)
+
+    def take(now: float, h: float, n: int, window: tuple[float, float]) -> tuple[Any, Any, Any] | None:
+        """Return the state after n steps of length h, s, and what loads supplied; None if they fail."""
+        field = model.field._replace(clock=(now, *window)) if clocked else model.field
+        with np.errstate(all="ignore"):
+            done, _, corrections, *_ = kernel.enter(*model._replace(q=q, L=L, field=field), *find(h), n, n, 0, *room)
+        found.corrections += corrections
+        last = *room[0][-1].tolist(), *room[1][-1].tolist()
+        return None if done < n or not all(map(math.isfinite, last)) else (last[:4], last[4:7], room[1][-1, 3:].copy())
+
+    h, now = min(FIRST / rate, longest), 0.0
+    for first, last in pairwise(edges):
+        stops = t[(t > max(first, 0.0) * (1 + SAME)) & (t <= last * (1 + SAME))].tolist()
+        stops += [last] if last < end and not (stops and stops[-1] >= last * (1 - SAME)) else []
+        for stop in stops:
+            stop_at = min(stop, last)
+            while now < stop_at:
+                left = stop_at - now
+                step = left if h >= left * (1 - SAME) else min(h, left / 2)
+                least = SHORTEST * max(stop_at, end / 100)
+                found.tries += 1
+                if found.tries > most:
+                    found.reason = f"a tolerance of {tolerance:.2g} takes more than {most} steps"
+                    return found
+                coarse, fine = take(now, step, 1, (first, last)), take(now, step / 2, 2, (first, last))
+                error = math.inf
+                if coarse is not None and fine is not None:
+                    off = math.dist(coarse[1], fine[1]) / size
+                    error = 2 * math.dist(coarse[0], fine[0]) + off
+                if error > tolerance and step > least:
+                    h = max(least, step * max(SHRINK, SHARE * (tolerance / error) ** POWER))
+                    continue
+                if fine is None:
+                    found.reason = kernel.FAILURE
+                    return found
+                q, L, supply = fine
+                supplied = supplied + supply
+                now = stop_at if step == left else now + step
+                found.h.append(step)
+                found.ends.append(now)
+                found.local += error
+                grown = step * min(GROW, SHARE * (tolerance / max(error, 1e-300)) ** POWER)
+                h = min(longest, max(h if step < h else 0.0, grown))  # a step that ends at a sample says nothing of longer ones
+            if found.good < len(t) and stop >= t[found.good] * (1 - SAME):
+                found.q[found.good], found.L[found.good, :3], found.L[found.good, 3:] = q, L, supplied
+                found.good += 1
+        if found.good == len(t):
+            break
+    return found
+
+
+def run_adaptively(
+    scene: Scene, grid: Grid, label: str, start: PrincipalStart, model: Any, find: Callable[[float], Any], tolerance: float
+) -> Callable[[], Trajectory]:
+    """Return the run with a tolerance that has the samples of a grid."""
+    return lambda: trajectory_of(scene, label, start, walk(scene, model, find, tolerance, grid.t))
+
+
+def trajectory_of(scene: Scene, label: str, start: PrincipalStart, found: Walk) -> Trajectory:
+    """Return the trajectory of a walk."""
+    n, good = len(found.t), found.good
+    R_WB, w_WB_B = np.empty((good, 3, 3)), np.empty((good, 3))
+    L = np.ascontiguousarray(found.L[:good])
+    turn = start.J_inverse, start.spin, start.R_BP
+    finite = kernels("samples").to_body_axes(found.t[:good], found.q[:good].copy(), L, *turn, R_WB, w_WB_B)
+    failure: IntegrationFailed | None = None
+    if finite < n:
+        time = float(found.t[max(finite - 1, 0)])
+        failure = NotConverged(len(found.h) + 1, time, 0.0, found.reason) if found.reason else Diverged(time)
+    counters = Counters(3 * found.tries, 36 * found.tries, found.corrections, 36 * found.tries)
+    supplied = L[:finite, 3:].copy() if scene.loaded else None
+    samples = found.t[:finite].copy(), R_WB[:finite], w_WB_B[:finite]
+    return Trajectory(scene, *samples, label, counters, failure, None, supplied, control=found.control)
