@@ -56,9 +56,9 @@ LONGEST = 2.0**64
 class Model(NamedTuple):
     """The closed system, principal axes, with momenta in units of `unit` kg m^2/s.
 
-    1/J and the moment c of the field in these units; `loose` is 1 for each component of L from which round-off may be removed,
-    else 0; L and gamma at the start, the attitude q there against axes whose third is along gamma, and `left`, which takes
-    those axes to the world's. `rotor` is the momentum of the rotor, which L does not contain, or None.
+    1/J and the moment c of the field in these units; `loose` is 1 for each component of L that changes, else 0; L and gamma at
+    the start, the attitude q there against axes whose third is along gamma, and `left`, which takes those axes to the world's.
+    `rotor` is the momentum of the rotor, which L does not contain, or None.
     """
 
     unit: float
@@ -340,6 +340,8 @@ def march(model, coefficients, workspace):
         phi, phi_carry = accumulate(phi, phi_carry, integrate_turn(h, b, a, length, J_inverse, Z))
         before = gamma
         dL, dg = weigh(b, b_low, F, at)
+        # The momentum about an axis of symmetry is constant. Divided by the moment of a rod, its round-off would be a rate.
+        dL = times(loose, dL)
         L, L_carry = add_carried(L, L_carry, scale(h, dL))
         gamma, g_carry = add_carried(gamma, g_carry, scale(h, dg))
         L, L_carry, gamma, g_carry = remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, gamma, g_carry)

@@ -49,6 +49,8 @@ ROUND_OFF = 2.0**-51
 """Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect a step may have before projection, and after it."""
+FLAT, NOISE = 0.01, 2.0**-49
+"""Where the gradient of the energy is shorter than FLAT of its scale, up to NOISE of the scale is not corrected."""
 DEPENDENT, TINY = 1e-8, 1e-300
 """Regularisation: added to the length 1 of the gradients, which are parallel in a steady precession, and to squares that can
 be 0."""
@@ -182,13 +184,25 @@ def gradient(J_inverse, rotor, field, turn, q, L):
 
 
 @small
-def shortest_move(J_inverse, rotor, field, axis, turn, size, e, m, q, L):
+def significant(e, scale, size, w, T):
+    """Return the part of an energy defect e that is corrected, given the `gradient` (w, T) there.
+
+    Near rest in an equilibrium the gradient vanishes, and the smallest correction of round-off moves the body far: by 4e-11 rad
+    at 1e-5 rad from the equilibrium of a spring, in each step. Round-off is therefore left there, and taken off e so that the
+    correction is a continuous function of e and of the state.
+    """
+    short = 1.0 - (size * size * dot(w, w) + dot(T, T)) / (FLAT * FLAT * scale * scale)
+    least = max(0.0, short) * NOISE * scale
+    return max(0.0, e - least) if e > 0.0 else min(0.0, e + least)
+
+
+@small
+def shortest_move(w, T, rotor, axis, size, e, m, q, L):
     """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order.
 
-    Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are scaled to length one here,
-    and regularised by DEPENDENT, so that parallel gradients share the correction.
+    (w, T) is the `gradient`. Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are
+    scaled to length one here, and regularised by DEPENDENT, so that parallel gradients share the correction.
     """
-    w, T = gradient(J_inverse, rotor, field, turn, q, L)
     by_energy = 1.0 / math.sqrt(size * size * dot(w, w) + dot(T, T) + TINY)
     if axis is None:
         a = e * by_energy * by_energy
@@ -216,8 +230,12 @@ def project(J_inverse, rotor, field, axis, turn, kept, scales, q, L):
         # Also if the defect is nan, which no comparison accepts; `march` then ends.
         if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
             return q, L, corrections, defect
+        w, T = gradient(J_inverse, rotor, field, turn, q, L)
+        e = significant(e, scales[0], scales[1], w, T)
+        if max(abs(e) / scales[0], abs(m) / scales[1]) <= ROUND_OFF:
+            return q, L, corrections, defect
         corrections += 1
-        dL, way = shortest_move(J_inverse, rotor, field, axis, turn, scales[1], e, m, q, L)
+        dL, way = shortest_move(w, T, rotor, axis, scales[1], e, m, q, L)
         L = add(L, dL)
         q = near_unit(product(q, (1.0, 0.5 * way[0], 0.5 * way[1], 0.5 * way[2])))
 
