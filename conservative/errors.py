@@ -313,7 +313,8 @@ def nearest(name: str, known: Iterable[str], command: str = "") -> str:
     If there are more than `MOST_LISTED`, the text has the nearest ones and the `command` that lists all.
     """
     known = sorted(known)
-    close = get_close_matches(name, known, n=3)
+    cases = {each.lower(): each for each in known}
+    close = [cases[each] for each in get_close_matches(name.lower(), cases, n=3)]
     few = len(known) <= MOST_LISTED or not command
     others = "" if few else "".join(f", {other!r}" for other in close[1:])
     everything = f"one of {', '.join(known)}" if few else f"one of {len(known)} names; list them with: {command}"

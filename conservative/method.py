@@ -205,6 +205,11 @@ class Method(ABC):
         return tuple(cls.configure(text) for text in cls.card.settings(purpose))
 
     @classmethod
+    def settings_in_tables(cls) -> tuple[Self, ...]:
+        """Return the methods that a name without settings stands for in tables: as installed, then the variants."""
+        return tuple(dict.fromkeys((*cls.settings_for("as_installed"), *cls.settings_for("variants"))))
+
+    @classmethod
     def configure(cls, settings: str) -> Self:
         """Return the method with settings as in a name, such as "RK4,threads=2".
 

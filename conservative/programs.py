@@ -12,6 +12,7 @@ configuration folder of platformdirs. A name in the project's file takes precede
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import tomllib
 import warnings
@@ -84,6 +85,8 @@ def read_programs(file: Path) -> dict[str, Program]:
     """Return the programs in a file by name. Raise `BadInput` as `list_programs`."""
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
+        if wrong := next(filter(re.compile(r"[@=:,\s]").search, table.keys()), None):
+            raise ValueError(f"the name {wrong!r} has one of '@', '=', ':' and ',', or a space")  # no command could take it
         return {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
     except (OSError, ValueError, AttributeError) as error:
         raise BadInput(str(file), str(error), 'a table [engines] of texts, such as my_engine = "build/my_engine"') from None

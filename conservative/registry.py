@@ -14,13 +14,17 @@
 
 A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`. An engine
 that runs in an environment of its own is named the same way, with a version if needed: `exudyn:RK44`, `mujoco@3.6.0:RK4`.
+`read_name` reads such a name, for every command and option. `mujoco==3.6.0:RK4` is the same name.
+
+A name without settings stands for one setting, the default, where a name makes one run (`method` here), and for all settings
+that tables show (`Method.settings_in_tables`) where a table is made. A version changes neither.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from .card import call_with_settings
 from .check import printable_text
@@ -47,13 +51,49 @@ def list_engines() -> tuple[str, ...]:
     return tuple(list_entries(ENGINES))
 
 
-VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
-"""Pattern of the version of an engine."""
+_VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
 
 
-def partition_version(name: str) -> tuple[str, str, str]:
-    """Return the parts of the name of an engine, `mujoco@3.6.0` or `mujoco==3.6.0`, as `str.partition("@")` returns them."""
-    return name.replace("==", "@", 1).partition("@")
+class Name(NamedTuple):
+    """The parts of the name of a method or an engine: `mujoco`, `3.6.0` and `RK4` of `mujoco@3.6.0:RK4`.
+
+    Attributes
+    ----------
+    base
+        The registered name, which can be unknown.
+    version
+        Version of the engine; empty without one.
+    settings
+        Text after the colon; None without a colon.
+    """
+
+    base: str
+    version: str = ""
+    settings: str | None = None
+
+    @property
+    def family(self) -> str:
+        """Registered name and version, such as `mujoco@3.6.0`."""
+        return f"{self.base}@{self.version}" if self.version else self.base
+
+    def __str__(self) -> str:
+        return self.family if self.settings is None else f"{self.family}:{self.settings}"
+
+
+def read_name(text: str, argument: str = "method", settings: bool = True) -> Name:
+    """Return the parts of `NAME`, `NAME@VERSION` or `NAME==VERSION`, followed by `:SETTINGS` unless `settings` is False.
+
+    `argument` is the name of the argument in messages. The registered name is not looked up. Raise `BadInput` for a text of
+    another form.
+    """
+    printable_text(argument, text, _NAME)
+    given, colon, rest = text.replace("==", "@").partition(":")
+    base, at, version = given.partition("@")
+    version = version.lower()  # versions of packages have no case
+    if not base or "=" in given or bool(at) != bool(_VERSION.fullmatch(version)) or (colon and not settings):
+        form = "NAME, NAME@VERSION or NAME==VERSION, such as mujoco@3.6.0"
+        raise BadInput(argument, repr(text), form + (", and settings after a colon" if settings else ", without settings"))
+    return Name(base, version, rest if colon else None)
 
 
 def engine(name: str) -> Any:
@@ -98,22 +138,22 @@ def method(text: str) -> Method:
     MissingEngine
         The engine is not installed.
     """
-    given, _, settings = printable_text("method", text, _NAME).partition(":")
-    base, at, version = partition_version(given)
-    name = base + at + version
+    name = read_name(text)
+    base, version, settings = name
     methods, engines = list_entries(METHODS), list_entries(ENGINES)
-    known = set(engines) if at else {*engines, *methods}
-    if base not in known or (at and not VERSION.fullmatch(version)):
+    known = set(engines) if version else {*engines, *methods}
+    if base not in known:
         allowed = nearest(base, known, "conservative list, and conservative engines list")
-        raise BadInput("method", repr(given), allowed + (", with @ and a version such as 3.6.0" if at else ""))
+        without = f"{base!r} without a version, or an engine: " if base in methods else ""
+        raise BadInput("method", repr(name.family), without + allowed)
     # The class that runs in this process, or in an environment if a version is named or there is no other.
     family: type[Method] = (
-        engine(base).at_version(version) if at else load_entry(METHODS if name in methods else ENGINES, "method", name)
+        engine(base).at_version(version) if version else load_entry(METHODS if base in methods else ENGINES, "method", base)
     )
-    if getattr(family, "family", None) != name:
-        got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
-        raise BadInput("method", got, f"family = {name!r}: the name that is registered")
-    return family.configure(settings)
+    if getattr(family, "family", None) != name.family:
+        got = f"{name.family!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
+        raise BadInput("method", got, f"family = {name.family!r}: the name that is registered")
+    return family.configure(settings or "")
 
 
 def list_families() -> dict[str, type[Method]]:

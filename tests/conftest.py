@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from conservative.errors import BadInput
+from conservative.registry import Name, read_name
+
 from .environments import ROOT, build, programs
 
 MARKERS = {
@@ -49,7 +52,11 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(config, items):
     items.sort(key=lambda item: item.get_closest_marker("late") is not None)
     everything = config.getoption("--all")
-    engines = set(filter(None, (config.getoption("--engines") or (ENGINES if everything else "")).split(",")))
+    texts = (config.getoption("--engines") or (ENGINES if everything else "")).split(",")
+    try:
+        engines = {read_name(text.strip(), "engines", settings=False) for text in texts if text.strip()}
+    except BadInput as error:
+        raise pytest.UsageError(str(error)) from None
     wanted = {
         "slow": everything,
         "browser": everything or config.getoption("--browser"),
@@ -59,7 +66,7 @@ def pytest_collection_modifyitems(config, items):
         for mark in item.iter_markers():
             if not wanted.get(mark.name, True):
                 item.add_marker(pytest.mark.skip(reason=f"{mark.name}: {MARKERS[mark.name]}"))
-            if mark.name == "engine" and not {mark.args[0], mark.args[0].partition("@")[0]} & engines:
+            if mark.name == "engine" and not {name := read_name(mark.args[0]), Name(name.base)} & engines:
                 item.add_marker(pytest.mark.skip(reason=f"needs {mark.args[0]}: runs with --engines {mark.args[0]}"))
 
 

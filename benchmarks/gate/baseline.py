@@ -34,8 +34,12 @@ ORDER_MARGIN = 0.05
 """Largest allowed decrease of an observed order."""
 
 
-class NoBaseline(BadInput):
-    """There is no usable baseline: exit code 2, never a pass."""
+class NothingToCompare(BadInput):
+    """No row can be compared: exit code 2, never a pass."""
+
+
+class NoBaseline(NothingToCompare):
+    """There is no usable baseline."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ def limit(measure: str, value: float, spread: float) -> float:
 def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) -> Baseline:
     """Return the baseline that accepts runs of one commit, with the reason in its history.
 
-    Rows that were not run, or skipped, are dropped; the history lists them. Those that `-k` or `-m` may have left out stay.
+    Rows that were not run, or skipped, are dropped; the history lists them. Those that a run left out stay.
 
     Raises
     ------
@@ -91,8 +95,8 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
     if failed:
         raise BadInput("results", f"rows that failed: {', '.join(failed)}", "runs without failures: a failure is not accepted")
     rows = {row.id: _row(row, runs) for row in runs[0].rows.values() if row.status is Status.PASSED}
-    if any(run.chosen for run in runs):
-        rows = {id: row for id, row in before.items() if id not in runs[0].rows} | rows
+    left_out = {id for run in runs for id in run.left_out}
+    rows = {id: row for id, row in before.items() if id in left_out and id not in runs[0].rows} | rows
     entry = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "reason": reason.strip(),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from .baseline import ORDER, Baseline, BaselineRow
+from .baseline import ORDER, Baseline, BaselineRow, NothingToCompare
 from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, Status, find_runaway
 
 ACCEPT = 'accept with: conservative gate --update "REASON"'
@@ -62,7 +62,15 @@ class Verdict:
 
 
 def judge(baseline: Baseline, results: Results) -> Verdict:
-    """Return the verdict on results. An empty baseline is a violation, because everything would pass."""
+    """Return the verdict on results. An empty baseline is a violation, because everything would pass.
+
+    Rows that the run left out are not compared. Raise `NothingToCompare` if these are all.
+    """
+    left_out = baseline.rows.keys() & {*results.left_out} - results.rows.keys()
+    if left_out and len(left_out) == len(baseline.rows):
+        got = f"none of the {len(left_out)} rows of the baseline, which were not selected"
+        raise NothingToCompare("results", got, "a selection with one of them")
+    baseline = replace(baseline, rows={id: row for id, row in baseline.rows.items() if id not in left_out})
     violations = [] if baseline.rows else [Violation("rows", "all", "all", "none", "none", "one or more")]
     notes = [
         f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status is Status.PASSED
@@ -75,6 +83,7 @@ def judge(baseline: Baseline, results: Results) -> Verdict:
             values = _write_value(before.value if before else None), _write_value(row.values.get(ENERGY_DRIFT))
             violations.append(Violation(ENERGY_DRIFT, row.scene or id, row.method or id, *values, f"at most {RUNAWAY:g}"))
     notes += _improvements(baseline, results)
+    notes += [f"not compared: {len(left_out)} rows of the baseline, which were not selected"] * bool(left_out)
     return Verdict(tuple(violations), tuple(notes), len(baseline.rows))
 
 

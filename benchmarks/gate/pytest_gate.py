@@ -8,8 +8,10 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import replace
+from fnmatch import fnmatch
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,11 @@ from conservative.errors import NotWritten
 
 from ..measures.origin import commit, machine_title
 from . import baseline, compare, results
+from .pytest_plugin import SUITE
 from .results import Results, Row, Status
+
+Made = pytest.Item | pytest.Collector | list[pytest.Item | pytest.Collector] | None
+"""What pytest makes of a name in a module."""
 
 
 class GateFailed(Exception):
@@ -57,16 +63,31 @@ class Gate:
         self.folder = self.root / results.FOLDER
         self.rows: dict[str, Row] = {}
         self.verdict: compare.Verdict | None = None
-        self.without_baseline = False
-        self.chosen = False
+        self.nothing = ""
+        self.config = config
+        self.read: set[str] = set()
+        self.classes: set[str] = set()
+        self.benchmarks: set[str] = set()
 
-    def pytest_deselected(self, items: Sequence[pytest.Item]) -> None:
-        """Note that `-k` or `-m` left benchmarks out."""
-        self.chosen = self.chosen or any("benchmark" in getattr(item, "fixturenames", ()) for item in items)
+    def pytest_collectstart(self, collector: pytest.Collector) -> None:
+        """Note the files and classes that are read; with `--lf` a file can be left out after this."""
+        if isinstance(collector, pytest.File | pytest.Class) and not self.config.getoption("lf", False):
+            self.read.add(row_id(collector))
 
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> None:
-        """Put the gate behind the benchmarks, whichever were chosen."""
+    @pytest.hookimpl(wrapper=True)
+    def pytest_pycollect_makeitem(self, collector: pytest.Collector) -> Generator[None, Made, Made]:
+        """Note the benchmarks and classes of a file or class that is read, before any is deselected."""
+        made = yield
+        nodes = made if isinstance(made, list) else [made] if made else []
+        self.read.add(row_id(collector))
+        self.classes |= {row_id(node) for node in nodes if isinstance(node, pytest.Class)}
+        self.benchmarks |= {row_id(node) for node in nodes if is_benchmark(node)}
+        return made
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> Generator[None]:
+        """Put the gate behind the benchmarks, whichever were chosen; after `--lf`, which would leave it out."""
+        yield
         item = GateItem.from_parent(session, name="gate")
         item.collector = self
         items.append(item)
@@ -75,7 +96,7 @@ class Gate:
     def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         """Record a row for every benchmark; a failure after its timing only changes the status."""
         report = yield
-        if "benchmark" in getattr(item, "fixturenames", ()):
+        if is_benchmark(item):
             id = row_id(item)
             if report.when == "call" or (report.when == "setup" and not report.passed):
                 self.rows[id] = row(item, report)
@@ -84,19 +105,22 @@ class Gate:
         return report
 
     def finish(self) -> compare.Verdict:
-        """Write the results to the folder, and return the verdict.
-
-        Raises
-        ------
-        NoBaseline
-            There is nothing to compare with.
-        """
-        run = Results(machine_title(), self.rows, commit(self.root), self.chosen)
-        results.write(run, self.folder / results.FILE)
+        """Write the results to the folder, and return the verdict. Raise `NothingToCompare`."""
+        before, problem = None, None
         try:
-            self.verdict = compare.judge(baseline.read(self.baseline), run)
-        except baseline.NoBaseline:
-            self.without_baseline = True
+            before = baseline.read(self.baseline)
+        except baseline.NoBaseline as error:
+            problem = error
+        ids = self.benchmarks | (before.rows.keys() if before else set())
+        run = Results(machine_title(), self.rows, commit(self.root), tuple(sorted(filter(self.is_left_out, ids))))
+        results.write(run, self.folder / results.FILE)
+        if before is None:
+            self.nothing = "no baseline"
+            raise problem
+        try:
+            self.verdict = compare.judge(before, run)
+        except baseline.NothingToCompare as error:
+            self.nothing = str(error)
             raise
         if summary := os.environ.get("GITHUB_STEP_SUMMARY"):
             try:
@@ -106,23 +130,51 @@ class Gate:
                 raise NotWritten("GITHUB_STEP_SUMMARY", Path(summary), error) from None
         return self.verdict
 
+    def is_left_out(self, id: str) -> bool:
+        """Return whether a benchmark exists, as far as this run has looked, and was not run, because it was not selected.
+
+        One that was not seen can exist in a file or a class that was not read, because paths, node ids or `--lf` select others.
+        """
+        if id in self.rows:
+            return False
+        if id in self.benchmarks or any(id.startswith(f"{name}::") for name in self.classes - self.read):
+            return True
+        file, some = id.partition("::")[0], self.config.args_source is pytest.Config.ArgsSource.ARGS
+        return file not in self.read and (some or self.config.getoption("lf", False)) and self.has_file(file)
+
+    def has_file(self, name: str) -> bool:
+        """Return whether the suite or the project has a file of a name, outside of folders that pytest does not search."""
+        if (SUITE / name).is_file():
+            return True
+        hidden = self.config.getini("norecursedirs")
+        for _, folders, files in os.walk(self.root):
+            if name in files:
+                return True
+            folders[:] = [folder for folder in folders if not any(map(partial(fnmatch, folder), hidden))]
+        return False
+
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Print the verdict and the path of the results."""
         terminalreporter.section("gate")
-        ended = self.verdict or "no verdict: " + ("no baseline" if self.without_baseline else "the run ended before the gate")
+        ended = self.verdict or f"no verdict: {self.nothing or 'the run ended before the gate'}"
         terminalreporter.write_line(str(ended))
         terminalreporter.write_line(f"results: {self.folder / results.FILE}, for Bencher: {self.folder / results.HISTORY}")
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Exit with 2 where there is no baseline, and never with 0 without a verdict."""
-        if self.without_baseline or (self.verdict is None and session.exitstatus == 0):
+        """Exit with 2 if there is nothing to compare, and never with 0 without a verdict."""
+        if self.nothing or (self.verdict is None and session.exitstatus == 0):
             session.exitstatus = 2
 
 
-def row_id(item: pytest.Item) -> str:
-    """Return the file's name and the test's, without folders, which depend on where pytest was started."""
-    return f"{item.path.name}::{item.nodeid.partition('::')[2]}"
+def row_id(node: pytest.Item | pytest.Collector) -> str:
+    """Return the names of the file and of the test in it, without folders, which depend on where pytest was started."""
+    return node.path.name + "".join(node.nodeid.partition("::")[1:])
+
+
+def is_benchmark(item: object) -> bool:
+    """Return whether a test has the fixture of pytest-benchmark."""
+    return "benchmark" in getattr(item, "fixturenames", ())
 
 
 def row(item: pytest.Item, report: pytest.TestReport) -> Row:

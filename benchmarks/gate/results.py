@@ -71,12 +71,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Results:
-    """The rows of one run, by id, its machine and commit, and whether `-k` or `-m` left benchmarks out."""
+    """The rows of one run, by id, its machine and commit, and the ids of benchmarks that exist and were not selected."""
 
     machine: str
     rows: Mapping[str, Row]
     commit: str = ""
-    chosen: bool = False
+    left_out: tuple[str, ...] = ()
 
 
 def find_runaway(values: Mapping[str, float]) -> str:
@@ -117,7 +117,7 @@ def read(path: Path) -> Results:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
-        return Results(content["machine"], {row.id: row for row in rows}, content["commit"], content.get("chosen", False))
+        return Results(content["machine"], {row.id: row for row in rows}, content["commit"], tuple(content["left_out"]))
     except OSError as error:
         raise BadInput("results", f"{path} ({error.strerror})", allowed) from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:

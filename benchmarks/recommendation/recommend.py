@@ -111,8 +111,8 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     if names is not None:
         known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
-            if registry.partition_version(name.partition(":")[0])[0] not in known:
-                raise BadInput("engines", repr(name), nearest(name, known))
+            if (base := registry.read_name(name, "engines").base) not in known:
+                raise BadInput("engines", repr(name), nearest(base, known))
         wanted = list(selection.methods(names))
     lines = {selection.series(method): method for method in reversed(wanted)}
     return tuple(reversed(lines.values()))

@@ -77,7 +77,7 @@ class Declaration:
     in_turn: bool = False
     scenes: Callable[[], tuple[Scene, ...]] | None = None
     draw: Callable[..., Study] | None = None
-    settings: selection.Settings = selection.all_variants
+    settings: selection.Settings = selection.in_tables
     of_engines: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     in_report: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     options: tuple[str, ...] = ("scenes", "methods")

@@ -11,7 +11,6 @@ from conservative.errors import BadInput, MissingEngine, nearest
 from conservative.method import Method, Role
 from conservative.programs import list_programs
 from conservative.references.environments.environment import list_environments
-from conservative.references.environments.lock import split_requirement
 
 from .selection import Missing
 
@@ -20,7 +19,7 @@ ALL = "all"
 
 
 def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
-    """Return the settings of engines by name: as installed, then their variants.
+    """Return the settings of engines by name (`Method.settings_in_tables`).
 
     Parameters
     ----------
@@ -38,14 +37,13 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     """
     every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
     methods: list[Method] = []
-    for name in dict.fromkeys("@".join(filter(None, split_requirement(each))) for each in every):
+    for name in dict.fromkeys(registry.read_name(each, "engines", settings=False) for each in every):
         try:
-            family = _family(*split_requirement(name))
-            methods += dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants")))
+            methods += _family(name.base, name.version).settings_in_tables()
         except MissingEngine as error:
             if not skip_missing:
                 raise
-            methods.append(Missing(name, error=error))
+            methods.append(Missing(str(name), error=error))
     if not methods:
         raise BadInput("engines", repr(ALL), "engines that are installed: conservative engines install NAME")
     return tuple({method.label: method for method in reversed(methods)}.values())[::-1]

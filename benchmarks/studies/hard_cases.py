@@ -19,7 +19,7 @@ from ..measures.measurement import Measurement
 from .case import Case
 from .declaration import Declaration, Extent
 from .paper import measure_accuracy
-from .selection import Missing, all_variants
+from .selection import Missing, in_tables
 from .study import HANG_FACTOR, Progress, Study
 from .time_limit import attempt_within
 
@@ -71,7 +71,7 @@ STUDY = Declaration(
     Extent.LONG,
     apart=True,
     scenes=scenes,
-    settings=lambda method: settings(all_variants(method)),
+    settings=lambda method: settings(in_tables(method)),
     of_engines=settings,
     in_report=settings,
 )

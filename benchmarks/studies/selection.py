@@ -20,9 +20,9 @@ Settings = Callable[[Method], tuple[Method, ...]]
 """Returns the settings of a method's family that its bare name stands for."""
 
 
-def all_variants(method: Method) -> tuple[Method, ...]:
+def in_tables(method: Method) -> tuple[Method, ...]:
     """Return all settings that tables include."""
-    return method.settings_for("variants")
+    return method.settings_in_tables()
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
 
 
 def methods(
-    names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = all_variants
+    names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = in_tables
 ) -> tuple[Method, ...]:
     """Return methods by name, ours first.
 
@@ -86,15 +86,16 @@ def methods(
         An engine is not installed, and `skip_missing` is False.
     """
     selected: dict[Method, None] = {}
-    for name in registry.list_methods() if names is None else names:
+    for text in registry.list_methods() if names is None else names:
+        name = registry.read_name(text, "methods")
         try:
-            method = registry.method(name)
-            selected.update(dict.fromkeys((method,) if ":" in name else settings(method)))
+            method = registry.method(text)
+            selected.update(dict.fromkeys(settings(method) if name.settings is None else (method,)))
         except (MissingEngine, NotLoadable) as error:  # the second is a broken entry point of another package
             if not skip_missing:
                 raise
-            missing = error if isinstance(error, MissingEngine) else MissingEngine(name, error.place)
-            selected[Missing(name, error=missing)] = None
+            missing = error if isinstance(error, MissingEngine) else MissingEngine(name.base, error.place)
+            selected[Missing(str(name), error=missing)] = None
     return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 

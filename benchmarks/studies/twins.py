@@ -6,12 +6,11 @@ reduced pair differs, and from which size on.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from conservative import registry
 from conservative.check import choice
 from conservative.errors import BadInput, MissingEngine
 from conservative.method import Method
@@ -25,7 +24,6 @@ from ..twins.compare import BODIES, Twins, count_twins, twins_of
 from ..twins.pairs import PAIRS, Pair
 from .case import Case
 from .declaration import Declaration, Named
-from .engine_selection import select_engines
 from .selection import Missing
 from .study import Progress, Study
 
@@ -38,16 +36,6 @@ KINDS = {"crashed": OutcomeKind.CRASHED, "lost": OutcomeKind.DIVERGED}
 def scenes() -> tuple[Scene, ...]:
     """Return the bodies as scenes, by their names."""
     return tuple(replace(one.scene, name=name.replace(" ", "_")) for name, one in BODIES.items())
-
-
-def select_methods(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
-    """Return methods by name; a bare engine stands for its settings in tables. Raise `BadInput` or `MissingEngine`."""
-    found: list[Method] = []
-    for name in names:
-        ours = registry.list_methods() if ":" in name or "@" not in name else ()
-        engine = ":" not in name and (name.partition("@")[0] in registry.list_engines() or name in ("mujoco", "pinocchio"))
-        found += select_engines((name,), skip_missing) if engine or not ours else (registry.method(name),)
-    return tuple(dict.fromkeys(found))
 
 
 def select_pairs(names: Sequence[str]) -> tuple[Pair, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 from conservative.method import Method
 from conservative.references.engines import shared
 from conservative.references.environments.adapter import AdapterMethod
+from conservative.registry import read_name
 
 from .compare import Twins
 from .pairs import PAIRS, Description
@@ -30,7 +31,7 @@ ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping"), "ra
 
 def script_of(method: Method, twins: Twins) -> str | None:
     """Return the script of a pair that differs; None if the engine has none for it."""
-    family = method.family.partition("@")[0]
+    family = read_name(method.family).base
     file, pair = FOLDER / f"{SAME.get(family, family)}.txt", next(each for each in PAIRS if each.name == twins.pair)
     ways = IN_THE_NUMBERS + ALSO.get(file.stem, ())
     first = twins.first
@@ -55,7 +56,7 @@ def script_of(method: Method, twins: Twins) -> str | None:
 
 def script_name(method: Method, pair: str) -> str:
     """Return the name of the file of a script."""
-    family = method.family.partition("@")[0]
+    family = read_name(method.family).base
     return re.sub(r"\W+", "_", f"{method.name} {pair}") + (".mjs" if SAME.get(family, family) in SCRIPTS_OF_NODE else ".py")
 
 

@@ -197,8 +197,8 @@ class EngineSide:
 def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str]) -> tuple[EngineSide, ...]:
     """Return the sides of a comparison of two or more versions of an engine, in their order.
 
-    Settings are as in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as
-    installed. Default scenes are those of a report that a setting supports.
+    Settings are as in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show. Default
+    scenes are those of a report that a setting supports.
 
     Raises
     ------
@@ -208,10 +208,9 @@ def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_na
     settings, scene_names = tuple(settings), tuple(scene_names)
     require_several([version.name for version in versions])
     engine = versions[-1].environment.engine
-    if not settings:  # those of the methods that tables show, and of the engine as installed
+    if not settings:
         family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
-        shown = (*family.settings_for("variants"), *family.settings_for("as_installed"))
-        settings = tuple(dict.fromkeys(settings_text(method) for method in shown))
+        settings = tuple(settings_text(method) for method in family.settings_in_tables())
     methods = [tuple(registry.method(f"{engine}@{each.name}:{setting}") for setting in settings) for each in versions]
     every = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)

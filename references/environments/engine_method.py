@@ -12,10 +12,11 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from conservative.batch import Batch
 from conservative.card import Maker
-from conservative.errors import IntegrationFailed, Unsupported
+from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
 from conservative.grid import Grid
 from conservative.method import Run
 from conservative.methods.many import RunMany
+from conservative.registry import read_name
 from conservative.scene import Scene
 
 from ..engine import principal_axes
@@ -28,6 +29,15 @@ from .plain_numbers import Answer, describe, describe_many, read_many, read_one,
 def engine_class(module: ModuleType) -> type[EngineMethod]:
     """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
     return method_class(module, EngineMethod)
+
+
+class OtherVersion(MissingEngine):
+    """A program has another version than the name of an engine, such as `my_engine@2.0`."""
+
+    def __init__(self, name: str, own: Environment) -> None:
+        self.engine = self.package = own.engine
+        remedy = f"Write {own.engine} or {own.engine}@{own.version}"
+        ImportError.__init__(self, f"{name} is not installed: the program {own.engine} has version {own.version}. {remedy}")
 
 
 class EngineMethod(AdapterMethod):
@@ -44,7 +54,9 @@ class EngineMethod(AdapterMethod):
     @classmethod
     @lru_cache(maxsize=256)
     def at_version(cls, version: str) -> type[EngineMethod]:
-        """Return the class of a version, whose family is `exudyn@1.13.6`."""
+        """Return the class of a version, whose family is `exudyn@1.13.6`; of the newest one if it is empty."""
+        if not version:
+            return cls.__mro__[1] if cls.version else cls  # type: ignore[return-value]
         if cls.version:
             return cls.__mro__[1].at_version(version)  # type: ignore[attr-defined]
         names = {"version": version, "family": f"{cls.family}@{version}", "__module__": cls.__module__, "__doc__": cls.__doc__}
@@ -52,11 +64,13 @@ class EngineMethod(AdapterMethod):
 
     @property
     def environment(self) -> Environment:
-        """The environment. Raises `MissingEnvironment` if it is not installed."""
+        """The environment. Raises `MissingEnvironment`, or `OtherVersion` of a program."""
         own: Environment | None = getattr(self.adapter, "environment", None)  # of a program
-        return (
-            own if own and self.version in ("", own.version) else find_environment(self.family.partition("@")[0], self.version)
-        )
+        if own is None:
+            return find_environment(read_name(self.family).base, self.version)
+        if self.version not in ("", own.version):
+            raise OtherVersion(self.family, own)
+        return own
 
     @property
     def maker(self) -> Maker:

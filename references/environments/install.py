@@ -15,7 +15,8 @@ from typing import Any
 from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
 from conservative.files import remove_leftovers, temporary
-from conservative.programs import Program, list_programs
+from conservative.programs import Program
+from conservative.registry import read_name
 
 from ..worker.client import EngineCrashed, EngineTimeout
 from . import apt, npm
@@ -37,8 +38,8 @@ from .environment import (
     version_key,
     worker_of,
 )
-from .lock import Lock, Source, find_python, normal_name, resolve_wheel, split_requirement
-from .programs import register
+from .lock import Lock, Source, find_python, normal_name, resolve_wheel
+from .programs import find_program, register
 from .uv_command import UvFailed, run_uv
 
 _KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm, "apt": apt}
@@ -56,14 +57,14 @@ class Installation:
 
 
 def install(requirement: str, source: Source | None = None, force: bool = False) -> Installation:
-    """Return the environment of `NAME` or `NAME@VERSION`, created if it does not exist.
+    """Return the environment of an engine, named with or without a version, created if it does not exist.
 
     With `force` an existing environment is created again with the same packages, from its lock. The old one is replaced when
     the new one is complete. Raise `BadInput` if the engine or the version is unknown, has no wheel for a Python on this
     machine, or is not available here and now.
     """
     source = source or Source()
-    engine, version = split_requirement(requirement)
+    engine, version, _ = read_name(requirement, "engine", settings=False)
     distribution = distribution_of(engine)
     clear_leftovers()
     try:
@@ -148,7 +149,7 @@ def install_releases(
 
 def check(requirement: str) -> None:
     """Raise `BadInput` if a requirement cannot be read or its engine is unknown."""
-    distribution_of(split_requirement(requirement)[0])
+    distribution_of(read_name(requirement, "engine", settings=False).base)
 
 
 def _install(engine: str, distribution: Distribution, lock: Lock, source: Source, force: bool = False) -> Installation:
@@ -192,10 +193,13 @@ def import_trouble(environment: Environment, distribution: Distribution) -> str:
 
 
 def remove(requirement: str) -> tuple[Environment | Program, ...]:
-    """Remove the environment of `NAME@VERSION`, all of `NAME`, or a program, and return them. `BadInput` if there is none."""
-    if program := list_programs().get(requirement):
+    """Remove the environment of a version, all environments of a name, or a program, and return them.
+
+    Raise `BadInput` if there is none.
+    """
+    engine, version, _ = read_name(requirement, "engine", settings=False)
+    if program := find_program(requirement):
         return (register(program, undo=True),)
-    engine, version = split_requirement(requirement)
     installed = {each.name: each for each in list_environments()}
     chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))
     if not chosen:

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
-from conservative.registry import VERSION, partition_version
 
 from .environment import LOCK, Distribution, interpreter_of, version_key
 from .uv_command import UvFailed, run_uv
 
-_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
 _PYTHONS = ("3.14", "3.13", "3.12", "3.11", "3.10", "3.9")  # those that the worker supports
 
 
@@ -61,14 +59,6 @@ class Lock:
     version: str
     python: str
     text: str
-
-
-def split_requirement(text: str) -> tuple[str, str]:
-    """Return name and version from NAME, NAME@VERSION or NAME==VERSION; the version is empty without one. Raise `BadInput`."""
-    name, at, version = partition_version(text)
-    if not _NAME.fullmatch(name) or bool(at) != bool(VERSION.fullmatch(version)):
-        raise BadInput("engine", repr(text), "NAME or NAME@VERSION: letters, digits, '.', '_' and '-'")
-    return name, version
 
 
 def resolve(distribution: Distribution, version: str, source: Source) -> Lock:

@@ -62,6 +62,21 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     return made
 
 
+def find_program(text: str) -> Program | None:
+    """Return the program registered under a name; None if the text is not one.
+
+    With a version the program is started. Raise `UnusableProgram` if that fails, and `OtherVersion` if it has another version.
+    """
+    try:
+        name = registry.read_name(text, settings=False)
+    except BadInput:  # a command line
+        return None
+    program = list_programs().get(name.base)
+    if program is not None and name.version:
+        _ = program_class(program).at_version(name.version)().environment
+    return program
+
+
 def read_program(text: str, name: str = "", project: bool = False) -> Program:
     """Return the program of a command line, by default with the name of its last file. Raise `BadInput` for a bad name."""
     file = project_file() if project else user_file()

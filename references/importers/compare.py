@@ -250,13 +250,14 @@ def compare_files(
 
     Raise `BadInput` for a file that cannot be read, before any engine starts, and `MissingEngine`.
     """
+    names = dict.fromkeys(str(registry.read_name(name, "engines", settings=False)) for name in engines)
     paths = list(files) or sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
     installed = {each.engine for each in list_environments()} | {name for name in LOCAL if find_spec(name)}
     findings: list[FileAnswer] = []
     with ExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory()))
         models = read_files(paths, folder, search)
-        programs = [Program(name) for name in engines or [name for name in LOADERS if name in installed]]
+        programs = [Program(name) for name in names or [name for name in LOADERS if name in installed]]
         if any(model.kind == "sdf" for model in models) and "drake" in installed:
             reader = next((each for each in programs if each.engine == "drake"), None) or Program("drake")
             stack.callback(reader.worker.close)
@@ -326,7 +327,7 @@ class Program:
     """The process in which an engine loads files; a name such as "mujoco" or "newton@1.0.0". Raise `MissingEngine`."""
 
     def __init__(self, name: str) -> None:
-        self.engine, _, wanted = registry.partition_version(name)
+        self.engine, wanted, _ = registry.read_name(name, "engines", settings=False)
         choice("engines", self.engine, (*LOADERS, *OTHERS, *list_programs()))
         self.formats: tuple[str, ...] = ()
         self.single = self.engine in SINGLE

@@ -96,13 +96,15 @@ def add(command: str, name: str, project: bool, as_json: bool) -> None:
 @json_option
 @click.pass_context
 def check(ctx: click.Context, command: str, as_json: bool) -> None:
-    """Test COMMAND, or the program of that name. Mistakes are named, with what to change; the exit code is then 1."""
-    require_extra("conservative engines", "environments")
-    from conservative.programs import list_programs
-    from conservative.references.environments.conformance import check
-    from conservative.references.environments.programs import read_program
+    """Test COMMAND, or the program of that NAME or NAME@VERSION.
 
-    program = list_programs().get(command) or read_program(command, "program")
+    Mistakes are named, with what to change; the exit code is then 1.
+    """
+    require_extra("conservative engines", "environments")
+    from conservative.references.environments.conformance import check
+    from conservative.references.environments.programs import find_program, read_program
+
+    program = find_program(command) or read_program(command, "program")
     results = _show(
         check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json, f"testing {command}"
     )

@@ -164,6 +164,7 @@ def _compare(options: dict[str, Any]) -> Document:
     from conservative.programs import list_programs, project_file
     from conservative.references.environments.environment import temporary_folder
     from conservative.references.environments.lock import Source
+    from conservative.registry import read_name
 
     from ..run.provenance import provenance
     from ..sections.comparison import build
@@ -177,6 +178,9 @@ def _compare(options: dict[str, Any]) -> Document:
     prices = read_prices(options["accept_slower"], project_file())
     project = Path(head) if Path(head).is_dir() else Path()
     asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}
+    for name in asked.get("methods", ()):
+        if read_name(name, "methods").version:
+            raise BadInput("methods", repr(name), "a method that the project registers, without a version of an engine")
     if options["build"]:
         asked = {"methods": programs, **asked}
     if options["processes"]:

@@ -325,13 +325,15 @@ def epilog(*examples: str) -> str:
 
 
 def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:
-    """Return the names in `a,b:setting=1,other=2,c`. A part with one equals sign and no colon belongs to the name before it.
+    """Return the names in `a,b:setting=1,other=2,c`.
+
+    A part with one equals sign and no colon is a setting of the name before it, if that has settings.
 
     An empty option, such as `--scenes "$EMPTY"`, is an error, because it would select everything.
     """
     names: list[str] = []
     for item in split_list(argument, texts):
-        if names and "=" in item.replace("==", "") and ":" not in item:
+        if names and ":" in names[-1] and "=" in item.replace("==", "") and ":" not in item:
             names[-1] += f",{item}"
         else:
             names.append(item)

@@ -64,7 +64,8 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
-    Versions that have no environment are installed first, each in its own. With --against, the exit code is 1 if an order, an
+    ENGINE can have the first version, as in mujoco@3.6.0. Versions that have no environment are installed first, each in its
+    own. With --against, the exit code is 1 if an order, an
     invariant or the end of a run is lost.
     """
     require_extra("conservative track", "report")
@@ -75,6 +76,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     from conservative.references.environments.environment import distribution_of
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
+    from conservative.registry import read_name
 
     from ..run.provenance import provenance
     from ..sections.track import build
@@ -84,6 +86,8 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     def tell(what: str) -> None:
         click.echo(what, err=True)
 
+    engine, first, _ = read_name(engine, "engine", settings=False)
+    versions = *([first] if first else []), *versions
     if options["bump"] is not None:
         bump = find_bump(distribution_of(engine).package, options["bump"], Path())
         if bump is None:

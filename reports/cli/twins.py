@@ -50,7 +50,8 @@ def twins(
     and the fewest steps. The exit code is 1 if a pair differs, or an engine crashes.
     """
     require_extra("conservative twins", "report")
-    from conservative.benchmarks.studies.twins import compare_methods, select_methods, select_pairs
+    from conservative.benchmarks.studies.selection import methods as select_methods
+    from conservative.benchmarks.studies.twins import compare_methods, select_pairs
     from conservative.benchmarks.twins.script import MARK, script_name, script_of
     from conservative.files import make_folder, write_text
 

@@ -113,7 +113,7 @@ def plan(
     scene, out, steps = registry.scene(scene_name), settings["path"], None
     if error is not None and dt is not None:
         raise BadInput("dt", describe(dt), "none together with --error, which chooses the step")
-    settings |= {"error": read_error(error, dt, method), "method": method[0] if method else None}
+    settings |= {"error": read_error(error, dt, method), "method": registry.method(method[0]) if method else None}
     if settings["resume"] and out is None:
         raise BadInput("resume", "no folder", "--out, the folder of a sweep that was interrupted")
     if settings["error"] is None:

@@ -16,7 +16,8 @@ from conservative import registry
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import studies
-from conservative.benchmarks.studies.twins import select_methods, select_pairs
+from conservative.benchmarks.studies.selection import methods as select_methods
+from conservative.benchmarks.studies.twins import select_pairs
 from conservative.benchmarks.twins import compare
 from conservative.benchmarks.twins.compare import BODIES, BODY, NEEDLE, Engine, difference, twins_of
 from conservative.benchmarks.twins.machine import EngineMachine, Machine, machine_of
@@ -246,6 +247,7 @@ def test_names_are_checked():
         select_methods(["no_engine"])
     assert [method.name for method in select_methods(["mujoco:RK4", "exact"])] == ["mujoco", "exact"]
     assert len(select_methods(["mujoco"])) == 5
+    assert len(select_methods(["gauss"])) == len(registry.method("gauss").settings_for("variants")) > 1
 
 
 def test_study_has_a_row_for_each_pair():

@@ -87,3 +87,52 @@ def test_the_core_names_no_room_above_it():
     ]
     assert len(files) > 80
     assert [each for each in texts if re.match(rf"(conservative)?\.({'|'.join(rooms)})\b", each[1])] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("mujoco", ("mujoco", "", None)),
+        ("mujoco:", ("mujoco", "", "")),
+        ("mujoco@3.6.0", ("mujoco", "3.6.0", None)),
+        ("mujoco@3.6.0RC1:RK4,threads=2", ("mujoco", "3.6.0rc1", "RK4,threads=2")),
+        ("my_engine@4.0.1+build.1a2b3c4d", ("my_engine", "4.0.1+build.1a2b3c4d", None)),
+        ("größe_@1", ("größe_", "1", None)),
+        ("nested:mujoco@3.6.0", ("nested", "", "mujoco@3.6.0")),
+        ("mujoco:RK4@3.6.0", ("mujoco", "", "RK4@3.6.0")),
+    ],
+)
+def test_a_name_has_a_version_in_two_spellings(text, parts):
+    read = registry.read_name(text)
+    assert read == registry.read_name(text.replace("@", "==")) == registry.read_name(str(read)) == parts
+
+
+OTHER_FORMS = ["", "@3", "mujoco@", "mujoco@:RK4", "mujoco=3.6.0", "mujoco@3@4", "mujoco@x", "mujoco@v3", "mujoco@3 ", ":RK4"]
+
+
+@pytest.mark.parametrize("text", OTHER_FORMS)
+def test_a_name_of_another_form_is_refused(text):
+    for each in {text, text.replace("@", "==")}:
+        expected = f"got {re.escape(repr(each))}; expected NAME, NAME@VERSION or NAME==VERSION"
+        with pytest.raises(BadInput, match=f"^engines: {expected}"):
+            registry.read_name(each, "engines")
+        with pytest.raises(BadInput, match=f"^method: {expected}"):
+            registry.method(each)
+    with pytest.raises(BadInput, match="without settings"):
+        registry.read_name("mujoco:RK4", settings=False)
+
+
+@pytest.mark.parametrize("text", ["mujoco:RK4@3.6.0", "reduced@1.0", "MuJoCo@1", "substepped:mujoco@0.1", "gauss:stages@2"])
+def test_both_spellings_are_refused_alike(text):
+    def refusal(name):
+        with pytest.raises((BadInput, cv.MissingEngine)) as caught:
+            registry.method(name)
+        return str(caught.value)
+
+    assert refusal(text) == refusal(text.replace("@", "=="))
+    assert re.search("mujoco|reduced|gauss|RK4@", refusal(text))
+
+
+def test_an_unknown_name_in_capitals_has_the_nearest():
+    with pytest.raises(BadInput, match=r"'mujoco' \(nearest\)"):
+        registry.method("MuJoCo:RK4")

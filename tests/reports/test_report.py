@@ -244,6 +244,7 @@ def test_a_failure_of_our_methods_fails_the_command(monkeypatch):
 
 def test_names_with_settings_are_kept_together():
     assert split_names("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
+    assert split_names("methods", ("a,b=1,c:x=1,d==2,e=3",)) == ["a", "b=1", "c:x=1", "d==2", "e=3"]
     assert split_names("engines", ("a==1,b==2,c",)) == ["a==1", "b==2", "c"]
     assert split_names("methods", ()) == []
     assert split_list("engines", ("all, exudyn,mujoco==3.6.0",)) == ["all", "exudyn", "mujoco==3.6.0"]

@@ -128,12 +128,24 @@ def test_the_history_has_every_change():
 
 def test_rows_that_a_run_left_out_stay():
     """An update after a run with `-k` removed 75 of 77 rows."""
-    chosen = Results("here", {OTHER.id: OTHER}, chosen=True)
+    chosen = Results("here", {OTHER.id: OTHER}, left_out=(ROW.id,))
     accepted = baseline.update_baseline(KEPT, [chosen], "one more")
     assert set(accepted.rows) == {ROW.id, OTHER.id}
     assert accepted.history[-1]["removed"] == []
-    skipped = Results("here", {ROW.id: replace(ROW, status=Status.SKIPPED)}, chosen=True)
+    skipped = Results("here", {ROW.id: replace(ROW, status=Status.SKIPPED)}, left_out=(OTHER.id,))
     assert set(baseline.update_baseline(accepted, [skipped], "not that one").rows) == {OTHER.id}
+    assert set(baseline.update_baseline(accepted, [Results("here", {OTHER.id: OTHER})], "it is gone").rows) == {OTHER.id}
+
+
+def test_rows_that_a_run_left_out_are_counted_and_no_violations():
+    both = baseline.update_baseline(KEPT, [Results("here", {ROW.id: ROW, OTHER.id: OTHER})], "both")
+    verdict = compare.judge(both, Results("here", {OTHER.id: OTHER}, left_out=(ROW.id,)))
+    assert (verdict.passed, verdict.rows) == (True, 1)
+    assert verdict.notes == ("not compared: 1 rows of the baseline, which were not selected",)
+    assert not compare.judge(both, Results("here", {OTHER.id: OTHER})).passed
+    assert not compare.judge(both, Results("here", {}, left_out=(ROW.id,))).passed  # the other one is missing
+    with pytest.raises(baseline.NothingToCompare, match="none of the 2 rows"):
+        compare.judge(both, Results("here", {}, left_out=(ROW.id, OTHER.id)))
 
 
 def test_runs_that_disagree_are_refused():

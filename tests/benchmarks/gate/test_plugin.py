@@ -171,9 +171,7 @@ def test_from_end_to_end(tmp_path, monkeypatch):
     assert code == 0, text
     assert "gate: passed, 5 rows" in text
     assert "## Gate: passed" in (tmp_path / "summary.md").read_text()
-    assert not results.read(Path(written)).chosen
-    run(tmp_path, "--benchmark", "--gate", "test_other.py", "-k", "kept")
-    assert results.read(Path(written)).chosen
+    assert not results.read(Path(written)).left_out
     for old, new in PLANTED:
         assert old in suite.read_text()
         suite.write_text(suite.read_text().replace(old, new))
@@ -190,6 +188,103 @@ def test_from_end_to_end(tmp_path, monkeypatch):
         assert line in text
         assert line in report
     assert "| row | mine | removed |" in (tmp_path / "summary.md").read_text()
+
+
+PARTS = {
+    "checks/test_one.py": """
+import pytest
+
+@pytest.mark.parametrize("method", ["kept", "removed", "a::b"])
+def test_mine(benchmark, method):
+    benchmark(sum, range(9))
+
+class TestFirst:
+    def test_in(self, benchmark):
+        benchmark(sum, range(9))
+
+class TestOther:
+    @pytest.mark.late
+    def test_in(self, benchmark):
+        benchmark(sum, range(9))
+
+def test_plain():
+    pass
+""",
+    "more/test_two.py": "def test_two(benchmark):\n    benchmark(sum, range(9))\n",
+    "more/test_three.py": "def test_three(benchmark):\n    benchmark(sum, range(9))\n",
+}
+ALL = {"test_mine[kept]", "test_mine[removed]", "test_mine[a::b]", "TestFirst::test_in", "TestOther::test_in"}
+ALL = {f"test_one.py::{name}" for name in ALL} | {"test_two.py::test_two", "test_three.py::test_three"}
+ONE = {name for name in ALL if name.startswith("test_one.py")}
+MINE = {name for name in ONE if "test_mine" in name}
+KEPT = "test_one.py::test_mine[kept]"
+SELECTIONS = {  # and the benchmarks that are run
+    "checks more": ALL,
+    "checks": ONE,
+    "more/test_two.py": {"test_two.py::test_two"},
+    "checks/test_one.py::TestFirst": {"test_one.py::TestFirst::test_in"},
+    "checks/test_one.py::test_mine": MINE,
+    "checks/test_one.py::test_mine[kept]": {KEPT},
+    "checks more -k kept": {KEPT},
+    "checks -k mine": MINE,
+    "checks more -m late": {"test_one.py::TestOther::test_in"},
+    "checks more --deselect checks/test_one.py::test_mine": ALL - MINE,
+    "checks more --ignore more/test_three.py": ALL - {"test_three.py::test_three"},
+    "checks more --lf": {KEPT},
+    "checks more -k plain": set(),
+    "checks more -k nothing": set(),
+}
+GONE = {"test_one.py::test_mine[removed]", "test_one.py::TestOther::test_in", "test_three.py::test_three"}
+RUNS = """
+import json, sys
+from pathlib import Path
+
+import pytest
+
+from conservative.benchmarks.gate import baseline, compare, results
+
+cache, ended = Path(".pytest_cache/v/cache/lastfailed"), {}
+for words in json.loads(sys.argv[1]):
+    cache.parent.mkdir(parents=True, exist_ok=True)
+    cache.write_text('{"checks/test_one.py::test_mine[kept]": true}')
+    code = pytest.main(["-q", "-n0", "--import-mode=importlib", "--benchmark", "--gate", *words.split()])
+    run = results.read(results.FOLDER / results.FILE)
+    if not baseline.PATH.exists():
+        baseline.write(baseline.update_baseline(None, [run], "first"), baseline.PATH)
+    try:
+        missing = [each.scene for each in compare.judge(baseline.read(baseline.PATH), run).violations if each.now == "missing"]
+    except baseline.NothingToCompare:
+        missing = []
+    ended[words] = code, sorted(run.rows), sorted(missing)
+Path("ended.json").write_text(json.dumps(ended))
+"""
+
+
+def select(folder, *selections):
+    """Return the exit code, the rows and the missing rows of a run for each selection, in one process."""
+    code = [sys.executable, "-c", RUNS, json.dumps(selections)]
+    subprocess.run(code, cwd=folder, capture_output=True, check=True)
+    return json.loads((folder / "ended.json").read_text())
+
+
+def test_rows_that_are_not_selected_are_not_missing(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --benchmark-max-time=0.001\nmarkers = late\n")
+    for name, text in PARTS.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    found = select(tmp_path, "more checks", *SELECTIONS)
+    assert found.pop("more checks") == [2, sorted(ALL), []]  # no baseline
+    assert found == {words: [0 if rows else 2, sorted(rows), []] for words, rows in SELECTIONS.items()}
+    plain = "    def test_in(self):\n        pass\n"
+    changed = PARTS["checks/test_one.py"].replace(', "removed"', "").partition("    @pytest.mark.late")[0] + plain
+    (tmp_path / "checks/test_one.py").write_text(changed)
+    (tmp_path / "more/test_three.py").unlink()
+    some = ("checks more", "more/test_two.py", "checks/test_one.py::TestFirst", "checks more -k kept", "checks more --lf")
+    for words, (code, rows, missing) in select(tmp_path, *some).items():
+        read = "test_one" if words.startswith("checks") else "nothing"
+        read = "test_mine" if "TestFirst" in words else read  # its node id leaves out the other class
+        assert missing == sorted({"test_three.py::test_three"} | {name for name in GONE if read in name}), words
+        assert (code, set(rows)) == (1, SELECTIONS[words] - GONE), words
 
 
 INFO = {"scene": "brick", "method": "reduced", "error": "1e-9", "spreads": {"error": 1e-12}}
