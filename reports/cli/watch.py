@@ -75,7 +75,7 @@ def watch(
     from conservative.files import text_file
     from conservative.method import Role
 
-    from ..animation import KINDS, Animation
+    from ..animation import KINDS, Animation, largest_values
     from ..document.model import Block, Document, Items, Paragraph
     from ..run import single_run as work
     from ..terminal.progress import progress
@@ -95,18 +95,21 @@ def watch(
         for each in shown:
             tell(0.4 * len(runs) / len(shown), each.typed)
             runs.append((work.run_on(body, each.method, each.grid), each.grid))
+        truth = next((number for number, each in enumerate(shown) if each.method.role == Role.TRUTH), None)
+        motions, values = [run for run, _ in runs], []
         for number, (run, grid) in enumerate(runs):
             tell(0.4 + 0.2 * number / len(runs), "errors")
-            found = work.find_errors(run, grid, None, None, t_end)
+            found = work.compare(run, grid, None)
             if target is None:
                 each = shown[number]
-                data.append(work.summarize(run, each.method, grid.dt, each.typed) | {"error": found})
+                data.append(work.summarize(run, each.method, grid.dt, each.typed) | {"error": work.describe_errors(found)})
             else:
-                data.append(work.summarize_chosen(run) | {"error": found})
+                data.append(work.summarize_chosen(run) | {"error": work.describe_errors(found)})
             labels.append(f"{data[-1]['typed']}, dt = {data[-1]['dt']:.3g} s")
-        truth = next((number for number, each in enumerate(shown) if each.method.role == Role.TRUTH), None)
-        motions = [run for run, _ in runs]
-        drawn = Animation(motions, labels, truth).render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing"))
+            error = None if isinstance(found, str) or number == truth else found.at_samples(len(run))
+            values.append(largest_values(run, error))
+        drawing = Animation(motions, labels, truth, values)
+        drawn = drawing.render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing"))
         stream.buffer.write(drawn)
     notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != "ok"]
     failures = [] if any(run.ok for run in motions) else [f"{run.label} on {body.name}: {run.outcome}" for run in motions]

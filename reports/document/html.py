@@ -78,7 +78,7 @@ def _datatables() -> str:
 
 
 def _motion(block: Motion) -> Markup:
-    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth))
+    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth, block.values))
 
 
 def _whole(text: str) -> Markup:

@@ -84,10 +84,14 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
     truth = set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"])
     exact = [method for method in motions if method in truth]
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
-    motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
+    known, labels = lines.largest_values(measured.samples, scene), [names.get(name, "exact") for name in shown]
+    trajectories, values = [motions[name] for name in shown], [known.get(name) for name in shown]
+    motion = Motion(trajectories, labels, 0 if exact else None, values)
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    signs = Paragraph("Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far.", Emphasis.NOTE)
-    lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, signs) if shown else ()
+    signs = "Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far."
+    if exact and (end := trajectories[0].t[-1]) < scene.t_end * (1 - 1e-9):
+        signs += f" Only the first {end:.3g} s are drawn, because the body turns too often."
+    lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, Paragraph(signs, Emphasis.NOTE)) if shown else ()
     blocks = filled(lead, *moving, table(found, scene))
     source = {"study": STUDIES, "scene": scene.name}
     return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
