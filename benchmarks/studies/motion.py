@@ -34,7 +34,7 @@ from .study import Finding, Progress, Study
 SAMPLES = 700
 """Largest number of samples of a curve."""
 TURN = 0.35
-"""Mean angle between two samples of attitudes, rad. Animations turn the shorter way from one to the next: right only below pi."""
+"""Mean angle between two samples of attitudes, rad. Animations turn the shorter way between them: right only below pi."""
 FRAMES, MOST_FRAMES = 200, 2000
 """Smallest and largest number of samples of attitudes and rates, after the first one, and of the frames of an animation."""
 POINTS = 120

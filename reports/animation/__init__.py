@@ -66,9 +66,7 @@ class Animation:
             return _fill("page.html.j2", **page).encode()
         from .video import draw
 
-        return draw(
-            *make_panels(self.trajectories, self.labels, self.truth, self.values), self.truth, kind, MARK, progress
-        )
+        return draw(*make_panels(self.trajectories, self.labels, self.truth, self.values), self.truth, kind, MARK, progress)
 
     def _repr_html_(self) -> str:
         height = 160 + 330 * math.ceil(len(self.trajectories) / 4)

@@ -89,6 +89,7 @@ class Emphasis(StrEnum):
     BODY = ""
     LEAD = "lead"
     NOTE = "note"
+    FAILED = "failed"  # stands for a part that could not be made
 
 
 @dataclass(frozen=True)

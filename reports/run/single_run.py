@@ -16,7 +16,7 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array, angle_between, orthonormality
-from conservative.errors import AccuracyNotReached, BadInput, MissingEngine
+from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid, grid_for
 from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_loads
 from conservative.invariants import sizes
@@ -171,10 +171,12 @@ def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None
 
 
 def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
-    """Return the trajectory on a grid; a failure ends it early."""
+    """Return the trajectory on a grid; a failure ends it early, or before its first sample if an engine crashes."""
     warn_of_loads(scene, method, grid.dt)
     try:
         return method.solve(scene, grid)
+    except IntegrationFailed as failure:
+        return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), method.label, failure=failure)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # as in `integrate`
 
@@ -230,9 +232,7 @@ def compare(trajectory: Trajectory, grid: Grid, wanted: bool | None) -> Compared
         return f"not computed: the reference solution ended: {truth.outcome}"
     numbers = np.unique([*range(0, n, stride), n - 1])
     attitude = angle_between(truth.R_WB, trajectory.R_WB[numbers])
-    return Compared(
-        truth, stride, numbers, attitude, np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[numbers], axis=1)
-    )
+    return Compared(truth, stride, numbers, attitude, np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[numbers], axis=1))
 
 
 def find_errors(
