@@ -148,4 +148,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
 
 def _errors(trajectory: Trajectory, truth: Trajectory) -> Array:
     """Return the attitude error at each sample (n,), rad, against the truth at the same time."""
-    return angle_between(attitudes_at(truth, trajectory.t), trajectory.R_WB)
+    t = trajectory.t  # whose last step can pass the end of the truth
+    if t[-1] > truth.t[-1] + np.diff(t).max(initial=0.0) * (1 + 1e-9):
+        raise BadInput("truth", f"a motion until {truth.t[-1]:g} s", f"one until {t[-1]:g} s, or less than a step before")
+    return angle_between(attitudes_at(truth, t), trajectory.R_WB)
