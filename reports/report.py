@@ -1,4 +1,7 @@
-"""`conservative report`: measure, build the document, write it; completely or not at all."""
+"""`conservative report`: measure, write the measurements, build the document, write it.
+
+What cannot be drawn is a sentence in its place (see `document.attempt`), and measurements are written before anything is drawn.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from conservative import files
-from conservative.errors import BadInput
+from conservative.errors import BadInput, NotWritten
 
 from .document import json
-from .document.model import Document, Figure
+from .document.attempt import attempt, failed_parts, render_all
+from .document.model import Block, Document, Figure, Motion, Paragraph, Section
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
@@ -34,7 +38,8 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     """Measure and write the report into the folder `out`, and return its document.
 
     If the report is interrupted or fails, finished studies are stored (see `checkpoint`), and a note of the exception contains
-    their file. With `resume` they are not measured again.
+    their file. With `resume` they are not measured again. They are also stored if a part could not be drawn, which is a failure
+    of the document.
 
     Raises
     ------
@@ -47,32 +52,66 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     try:
         with report_folder(out) as folder:
             measurements = measure(plan, step, progress)
+            content = measurements.content(source)
+            files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
+            files.write_text(folder / MANIFEST, json.render(content), "out")
             step(1.0, "pictures and page")
             announce("pictures and page")
-            from .sections.report import build  # here, as altair takes a second to import
+            failure = None
+            try:
+                from .sections.report import build  # here, as altair takes a second to import
 
-            document = build(plan, measurements, source)
-            render(document, folder, plan.png, plan.latex)
-            files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
-            render_pages(document, folder)
-            names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
-            files.write_text(folder / MANIFEST, json.render({**dict(document.data), "files": names}, indent=1), "out")
+                document = render(build(plan, measurements, source), folder, plan.png, plan.latex)
+                render_pages(document, folder)
+            except NotWritten:
+                raise
+            except Exception as error:  # the folder has the measurements
+                failure = error
+            names = sorted(path.name for path in folder.iterdir())
+            files.write_text(folder / MANIFEST, json.render({**content, "files": names}, indent=1), "out")
+        if failure is not None:
+            raise failure
     except BaseException as error:
         if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
         raise
-    progress.remove()
-    return document
+    if not (failed := failed_parts(document.blocks)):
+        progress.remove()
+    return replace(document, failures=[*document.failures, *failed])
 
 
-def render(document: Document, folder: Path, png: bool, latex: bool = False) -> None:
-    """Write report.md with its pictures, the page and, if `latex`, the tables in report.tex."""
+def render(document: Document, folder: Path, png: bool, latex: bool = False) -> Document:
+    """Write report.md with its pictures, the page and, if `latex`, the tables in report.tex.
+
+    Return the document as it was written, in which the parts that could not be drawn are sentences.
+    """
     from .document import html, markdown, text
 
-    files.write_text(folder / "report.md", markdown.render(document, draw_into(folder, png)), "out")
-    files.write_text(folder / "index.html", html.render(document), "out")
+    pictures, draw = dict[str, str](), draw_into(folder, png)
+
+    def tried(block: Block) -> list[Block]:
+        match block:
+            case Section():
+                return [replace(block, blocks=[each for part in block.blocks for each in tried(part)])]
+            case Motion():
+                made: object = attempt("The animation", lambda: html.motion(block))
+                return [made if isinstance(made, Paragraph) else block]
+            case Figure() if block.picture is not None:
+                file = attempt(f"The picture {block.title!r}", lambda: draw(block))
+                if isinstance(file, str):
+                    pictures[block.name] = file
+                    return [block]
+                return [file, *([replace(block, picture=None)] if block.panels else [])]
+        return [block]
+
+    document = replace(document, blocks=[each for part in document.blocks for each in tried(part)])
+    document, page = render_all(document, html.render)
+    document, words = render_all(document, lambda part: markdown.render(part, lambda figure: pictures[figure.name]))
+    files.write_text(folder / "report.md", words, "out")
+    files.write_text(folder / "index.html", page, "out")
     if latex:
         files.write_text(folder / "report.tex", text(document, "latex"), "out")
+    return document
 
 
 def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:

@@ -8,11 +8,12 @@ curve of a body in a field is the trace of an axis, a unit vector in world axes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.grid import ROUNDING, Grid, grid_for
 from conservative.invariants import sizes
 from conservative.method import Method, Role
@@ -20,6 +21,7 @@ from conservative.outcome import Outcome
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
+from conservative.scene import Scene
 from conservative.trajectory import Trajectory, head
 
 from ..measures import errors
@@ -31,8 +33,10 @@ from .study import Finding, Progress, Study
 
 SAMPLES = 700
 """Largest number of samples of a curve."""
-FRAMES = 200
-"""Largest number of samples of attitudes and rates, after the first one."""
+TURN = 0.35
+"""Mean angle between two samples of attitudes, rad. Animations turn the shorter way between them: right only below pi."""
+FRAMES, MOST_FRAMES = 200, 2000
+"""Smallest and largest number of samples of attitudes and rates, after the first one, and of the frames of an animation."""
 POINTS = 120
 """Largest number of samples of a drift."""
 AXES = ("x", "y", "z")
@@ -41,6 +45,10 @@ STATES = ("q_w", "q_x", "q_y", "q_z", "w_x", "w_y", "w_z")
 """Quantities of the first duration: attitude as a quaternion, body to world, and rates, rad/s, body axes."""
 SIGNED = "drift of "
 """Begins the quantities of relative drifts; that of a vector is the change of its length."""
+LARGEST = "largest drift of "
+"""Begins the quantities of the largest relative drift so far, over all steps of the run, at the times of the states."""
+ERROR = "largest attitude error"
+"""Quantity of the largest attitude error so far, rad, over all steps of the run, at the times of the states."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
@@ -49,9 +57,10 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     tell = study.count(progress, len(drawn) + 1)
     for scene in study.scenes:
         tell(f"{scene.name}: exact")
-        grid = Grid(scene.t_end / FRAMES, FRAMES)
+        exact = truth_of_frames(study, scene)
         solver = Exact() if Exact().unsupported(scene) is None else Precise()
-        yield from _lines(Case(study.name, scene, solver, grid), study.truth(scene, grid).trajectory)
+        grid = Grid(scene.t_end / FRAMES, FRAMES)
+        yield from _lines(Case(study.name, scene, solver, grid), exact, exact, exact)
         for method in drawn:
             tell(f"{scene.name}: {method.name}")
             step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
@@ -60,9 +69,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
                 case = Case(study.name, scene, method, grid_for(scene, step, end))
                 done = study.attempt(case)
                 if isinstance(done, Success):
-                    begin = head(done.trajectory, first.n_samples)
-                    yield from case.rows(errors.measure_errors(begin, study.truth(scene, first).trajectory))
-                    yield from _lines(case, done.trajectory)
+                    begin, truth = head(done.trajectory, first.n_samples), study.truth(scene, first).trajectory
+                    yield from case.rows(errors.measure_errors(begin, truth))
+                    yield from _lines(case, done.trajectory, begin, exact, angle_between(truth.R_WB, begin.R_WB))
                     break
             if isinstance(done, Outcome):
                 yield from case.rows(errors.blanks(scene), done)
@@ -76,21 +85,43 @@ def select_methods(methods: Sequence[Method]) -> list[Method]:
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 
 
-def _lines(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
-    def line(quantity: str, values: Array, count: int) -> Samples:
-        some = np.unique(np.linspace(0, len(values) - 1, count).round().astype(int))
+def truth_of_frames(study: Study, scene: Scene) -> Trajectory:
+    """Return the exact motion at the times of frames: of the first duration, or of the part that `MOST_FRAMES` can show."""
+    exact = study.truth(scene, Grid(scene.t_end / FRAMES, FRAMES)).trajectory
+    fastest = float(np.linalg.norm(exact.w_WB_B, axis=1).max())
+    if fastest * scene.t_end <= FRAMES * TURN:
+        return exact
+    end = min(scene.t_end, MOST_FRAMES * TURN / fastest)
+    n = min(MOST_FRAMES, math.ceil(fastest * end / TURN))
+    return study.truth(scene, Grid(end / n, n)).trajectory
+
+
+def _lines(
+    case: Case, trajectory: Trajectory, begin: Trajectory, exact: Trajectory, error: Array | None = None
+) -> Iterator[Samples]:
+    """Yield the lines of a motion, of its first duration `begin` and its errors there, at the times of `exact` or fewer."""
+
+    def line(quantity: str, values: Array, some: Array) -> Samples:
         return case.samples(quantity, trajectory.t[some], values[some])
 
-    begin = head(trajectory, 1 + int(np.searchsorted(trajectory.t, case.scene.t_end * (1 - ROUNDING))))
+    def spread(n: int, count: int) -> Array:
+        return np.unique(np.linspace(0, n - 1, count).round().astype(int))
+
+    last = min(len(begin) - 1, int(np.searchsorted(begin.t, exact.t[-1] * (1 - ROUNDING))))
+    shown, drifts = spread(last + 1, len(exact)), {each: trajectory.drift(each) for each in case.scene.invariants}
     states = np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
-    yield from (line(quantity, values, FRAMES + 1) for quantity, values in zip(STATES, states.T, strict=True))
-    for invariant in case.scene.invariants:
-        drift = trajectory.drift(invariant)
+    yield from (line(quantity, values, shown) for quantity, values in zip(STATES, states.T, strict=True))
+    for invariant, drift in drifts.items():
+        yield line(LARGEST + invariant.name, np.maximum.accumulate(sizes(drift)), shown)
+    if error is not None:
+        yield line(ERROR, np.maximum.accumulate(error), shown)
+    for invariant, drift in drifts.items():
         if drift.ndim > 1:  # relative to the initial value, which is the scale of a vector that is not zero
             start = case.scene.initial_value(invariant) / invariant.scale
             drift = sizes(drift + start) - sizes(start)
-        yield line(SIGNED + invariant.name, drift, POINTS)
-    yield from (line(axis, values, SAMPLES) for axis, values in zip(AXES, project_on_sphere(trajectory).T, strict=True))
+        yield line(SIGNED + invariant.name, drift, spread(len(trajectory), POINTS))
+    curve = project_on_sphere(trajectory).T
+    yield from (line(axis, values, spread(len(trajectory), SAMPLES)) for axis, values in zip(AXES, curve, strict=True))
 
 
 def project_on_sphere(trajectory: Trajectory) -> Array:

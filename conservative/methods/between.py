@@ -130,6 +130,21 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     return cut_at_failure(samples, method.conserves, method.bounds(found.scene, grid))
 
 
+def attitudes_at(found: Trajectory, t: Array) -> Array:
+    """Return the attitudes (n, 3, 3) of a run at increasing times t (n,), s, which can be a little later than its last sample.
+
+    Each is the state of the sample before it, moved forward by integration; a spline through the samples is less accurate.
+    From the time at which a state cannot be moved, they are nan.
+    """
+    near = SAME * float(np.diff(found.t).min(initial=math.inf))
+    row = np.clip(np.searchsorted(found.t, t + (near if math.isfinite(near) else 0.0), side="right") - 1, 0, None)
+    gaps = t - found.t[row]
+    gaps[np.abs(gaps) <= near] = 0.0
+    R_WB, _, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
+    R_WB[done:] = np.nan
+    return R_WB
+
+
 def move(
     scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array, supplied: Array | None = None
 ) -> tuple[Array, Array, int]:

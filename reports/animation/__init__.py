@@ -20,7 +20,8 @@ from conservative.errors import BadInput, require_extra
 from conservative.files import write_bytes
 from conservative.trajectory import Trajectory
 
-from .frames import COLOURS, make_panels, speeds
+from .frames import COLOURS, Values, make_panels, speeds
+from .frames import largest_values as largest_values
 
 KINDS = (".html", ".gif", ".mp4", ".png")
 """Endings of files that contain an animation, or its last frame."""
@@ -34,12 +35,13 @@ class Animation:
     """An animation of trajectories. A notebook shows it; `save` writes it into a file.
 
     Attributes: `trajectories`, `labels` (the titles of the panels), and `truth`, the index of the reference solution, which the
-    other panels show as an outline, or None.
+    other panels show as an outline, or None. `values` as in `element`.
     """
 
     trajectories: Sequence[Trajectory]
     labels: Sequence[str]
     truth: int | None = None
+    values: Sequence[Values | None] | None = None
 
     def save(self, path: str | Path) -> None:
         """Write a page (.html), a video (.gif, .mp4), or the last frame (.png); an existing file is replaced.
@@ -58,13 +60,13 @@ class Animation:
         if kind not in KINDS:
             raise BadInput("path", f"a file that ends in {kind!r}", f"one that ends in {', '.join(KINDS)}")
         if kind == ".html":
-            motion = element(self.trajectories, self.labels, truth=self.truth)
+            motion = element(self.trajectories, self.labels, truth=self.truth, values=self.values)
             name = self.trajectories[0].scene.name
             page = {"name": name, "mark": MARK, "motion": motion, "script": script(), "panels": len(self.trajectories)}
             return _fill("page.html.j2", **page).encode()
         from .video import draw
 
-        return draw(*make_panels(self.trajectories, self.labels, self.truth), self.truth, kind, MARK, progress)
+        return draw(*make_panels(self.trajectories, self.labels, self.truth, self.values), self.truth, kind, MARK, progress)
 
     def _repr_html_(self) -> str:
         height = 160 + 330 * math.ceil(len(self.trajectories) / 4)
@@ -85,6 +87,7 @@ def element(
     labels: Sequence[str],
     id: str = "motion",
     truth: int | None = None,
+    values: Sequence[Values | None] | None = None,
 ) -> str:
     """Return the HTML of an animation with its data; `script` makes it move.
 
@@ -95,15 +98,17 @@ def element(
     id
         Identifier of the element on the page.
     truth
-        Index of the reference solution, or None. The other panels show its attitude as an outline, and their attitude error.
-        If its samples have other times, the error includes that of the interpolation between them.
+        Index of the reference solution, or None. The other panels show its attitude as an outline.
+    values
+        The numbers of each panel (see `largest_values`), or None for the drifts at the samples and, with a reference solution,
+        for the attitude errors there. Samples of the reference solution at other times are moved there by integration.
 
     Raises
     ------
     BadInput
         A trajectory has no samples, there is not one label for each, or the body turns too often to be watched.
     """
-    times, panels = make_panels(trajectories, labels, truth)
+    times, panels = make_panels(trajectories, labels, truth, values)
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -11,22 +11,26 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, angle_between, to_quaternion
+from conservative.benchmarks.studies.motion import FRAMES, MOST_FRAMES, TURN
 from conservative.errors import BadInput
-from conservative.invariants import sizes
+from conservative.invariants import Invariant, sizes
+from conservative.methods.between import attitudes_at
 from conservative.trajectory import Trajectory
 
-TURN = 0.35
-"""Mean angle between two frames, rad: the player interpolates on the shorter way, which is the right one only below pi."""
-FRAMES = (200, 2000)
-"""Smallest and largest number of frames; 50 bytes each in the page."""
 THINNEST = 0.04
 """Shortest side of a box relative to its longest: of a planar body, or of moments that no mass distribution has."""
+MOST = 1e6
+"""Largest angular momentum in the data of a panel, relative to the initial one; the arrow ends before."""
 ERROR = "attitude error, rad"
 LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
 """Largest values that are good, and fair, of the attitude error; those of drifts are 1e-10 and 1e-3."""
 FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
 COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
+
+
+Values = Mapping[str, Array]
+"""The largest value so far of each drift and of the attitude error, rad, at the samples of a motion (n,), by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +80,22 @@ def speeds(duration: float) -> list[float]:
     return [float(f"{(1, 2, 5)[k % 3]}e{k // 3}") for k in range(middle - 2, middle + 3)]
 
 
-def make_panels(trajectories: Sequence[Trajectory], labels: Sequence[str], truth: int | None) -> tuple[Array, list[Panel]]:
+def drift_name(invariant: Invariant) -> str:
+    """Return the name of the drift of an invariant in `Panel.sizes`."""
+    return f"{invariant.name} drift"
+
+
+def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Array]:
+    """Return the largest drift of each invariant so far, and the largest attitude error, rad, at the samples (n,), by name."""
+    values = {drift_name(each): sizes(trajectory.drift(each)) for each in trajectory.scene.invariants}
+    if error is not None:
+        values[ERROR] = error
+    return {name: np.maximum.accumulate(value) for name, value in values.items()}
+
+
+def make_panels(
+    trajectories: Sequence[Trajectory], labels: Sequence[str], truth: int | None, values: Sequence[Values | None] | None = None
+) -> tuple[Array, list[Panel]]:
     """Return the times of the frames (n,), s, and the panels of trajectories, see `element`."""
     if not trajectories or not all(map(len, trajectories)):
         raise BadInput("trajectories", repr(list(trajectories)), "trajectories with at least one sample")
@@ -84,54 +103,52 @@ def make_panels(trajectories: Sequence[Trajectory], labels: Sequence[str], truth
         raise BadInput("labels", list(labels), f"one label for each of {len(trajectories)} trajectories")
     duration = max(float(each.t[-1]) for each in trajectories) or trajectories[0].scene.t_end
     rate = min(float(np.linalg.norm(each.w_WB_B, axis=1).mean()) for each in trajectories)
-    frames = max(FRAMES[0], math.ceil(rate * duration / TURN) + 1)
-    if frames > FRAMES[1]:
+    frames = max(FRAMES, math.ceil(rate * duration / TURN) + 1)
+    if frames > MOST_FRAMES + 1:
         got = f"{duration:g} s, in which the body turns by {rate * duration:.0f} rad"
-        raise BadInput("t_end", got, f"at most {FRAMES[1] * TURN / rate:.3g} s, so that the motion can be watched")
+        raise BadInput("t_end", got, f"at most {MOST_FRAMES * TURN / rate:.3g} s, so that the motion can be watched")
     times, exact = np.linspace(0.0, duration, frames), None if truth is None else trajectories[truth]
-    return times, [_panel(each, label, times, exact) for each, label in zip(trajectories, labels, strict=True)]
+    panels = []
+    for each, label, known in zip(trajectories, labels, values or [None] * len(trajectories), strict=True):
+        if known is None:
+            known = largest_values(each, None if exact is None or each is exact else _errors(each, exact))
+        panels.append(_panel(each, label, times, known))
+    return times, panels
 
 
-def _panel(trajectory: Trajectory, label: str, times: Array, truth: Trajectory | None) -> Panel:
+def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> Panel:
     from scipy.spatial.transform import Rotation
 
     t, scene, body = trajectory.t, trajectory.scene, trajectory.scene.body
     near = 1e-9 * times[-1]
-    times = times[times <= t[-1] + near]
+    times = times[: 1 + np.count_nonzero(times < t[-1] - near)]  # the last frame is the last sample
     before = np.clip(np.searchsorted(t, times + near) - 1, 0, None)
     after = np.minimum(before + 1, len(t) - 1)
     share = np.clip((times - t[before]) / np.where(after > before, t[after] - t[before], 1.0), 0.0, 1.0)
     start, stop = Rotation.from_matrix(trajectory.R_WB[before]), Rotation.from_matrix(trajectory.R_WB[after])
     R_WB = (start * Rotation.from_rotvec(share[:, None] * (start.inv() * stop).as_rotvec())).as_matrix()
     lengths = np.linalg.norm(trajectory.momentum_W, axis=1)
-    drifts = {f"{each.name} drift": sizes(trajectory.drift(each)) for each in scene.invariants}
-    largest = {name: values for name, values in drifts.items() if not np.isnan(values).any()}  # a method may not give balances
-    if truth is not None and truth is not trajectory:
-        largest[ERROR] = _errors(trajectory, truth)
     squares = np.maximum(body.moments.sum() - 2 * body.moments, 0)  # of the sides: J_1 = m/12 (b^2 + c^2), and so on
     size = np.maximum(np.sqrt(squares), THINNEST * math.sqrt(squares.max()))
-    com_B = getattr(scene.potential, "com_B", None)
-    axis = scene.w_WB_B0 @ body.R_BP
-    tip = np.eye(3)[np.argmax(np.abs(axis))] if com_B is None else np.asarray(com_B) @ body.R_BP
+    tip = np.asarray(getattr(scene.potential, "com_B", np.zeros(3))) @ body.R_BP
+    if not tip.any():
+        tip = np.eye(3)[np.argmax(np.abs(scene.w_WB_B0 @ body.R_BP))]
+    with np.errstate(all="ignore"):  # the momentum of a run that diverged can overflow
+        L_W = np.nan_to_num(trajectory.momentum_W[before] / (lengths[0] or lengths.max() or 1.0))
     return Panel(
         label,
         "" if trajectory.ok else str(trajectory.outcome),
         2 * size / np.linalg.norm(size),
         1.25 * tip / np.linalg.norm(tip),
         R_WB @ body.R_BP,
-        trajectory.momentum_W[before] / (lengths[0] or lengths.max() or 1.0),
-        {name: np.maximum.accumulate(values)[before] for name, values in largest.items()},
+        np.clip(L_W, -MOST, MOST),
+        {name: value[before] for name, value in values.items() if not np.isnan(value).any()},  # not every method has balances
     )
 
 
 def _errors(trajectory: Trajectory, truth: Trajectory) -> Array:
-    """Return the attitude error at each sample (n,), rad. A truth with other times is interpolated (spline, order 4)."""
-    from scipy.spatial.transform import Rotation, RotationSpline
-
-    t, n = trajectory.t, len(trajectory)
-    if n <= len(truth) and np.allclose(t, truth.t[:n], rtol=1e-12, atol=0):
-        return angle_between(truth.R_WB[:n], trajectory.R_WB)
-    if t[-1] > truth.t[-1] * (1 + 1e-9):
-        raise BadInput("truth", f"a motion until {truth.t[-1]:g} s", f"one until {t[-1]:g} s")
-    spline = RotationSpline(truth.t, Rotation.from_matrix(truth.R_WB))
-    return angle_between(spline(np.minimum(t, truth.t[-1])).as_matrix(), trajectory.R_WB)
+    """Return the attitude error at each sample (n,), rad, against the truth at the same time."""
+    t = trajectory.t  # whose last step can pass the end of the truth
+    if t[-1] > truth.t[-1] + np.diff(t).max(initial=0.0) * (1 + 1e-9):
+        raise BadInput("truth", f"a motion until {truth.t[-1]:g} s", f"one until {t[-1]:g} s, or less than a step before")
+    return angle_between(attitudes_at(truth, t), trajectory.R_WB)

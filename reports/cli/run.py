@@ -59,7 +59,7 @@ FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
 @click.option(
     "--truth/--no-truth",
     default=None,
-    help="Errors against the reference solution, at 200 samples.  [default: unless it takes long]",
+    help="Errors against the reference solution, at up to 20,000 samples.  [default: unless it takes long]",
 )
 @click.option("--csv", type=Output(SAMPLES), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample.")
 @click.option("--parquet", type=Output("PAR1"), help="Write the same as a Parquet file.")

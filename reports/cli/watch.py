@@ -75,7 +75,7 @@ def watch(
     from conservative.files import text_file
     from conservative.method import Role
 
-    from ..animation import KINDS, Animation
+    from ..animation import KINDS, Animation, largest_values
     from ..document.model import Block, Document, Items, Paragraph
     from ..run import single_run as work
     from ..terminal.progress import progress
@@ -87,7 +87,7 @@ def watch(
     planned = work.plan_runs(body, names, dt, t_end, usual=True) if target is None else []
     shown = [each for each in planned if not each.refusal]
     data = [each.refused(body) for each in planned if each.refusal]
-    runs, labels = [], []
+    runs, drawn = [], []
     with text_file(out, "out") as stream, progress() as tell:
         tell(0.0, "choosing a method" if target else shown[0].typed)
         if target is not None:
@@ -95,21 +95,27 @@ def watch(
         for each in shown:
             tell(0.4 * len(runs) / len(shown), each.typed)
             runs.append((work.run_on(body, each.method, each.grid), each.grid))
+        truth = next((run for each, (run, _) in zip(shown, runs, strict=False) if each.method.role == Role.TRUTH), None)
         for number, (run, grid) in enumerate(runs):
             tell(0.4 + 0.2 * number / len(runs), "errors")
-            found = work.find_errors(run, grid, None, None, t_end)
+            found = work.compare(run, grid, None)
             if target is None:
                 each = shown[number]
-                data.append(work.summarize(run, each.method, grid.dt, each.typed) | {"error": found})
+                summary = work.summarize(run, each.method, grid.dt, each.typed)
             else:
-                data.append(work.summarize_chosen(run) | {"error": found})
-            labels.append(f"{data[-1]['typed']}, dt = {data[-1]['dt']:.3g} s")
-        truth = next((number for number, each in enumerate(shown) if each.method.role == Role.TRUTH), None)
-        motions = [run for run, _ in runs]
-        drawn = Animation(motions, labels, truth).render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing"))
-        stream.buffer.write(drawn)
+                summary = work.summarize_chosen(run)
+            data.append(summary | {"error": work.describe_errors(found)})
+            if len(run):  # an engine that crashes at its start has no samples
+                error = None if isinstance(found, str) or run is truth else found.at_samples(len(run))
+                drawn.append((run, f"{summary['typed']}, dt = {summary['dt']:.3g} s", largest_values(run, error)))
+        if failure := runs[0][0].failure if not drawn else None:
+            raise failure
+        motions, labels, values = zip(*drawn, strict=True)
+        outline = next((number for number, run in enumerate(motions) if run is truth), None)
+        drawing = Animation(motions, labels, outline, values)
+        stream.buffer.write(drawing.render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing")))
     notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != "ok"]
-    failures = [] if any(run.ok for run in motions) else [f"{run.label} on {body.name}: {run.outcome}" for run in motions]
+    failures = [] if any(run.ok for run, _ in runs) else [f"{run.label} on {body.name}: {run.outcome}" for run, _ in runs]
     text = Paragraph(f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html"))
     blocks: list[Block] = [text, *([Items.of(notes)] if notes else [])]
     show(Document("conservative watch", body.name, blocks, data={"out": str(out), "runs": data}, failures=failures), as_json)

@@ -33,7 +33,7 @@ def render(document: Document) -> str:
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"whole": _whole, "narrow": _narrow, "place": _place}
-    environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns, "motion": _motion}
+    environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns, "motion": motion}
     blocks = list(walk(document.blocks))
     linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
@@ -77,8 +77,10 @@ def _datatables() -> str:
     return pack(Path(itables.options.dt_bundle).read_text(encoding="utf-8"))
 
 
-def _motion(block: Motion) -> Markup:
-    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth))
+@lru_cache(maxsize=4)
+def motion(block: Motion) -> Markup:
+    """Return an animation. It is cached, because a report tries it before it renders the page."""
+    return Markup(animation.element(block.trajectories, block.labels, "animation", block.truth, block.values))
 
 
 def _whole(text: str) -> Markup:

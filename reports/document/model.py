@@ -89,6 +89,7 @@ class Emphasis(StrEnum):
     BODY = ""
     LEAD = "lead"
     NOTE = "note"
+    FAILED = "failed"  # stands for a part that could not be made
 
 
 @dataclass(frozen=True)
@@ -186,11 +187,15 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An animation, on the page alone: trajectories, their labels, and the index of the exact one (see `animation.element`)."""
+    """An animation, on the page alone: trajectories, their labels, the index of the exact one, and the numbers of each panel.
+
+    See `animation.element`.
+    """
 
     trajectories: Sequence[Trajectory]
     labels: Sequence[str]
     truth: int | None = None
+    values: Sequence[Mapping[str, Any] | None] | None = None
 
 
 @dataclass(frozen=True)

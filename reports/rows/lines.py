@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from conservative.attitude import from_quaternion
+from conservative.attitude import Array, from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, motion
@@ -15,6 +15,7 @@ from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..animation.frames import ERROR, drift_name
 from .names import of_measure, of_study, with_outcome
 
 ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
@@ -44,6 +45,17 @@ def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
         )
         for method, part in points.groupby("method", sort=False)
     }
+
+
+def largest_values(samples: pd.DataFrame, scene: Scene) -> dict[str, dict[str, Array]]:
+    """Return the largest drifts and attitude error so far of each method, by the names of `animation.frames`, at its states."""
+    rows = samples[(samples["study"] == motion.STUDY.name) & (samples["scene"] == scene.name)]
+    names = {motion.LARGEST + each.name: drift_name(each) for each in scene.invariants} | {motion.ERROR: ERROR}
+    found: dict[str, dict[str, Array]] = {}
+    for (method, quantity), part in rows.groupby(["method", "quantity"], sort=False):
+        if quantity in names:
+            found.setdefault(str(method), {})[names[quantity]] = part["value"].to_numpy()
+    return found
 
 
 def curves(samples: pd.DataFrame) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import pandas as pd
 
@@ -28,7 +29,10 @@ from conservative.references.worker.client import kill_workers
 from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
 from .plan import Plan
+from .provenance import Provenance
 
+SCHEMA = 2
+"""Version of the layout of measurements.json; a change that breaks a reader raises it."""
 COMPILERS = 4
 """Largest number of processes that compile kernels; each takes 0.3 GB."""
 COMPILATION_LIMIT = 300.0
@@ -50,6 +54,18 @@ class Measurements:
             measurement.frame(each for each in every if isinstance(each, Measurement)),
             measurement.samples_frame(each for each in every if isinstance(each, Samples)),
         )
+
+    def content(self, source: Provenance) -> dict[str, Any]:
+        """Return the content of measurements.json."""
+        return {"schema": SCHEMA, **vars(source), "rows": records(self.table)}
+
+
+def records(table: pd.DataFrame) -> list[dict[str, object]]:
+    """Return the rows of a table for JSON."""
+    return [
+        {str(name): value for name, value in row.items()}
+        for row in table.astype(object).where(table.notna(), None).to_dict("records")
+    ]
 
 
 def compile_kernels(plan: Plan, step: Step) -> None:

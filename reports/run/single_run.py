@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from conservative import registry
-from conservative.attitude import angle_between, orthonormality
-from conservative.errors import AccuracyNotReached, BadInput, MissingEngine
+from conservative.attitude import Array, angle_between, orthonormality
+from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid, grid_for
 from conservative.integration import one
 from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_loads
@@ -41,8 +41,8 @@ TIMED = 0.2
 """Time, s, for which a run of a table is repeated; a longer one is made once."""
 FIRST_STEPS = 10
 """Steps of the run that compiles a method before it is timed."""
-COMPARED = 200
-"""Largest number of samples that are compared with the reference solution, evenly chosen."""
+COMPARED = 20_000
+"""Largest number of intervals between samples that are compared with the reference solution; of longer runs, even ones are."""
 TURNS = 1000.0
 """Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
 LARGE = 0.1
@@ -170,10 +170,12 @@ def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None
 
 
 def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
-    """Return the trajectory on a grid; a failure ends it early."""
+    """Return the trajectory on a grid; a failure ends it early, or before its first sample if an engine crashes."""
     warn_of_loads(scene, method, grid)
     try:
         return method.solve(scene, grid)
+    except IntegrationFailed as failure:
+        return Trajectory(scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), method.label, failure=failure)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # as in `integrate`
 
@@ -189,36 +191,72 @@ def time_run(scene: Scene, method: Method, grid: Grid) -> tuple[Trajectory, floa
     return trajectory, wall_time
 
 
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The errors of a run against the reference solution at the same times.
+
+    Attributes: `truth`, the reference solution at the compared samples; `stride`, every how many samples of the run there is
+    one; `numbers` of the samples (n,), and their errors `attitude`, rad, and `rate`, rad/s, (n,).
+    """
+
+    truth: Trajectory
+    stride: int
+    numbers: Array
+    attitude: Array
+    rate: Array
+
+    def at_samples(self, n: int) -> Array:
+        """Return the largest attitude error so far, rad, at each of the n samples of the run."""
+        return np.maximum.accumulate(self.attitude)[np.searchsorted(self.numbers, np.arange(n), side="right") - 1]
+
+
+def compare(trajectory: Trajectory, grid: Grid, wanted: bool | None) -> Compared | str:
+    """Return the errors of a run on a grid, whose samples can end early, or the reason why there are none.
+
+    At most `COMPARED` intervals are compared. `wanted` None leaves out long runs without closed form (`TURNS`).
+    """
+    scene, n = trajectory.scene, len(trajectory)
+    if wanted is False:
+        return "not computed (--no-truth)"
+    if n < 2:
+        return "not computed, because the run has no step"
+    if wanted is None and Exact().unsupported(scene) is not None and np.linalg.norm(scene.w_WB_B0) * trajectory.t[-1] > TURNS:
+        return "not computed, because the reference solution of a long run takes long; --truth computes it"
+    stride, steps = math.ceil((n - 1) / COMPARED), int(grid.steps[n - 1])
+    try:
+        truth = solve(scene, Grid(grid.dt, steps, min(grid.every * stride, steps)))
+    except MissingEngine as missing:
+        return f"not computed: {missing}"
+    if not truth.ok:
+        return f"not computed: the reference solution ended: {truth.outcome}"
+    numbers = np.unique([*range(0, n, stride), n - 1])
+    attitude = angle_between(truth.R_WB, trajectory.R_WB[numbers])
+    return Compared(truth, stride, numbers, attitude, np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[numbers], axis=1))
+
+
 def find_errors(
     trajectory: Trajectory, grid: Grid, wanted: bool | None, scene_name: str | None, t_end: float | None
 ) -> dict[str, Any]:
-    """Return the largest errors against the reference solution, or the reason why there are none.
+    """Return the largest errors against the reference solution, or the reason why there are none; see `compare`.
 
-    At most `COMPARED` samples are compared. `attitude` is in rad and `rate` in rad/s. `wanted` None leaves out long runs
-    without closed form (`TURNS`). If the attitude error is above `LARGE`, `better` is the result of `find_better`.
+    `attitude` is in rad and `rate` in rad/s. If the attitude error is above `LARGE`, `better` is the result of `find_better`.
     `scene_name` and `t_end` are those of the command; without a name there is no search.
     """
-    scene = trajectory.scene
-    if wanted is False:
-        return {"reason": "not computed (--no-truth)"}
-    if not trajectory.ok:
+    if wanted is not False and not trajectory.ok:
         return {"reason": "not computed, because the run did not reach its end"}
-    if wanted is None and Exact().unsupported(scene) is not None and np.linalg.norm(scene.w_WB_B0) * trajectory.t[-1] > TURNS:
-        return {"reason": "not computed, because the reference solution of a long run takes long; --truth computes it"}
-    stride = math.ceil(grid.n_samples / COMPARED)
-    try:
-        truth = solve(scene, replace(grid, every=grid.every * stride))
-    except MissingEngine as missing:
-        return {"reason": f"not computed: {missing}"}
-    if not truth.ok:
-        return {"reason": f"not computed: the reference solution ended: {truth.outcome}"}
-    compared = np.unique([*range(0, len(trajectory), stride), len(trajectory) - 1])
-    attitude = angle_between(truth.R_WB, trajectory.R_WB[compared])
-    rate = np.linalg.norm(truth.w_WB_B - trajectory.w_WB_B[compared], axis=1)
-    errors = {"attitude": float(attitude.max()), "rate": float(rate.max()), "samples": len(compared), "truth": truth.label}
-    if scene_name is None or attitude.max() <= LARGE:
+    found = compare(trajectory, grid, wanted)
+    errors = describe_errors(found)
+    if isinstance(found, str) or scene_name is None or errors["attitude"] <= LARGE:
         return errors
-    return errors | {"better": find_better(truth, grid, stride, scene_name, t_end)}
+    return errors | {"better": find_better(found.truth, grid, found.stride, scene_name, t_end)}
+
+
+def describe_errors(found: Compared | str) -> dict[str, Any]:
+    """Return the summary of errors: the largest ones, the number of compared samples and the label of the truth."""
+    if isinstance(found, str):
+        return {"reason": found}
+    largest = {"attitude": float(found.attitude.max()), "rate": float(found.rate.max())}
+    return largest | {"samples": len(found.numbers), "truth": found.truth.label}
 
 
 def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_end: float | None) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import pandas as pd
 
@@ -11,6 +12,7 @@ from conservative.scene import Scene
 
 from ..charts import figures, spheres, vega_embed
 from ..charts.style import families_of
+from ..document.attempt import attempt
 from ..document.model import Emphasis, Figure, Layout, Paragraph, Section, filled
 from ..rows import lines
 from .measured import Measured, of_scene
@@ -26,7 +28,8 @@ _WHY = (
 def section(measured: Measured, found: Sequence[Result]) -> Section:
     """Return the section, about the methods of `tumbling.results`."""
     scene, methods = measured.main_scene, drawn(found)
-    drawings = (draw(measured, scene, methods) for draw in (drift_figure, spheres_figure))
+    draw = {"The chart of drift": drift_figure, "The curves on spheres": spheres_figure}
+    drawings = [attempt(what, partial(each, measured, scene, methods)) for what, each in draw.items()]
     return Section("Where drift comes from", filled(Paragraph(_WHY, Emphasis.LEAD), *drawings), "drift", "Drift")
 
 

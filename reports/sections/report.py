@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from functools import cache, partial
+from typing import Any, TypeVar
 
 import pandas as pd
 
@@ -11,7 +13,8 @@ from conservative.benchmarks.studies import random
 from conservative.benchmarks.studies.declaration import Named
 from conservative.benchmarks.studies.studies import STUDIES
 
-from ..document.model import Document, Links, Paragraph, Section
+from ..document.attempt import attempt
+from ..document.model import Block, Document, Links, Paragraph, Section
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
@@ -37,53 +40,81 @@ from . import (
 )
 from .measured import Measured, of_scene
 
+T = TypeVar("T")
 SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time, motions, twins)}
 """Sections of the rows and samples of one study, by its name."""
-SCHEMA = 2
-"""Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
 
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> Document:
-    """Return the document of measurements. Every number that a report shows is computed here; nothing is measured."""
+    """Return the document of measurements. Every number that a report shows is computed here; nothing is measured.
+
+    A section that cannot be made is a sentence (see `attempt`), and a failure of the document.
+    """
     measured = Measured(plan, measurements, source)
-    found = tumbling.results(measured)
+    found = cache(lambda: tumbling.results(measured))
     points = {scene.name: of_scene(measured.points, scene.name) for scene in plan.scenes}
-    summaries = {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes}
+    summaries = cache(lambda: {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes})
     rows = measured.scene_rows
-    details: list[Section] = [ratios.section(measured)]
+
+    def part(title: str, make: Callable[[], T]) -> T | Paragraph:
+        return attempt(f"The section {title!r}", make)
+
+    def random_section() -> Section:
+        return random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows))
+
+    details: list[Block] = [part("ratios", lambda: ratios.section(measured))]
     if random.STUDY.name in plan.names:
-        details.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows)))
-    details += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
+        details.append(part("random bodies", random_section))
+    for scene in plan.scenes:
+        make = partial(lambda scene: scenes.section(measured, scene, summaries()[scene.name]), scene)
+        details.append(part(f"all tables of {scene.name}", make))
     of_engines = {name: part for name, part in SECTIONS.items() if STUDIES[name].named is Named.ONLY}
-    pages = engine_page.pages(measured, of_engines) if plan.engines else {}
+    pages = part("pages of engines", lambda: engine_page.pages(measured, of_engines)) if plan.engines else {}
+    if isinstance(pages, Paragraph):
+        details.append(pages)
+        pages = {}
     if pages:
-        section = engines.section(measured)
         links = Links([(f"Page of {page.title}", f"{name}.html") for name, page in pages.items()])
-        details.append(replace(section, blocks=[links, *section.blocks]))
-    for name, part in SECTIONS.items():
+        section = part("engines", lambda: engines.section(measured))
+        linked = replace(section, blocks=[links, *section.blocks]) if isinstance(section, Section) else section
+        details.append(linked)
+    for name, each in SECTIONS.items():
         if name in plan.names:
-            details.append(replace(part.section(measured.rows, measured.samples), source={"study": name}))
-    details += hard_cases.sections(measured.rows)
-    details.append(failures.section(rows))
-    blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
-    blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]
-    tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]
-    sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
-    sentences += [each.sentence for each in summaries.values()]
+            section = part(name, partial(each.section, measured.rows, measured.samples))
+            details.append(replace(section, source={"study": name}) if isinstance(section, Section) else section)
+    cases = part("hard cases", lambda: hard_cases.sections(measured.rows))
+    details += [cases] if isinstance(cases, Paragraph) else cases
+    details.append(part("failures", lambda: failures.section(rows)))
+    folded = [replace(each, folded=True) if isinstance(each, Section) else each for each in details]
+    blocks: list[Block] = [
+        part("motion", lambda: tumbling.section(measured, found())),
+        part("speed", lambda: speed.section(measured, summaries())),
+        part("drift", lambda: drift.section(measured, found())),
+        part("advice", lambda: advice.section(measured)),
+    ]
+    origin = part("provenance", lambda: provenance.section(measured, folded))
+    blocks += [origin] if isinstance(origin, Section) else [origin, *folded]
     return Document(
         "conservative report",
         "conservative: which integrator for a rotating body?",
         blocks,
-        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *engines.tables(measured), *map(Paragraph, sentences)],
-        data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
+        brief=list(brief(measured, points, summaries)),
+        data=measurements.content(source),
         failures=failures.failures_of_ours(rows),
         pages=pages,
     )
 
 
-def records(table: pd.DataFrame) -> list[dict[str, object]]:
-    """Return the rows of a table for JSON."""
-    return [
-        {str(name): value for name, value in row.items()}
-        for row in table.astype(object).where(table.notna(), None).to_dict("records")
-    ]
+def brief(
+    measured: Measured, points: Mapping[str, pd.DataFrame], summaries: Callable[[], Mapping[str, summary.Summary]]
+) -> Iterator[Block]:
+    """Yield what the terminal shows: a table of each scene, and sentences."""
+    for name, each in points.items():
+        yield attempt(f"The table of {name}", partial(closing.scene_table, measured.rows, each, name))
+    yield Paragraph(f"{closing.LEGEND}\n")
+    tables = attempt("The tables of engines", lambda: engines.tables(measured))
+    yield from [tables] if isinstance(tables, Paragraph) else tables
+    if measured.ratios:
+        yield attempt("The sentence on random bodies", lambda: Paragraph(random_bodies.sentence(measured.ratios)))
+    found = attempt("The summary", lambda: [Paragraph(each.sentence) for each in summaries().values()])
+    yield from [found] if isinstance(found, Paragraph) else found

@@ -15,6 +15,7 @@ from conservative.scene import Scene
 
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
+from ..document.attempt import attempt
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Emphasis, Figure, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
@@ -48,7 +49,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         f"relative to `{DEFAULT_METHOD}`."
     )
     work: list[Block] = [
-        work_figure(points, name),
+        attempt(f"The chart of time against error of {name}", lambda: work_figure(points, name)),
         Paragraph(SAMPLE_TERMS, Emphasis.NOTE),
     ]
     if decades.rows:
@@ -57,8 +58,10 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     fits = lines.fits(errors)
     orders = filled(order(fits, lines.fits(rate_errors), name), accuracy(rows, name))
-    curves = spheres_figure(measured, scene)
-    long_times = filled(drift_figure(measured, scene), Paragraph(drift_words), conservation(rows, name))
+    curves = attempt(f"The curves of {name}", lambda: spheres_figure(measured, scene))
+    over_time = attempt(f"The chart of drift of {name}", lambda: drift_figure(measured, scene))
+    long_times = filled(over_time, Paragraph(drift_words), conservation(rows, name))
+    converging = attempt(f"The chart of convergence of {name}", lambda: convergence_figure(errors, fits, name))
     return Section(
         f"All tables of {name}",
         filled(
@@ -69,7 +72,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Section(
                 "Drift at the scene's own step", filled(drift(rows, name)), folded=True, source={"study": paper.STUDY.name}
             ),
-            Section("Convergence", [convergence_figure(errors, fits, name), Paragraph(order_words)]),
+            Section("Convergence", [converging, Paragraph(order_words)]),
             Section(
                 "Orders and errors as tables", orders, folded=True, source={"study": (convergence.STUDY.name, paper.STUDY.name)}
             ),

@@ -11,6 +11,7 @@ from conservative.benchmarks.contest import costs
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours
+from ..document.attempt import attempt
 from ..document.cells import factor, tolerance
 from ..document.model import Emphasis, Figure, Layout, LegendEntry, Paragraph, Section, filled
 from ..rows.names import MethodClass, of_classes
@@ -36,7 +37,12 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
         random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
     lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
-    blocks = filled(lead, figure(pictures), Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE))
+    chart = attempt("The chart of time against error", lambda: figure(pictures))
+    blocks = filled(
+        lead,
+        chart,
+        Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE),
+    )
     return Section("How wrong, how fast", blocks, "speed", "Speed")
 
 

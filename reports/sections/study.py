@@ -17,10 +17,10 @@ from ..document.model import Block, Document, Facts, Figure, Paragraph, Row, Sec
 from ..rows import lines
 from ..rows.names import with_names
 from ..rows.points import points
-from ..run.measure import Measurements
+from ..run.measure import Measurements, records
 from . import random_bodies, scenes
 from .measured import of_scene
-from .report import SECTIONS, records
+from .report import SECTIONS
 
 
 def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:

@@ -16,8 +16,9 @@ from conservative.method import Role
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
+from ..document.attempt import attempt
 from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
-from ..document.model import Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
+from ..document.model import Block, Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_classes, of_measure, of_study, outcomes
 from .hard_cases import RIGHT, USABLE
@@ -79,18 +80,29 @@ def drawn(found: Sequence[Result]) -> list[str]:
 def section(measured: Measured, found: Sequence[Result]) -> Section:
     """Return the section, from the `results`."""
     scene = measured.main_scene
+    subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
+    moving = attempt(f"The animation of {scene.name}", lambda: animation(measured, scene, found))
+    lead = Paragraph(_sentence(found, scene), Emphasis.LEAD)
+    blocks = filled(lead, *([moving] if isinstance(moving, Paragraph) else moving), table(found, scene))
+    source = {"study": STUDIES, "scene": scene.name}
+    return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
+
+
+def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list[Block]:
+    """Return the animation of the exact motion and of the `drawn` results, and its legend; nothing without samples."""
     motions = lines.trajectories(measured.samples, scene)
-    names = {each.method: each.line for each in found}
+    names, values = {each.method: each.line for each in found}, lines.largest_values(measured.samples, scene)
     truth = set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"])
     exact = [method for method in motions if method in truth]
     shown = [*exact, *(method for method in drawn(found) if method in motions)]
-    motion = Motion([motions[name] for name in shown], [names.get(name, "exact") for name in shown], 0 if exact else None)
-    subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    signs = Paragraph("Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far.", Emphasis.NOTE)
-    lead, moving = Paragraph(_sentence(found, scene), Emphasis.LEAD), (motion, signs) if shown else ()
-    blocks = filled(lead, *moving, table(found, scene))
-    source = {"study": STUDIES, "scene": scene.name}
-    return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
+    if not shown:
+        return []
+    signs = "Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far."
+    if exact and (end := motions[exact[0]].t[-1]) < scene.t_end * (1 - 1e-9):
+        signs += f" Only the first {end:.3g} s are drawn, because the body turns too often."
+    labels = [names.get(name, "exact") for name in shown]
+    motion = Motion([motions[name] for name in shown], labels, 0 if exact else None, [values.get(name) for name in shown])
+    return [motion, Paragraph(signs, Emphasis.NOTE)]
 
 
 def _sentence(found: Sequence[Result], scene: Scene) -> str:

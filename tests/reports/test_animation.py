@@ -87,7 +87,8 @@ def test_a_run_that_ended_early_has_fewer_frames(motions):
         motions[0], t=motions[0].t[:100], R_WB=motions[0].R_WB[:100], w_WB_B=motions[0].w_WB_B[:100], failure=Diverged(0.99)
     )
     times, panels = make_panels([cut, motions[1]], ["a", "b"], 1)
-    assert len(panels[0].R_WP) == np.count_nonzero(times <= 0.99) < len(panels[1].R_WP) == len(times)
+    assert len(panels[0].R_WP) == np.count_nonzero(times < 0.99) + 1 < len(panels[1].R_WP) == len(times)
+    assert angle_between(panels[0].R_WP[-1], cut.R_WB[-1] @ BODY.R_BP) < 1e-7  # its last sample; angles of round-off are 1e-8
     assert panels[0].outcome == str(cut.outcome)
 
 

@@ -19,10 +19,10 @@ from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import split_list, split_names
 from conservative.reports.document.model import Document
+from conservative.reports.run.measure import SCHEMA
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import failures
-from conservative.reports.sections.report import SCHEMA
 
 from ..declared import ENGINES, FULL, MAIN, ONLY
 from .made_up import measurements
