@@ -67,7 +67,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     details.append(failures.section(rows))
     blocks = [tumbling.section(measured, found), speed.section(measured, summaries), drift.section(measured, found)]
     blocks += [advice.section(measured), provenance.section(measured, [replace(each, folded=True) for each in details])]
-    tables = [closing.scene_table(measured.rows, points[scene.name], scene.name) for scene in plan.scenes]
+    tables = [closing.scene_table(measured.rows, points[each.name], each, bool(plan.named)) for each in plan.scenes]
     sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
     sentences += [each.sentence for each in summaries.values()]
     return Document(
