@@ -48,7 +48,7 @@ _WIDTH, _HEIGHT = 480, 160
 
 
 def rounded_up(value: float, digits: int) -> float:
-    """Return a size, such as an error or a drift, away from 0 to `digits` digits, so that no smaller one is shown than found."""
+    """Return a size, such as an error or a drift, rounded away from 0 to `digits` digits: what is shown is never too small."""
     if not math.isfinite(value):
         return value
     # Of the 15 digits that a double has for certain, so that 0.1 and 100 * 0.07 = 7.000000000000001 stay 0.1 and 7.

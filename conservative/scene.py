@@ -28,7 +28,7 @@ from .errors import BadInput
 from .flight import Flight, read_flight
 from .identity import NOT_OF_MOTION, digest
 from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
-from .needs import LOADS, Needs, needs_of
+from .needs import LOADS, Need, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.smoothness import SMOOTH, Smoothness, examine
@@ -192,6 +192,11 @@ class Scene(PickledByFields):
         """The torque, the damping and the momentum of the rotor, as far as they are not constant."""
         parts = self.torque, self.damping and self.damping.of_time, self.body.motor
         return tuple(load for load in parts if load and not load.constant)
+
+    @property
+    def calls_python(self) -> bool:
+        """True if steps call Python functions, so that one takes as long as the functions need."""
+        return bool(self.loads) or not self.needs.isdisjoint((Need.FUNCTION, Need.TIME))
 
     @property
     def breaks(self) -> Array:

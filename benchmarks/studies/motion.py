@@ -21,6 +21,7 @@ from conservative.outcome import Outcome
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
+from conservative.scene import Scene
 from conservative.trajectory import Trajectory, head
 
 from ..measures import errors
@@ -56,13 +57,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
         grid = Grid(scene.t_end / FRAMES, FRAMES)
         solver = Exact() if Exact().unsupported(scene) is None else Precise()
         yield from _lines(Case(study.name, scene, solver, grid), study.truth(scene, grid).trajectory)
-        for method in study.competitors:
+        runs = {method: list_runs(study, scene, method, method in drawn) for method in study.competitors}
+        skipped = study.skip_slow([each[-1] for each in runs.values()], [each[0] for each in runs.values() if len(each) > 1])
+        for method, cases in runs.items():
             tell(f"{scene.name}: {method.name}")
-            step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
-            first = grid_for(scene, step)
-            for end in (*([end_of(scene)] if method in drawn else []), scene.t_end):
-                case = Case(study.name, scene, method, grid_for(scene, step, end))
-                done = study.attempt(case)
+            first = cases[-1].grid
+            for case in cases:
+                done = skipped.get(case) or study.attempt(case)
                 if isinstance(done, Success):
                     begin = head(done.trajectory, first.n_samples)
                     yield from case.rows(errors.measure_errors(begin, study.truth(scene, first).trajectory))
@@ -71,6 +72,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
                     break
             if isinstance(done, Outcome):
                 yield from case.rows(errors.blanks(scene), done)
+
+
+def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[Case]:
+    """Return the runs of a method of which the first that succeeds is shown: ten durations if it is drawn, and one."""
+    step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
+    ends = dict.fromkeys((*([end_of(scene)] if drawn else []), scene.t_end))
+    return [Case(study.name, scene, method, grid_for(scene, step, end)) for end in ends]
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:

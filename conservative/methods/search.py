@@ -25,7 +25,6 @@ from .. import registry
 from ..errors import MissingEngine
 from ..grid import Grid
 from ..method import Method, Role
-from ..needs import Need
 from ..scene import Scene
 from .trials import Trials, convergence_factor, parts_for
 from .units import bound_rate
@@ -176,8 +175,7 @@ def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: floa
     duration = min(t_end, PROBE_RADIANS / rate)
     error *= min(1.0, 4 * duration / t_end)
     likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
-    calling = scene.loads or not scene.needs.isdisjoint((Need.FUNCTION, Need.TIME))
-    dt = min(duration / 2, method.card.longest / rate, math.inf if calling else likely)
+    dt = min(duration / 2, method.card.longest / rate, math.inf if scene.calls_python else likely)
     if scene.loads:  # runs at two and four times the step have to differ everywhere (`conservative.methods.pieces`)
         breaks, step, _ = scene.smoothness(t_end)
         dt = min(dt, step, t_end / 4 / (1 + np.count_nonzero(breaks < t_end)))
