@@ -59,7 +59,8 @@ class Study:
     truth
         Source of reference solutions; studies of the same scenes can share it.
     time_limit
-        Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
+        Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points, and slow runs on a scene
+        take up to `SLOW_FACTOR` budgets together (see `skip_slow`).
     processes
         Number of processes that time the same runs in turn, for an interval of each ratio; see `measures.processes`.
     drawn
