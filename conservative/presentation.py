@@ -5,7 +5,9 @@ The argument `trajectory` is always a `Trajectory`, whose file imports this one.
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
+from decimal import ROUND_UP, Context, Decimal
 from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -43,6 +45,14 @@ TIME_UNITS = (("days", 86400.0), ("h", 3600.0), ("s", 1.0))
 """Units of time axes by their length, s. A unit is used from a duration of two on."""
 
 _WIDTH, _HEIGHT = 480, 160
+
+
+def rounded_up(value: float, digits: int) -> float:
+    """Return a size, such as an error or a drift, rounded away from 0 to `digits` digits: what is shown is never too small."""
+    if not math.isfinite(value):
+        return value
+    # Of the 15 digits that a double has for certain, so that 0.1 and 100 * 0.07 = 7.000000000000001 stay 0.1 and 7.
+    return float(Context(digits, ROUND_UP).create_decimal(Decimal(f"{value:.15g}")))
 
 
 def samples(trajectory: Any) -> Array:

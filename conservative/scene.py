@@ -244,6 +244,11 @@ class Scene(PickledByFields):
         return tuple(load for load in parts if load and not load.constant)
 
     @property
+    def calls_python(self) -> bool:
+        """True if steps call Python functions, so that one takes as long as the functions need."""
+        return bool(self.loads) or not self.needs.isdisjoint((Need.FUNCTION, Need.TIME))
+
+    @property
     def breaks(self) -> Array:
         """Times (n,) above 0 at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
         return self.now().smoothness().breaks

@@ -238,7 +238,8 @@ class Trajectory:
             ("work", ", ".join(f"{count} {name}" for name, count in self.work.items())),
         ]
         drifts = ((each.name, sizes(self.drift(each)).max(initial=0.0)) for each in self.scene.invariants)
-        return presentation.html_table("Trajectory", [*rows, *((f"drift of {k}", f"{x:.2e} (relative)") for k, x in drifts)])
+        rows += [(f"drift of {name}", f"{presentation.rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
+        return presentation.html_table("Trajectory", rows)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -120,7 +120,7 @@ def test_a_changed_measurement_makes_it_stale(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(4e-16, "< 1e-15"), (3.2e-12, "3e-12"), (1.7e-6, "2e-6"), (0.0547, "0.05"), (0.72, "0.7"), (3.1, "3")]
+    ("value", "text"), [(4e-16, "< 1e-15"), (3.21e-12, "3.3e-12"), (1.69e-6, "1.7e-6"), (0.0547, "0.055"), (0.721, "0.73")]
 )
 def test_small_numbers(value, text):
     assert load("measured").small(value) == text

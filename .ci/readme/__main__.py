@@ -2,8 +2,8 @@
 
     python .ci/readme                    # write them
     python .ci/readme --check            # exit with 1 if one of them is not current
-    python .ci/readme --report FOLDER --times FOLDER [FOLDER ...] --random FOLDER --each-step FOLDER --many FOLDER
-        --typed --price --calls
+    python .ci/readme --accuracy FOLDER --moving FOLDER --report FOLDER --times FOLDER [FOLDER ...] --random FOLDER
+        --each-step FOLDER --many FOLDER --chosen --typed --price --calls
 
 The last form first replaces rows of measured.csv, from the folders of a report and of studies, and the picture. Options can be
 left out; the rows of others stay. CONTRIBUTING.md has the commands that make the folders.
@@ -41,7 +41,9 @@ def measure_again(options: argparse.Namespace) -> None:
     import typed
 
     made = {
-        measured.REPORT: measure.scene_rows(options.report) if options.report else None,
+        measured.ACCURACY: measure.accuracy_rows(options.accuracy) if options.accuracy else None,
+        measured.PICTURE: measure.picture_rows(options.moving) if options.moving else None,
+        measured.CHOSEN: measure.chosen_rows() if options.chosen else None,
         measured.TIMES: measure.time_rows(options.times) if options.times else None,
         measured.BODIES: measure.random_rows(options.random) if options.random else None,
         measured.TYPED: typed.typed_rows(measure.SEED) if options.typed else None,
@@ -67,7 +69,9 @@ def main(root: Path = ROOT) -> None:
     )
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page is not current")
     folders = {
-        "report": "drifts, errors and the picture of README",
+        "accuracy": "drifts and errors of README",
+        "moving": "drifts and errors of the moving picture of README",
+        "report": "the picture of time against error of README",
         "random": "random bodies",
         "each-step": "the scene's steps, in the table of three scenes",
         "many": "the table of many bodies",
@@ -77,6 +81,7 @@ def main(root: Path = ROOT) -> None:
     parser.add_argument(
         "--times", nargs="+", type=Path, metavar="FOLDER", help="times of README and of the table of three scenes"
     )
+    parser.add_argument("--chosen", action="store_true", help="measure the drifts of the methods that are chosen")
     parser.add_argument("--typed", action="store_true", help="measure the table of typed tolerances")
     parser.add_argument("--price", action="store_true", help="measure the table of prices, in new processes")
     parser.add_argument("--calls", action="store_true", help="measure the table of calls")

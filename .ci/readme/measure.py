@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,9 @@ import pandas as pd
 from conservative import registry
 from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.errors import AccuracyNotReached
+from conservative.integration.one import integrate
+from conservative.invariants import sizes
 from conservative.reports.document.cells import tolerance
 from conservative.reports.rows.names import MethodClass, of_classes, with_names
 from conservative.reports.rows.points import points
@@ -29,6 +33,16 @@ ENGINES = {"heyoka": "heyoka", "SciPy": "scipy:loop=compiled", "MuJoCo": "mujoco
 FAMILIES = {name: method.partition(":")[0] for name, method in ENGINES.items()}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
+ACCURACY = (
+    "conservative study paper --scenes brick_flip,lagrange_top"
+    " --methods reduced,taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
+)
+MOVING = {
+    **{"MuJoCo, default": "mujoco:integrator=Euler", "MuJoCo, RK4": "mujoco", "PyBullet": "pybullet"},
+    "reduced": "reduced",
+}
+"""The motions of README's first picture, and the most accurate setting of an engine in it."""
+PICTURE = "conservative study motion --scenes brick_flip --methods mujoco,pybullet,reduced"
 METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 TIMES = (
     f"conservative study work_precision --scenes brick_flip,lagrange_top,asymmetric_top {METHODS}",
@@ -51,12 +65,45 @@ EACH = ("the scene's steps, all stored", "without the conversion of an engine's 
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy:loop=compiled")
 
 
-def scene_rows(report: Path) -> Iterator[dict[str, Any]]:
-    """Yield drifts and errors on the paper's two scenes, as dictionaries with the keys `COLUMNS`."""
-    table = _read(report / "measurements.csv")
-    for scene in CLOSED_FORMS:
-        for row in _run_rows(table[table["scene"] == scene], scene):
-            yield row | {"command": "conservative report", "date": _date(report / "measurements.csv")}
+def accuracy_rows(accuracy: Path) -> Iterator[dict[str, Any]]:
+    """Yield drifts and errors on the paper's two scenes at the scene's step, as dictionaries with the keys `COLUMNS`."""
+    table = _read(accuracy / "study.csv")
+    common = {"command": ACCURACY, "date": _date(accuracy / "study.csv")}
+    for scene, closed in CLOSED_FORMS.items():
+        here = table[table["scene"] == scene]
+        here = here[here["dt"] == here["dt"].max()]
+        for name, method in {"ours": GENERAL, "closed form": closed, **ENGINES, "reduced": "reduced"}.items():
+            yield from (common | {"scene": scene, "name": name} | row for row in _run_rows(here[here["method"] == method]))
+
+
+def picture_rows(motion: Path) -> Iterator[dict[str, Any]]:
+    """Yield drifts and errors of the methods of README's first picture, and of MuJoCo's other setting."""
+    table = _read(motion / "study.csv")
+    common = {"scene": "picture", "command": PICTURE, "date": _date(motion / "study.csv")}
+    for name, method in MOVING.items():
+        run = table[table["method"] == method]
+        yield from (common | {"name": name} | row for row in _run_rows(run))
+        facts = {"version": run["version"].iloc[0], "method": method, "quantity": "step", "unit": "s"}
+        yield common | {"name": name, **facts, "value": run["dt"].iloc[0]}
+
+
+def chosen_rows() -> Iterator[dict[str, Any]]:
+    """Yield the largest drift on each registered scene, of the method that `integrate(scene, error=1e-6)` chooses."""
+    common = {"name": "chosen method", "quantity": "largest drift", "unit": "1", "version": ""}
+    common |= {"command": "python .ci/readme --chosen", "date": datetime.datetime.now(datetime.UTC).date().isoformat()}
+    for name in registry.list_scenes():
+        method, drift = chosen_drift(name)
+        yield common | {"scene": name, "method": method, "value": drift}
+
+
+def chosen_drift(name: str) -> tuple[str, float]:
+    """Return the method that is chosen for a scene, and the largest drift of its invariants."""
+    scene = registry.scene(name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyNotReached)  # of a separatrix, whose rounding alone exceeds the error
+        run = integrate(scene, error=ERROR)
+    assert run.choice is not None
+    return run.choice.method.name, max(float(sizes(run.drift(each)).max()) for each in scene.invariants)
 
 
 def time_rows(folders: list[Path]) -> Iterator[dict[str, Any]]:
@@ -124,14 +171,13 @@ def many_rows(throughput: Path) -> Iterator[dict[str, Any]]:
             yield from (common | {"date": _date(throughput / "study.csv")} | row for row in _ratio_rows({}, contest))
 
 
-def _run_rows(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
-    """Yield drift and error of one run at the scene's own step: of each row of README's table, and of `Reduced`."""
-    paper = table[(table["study"] == "paper") & (table["dt"] == table[table["study"] == "paper"]["dt"].max())]
-    for name, method in {"ours": GENERAL, "closed form": CLOSED_FORMS[scene], **ENGINES, "reduced": "reduced"}.items():
-        run = paper[paper["method"] == method]
-        common = {"scene": scene, "name": name, "version": run["version"].iloc[0], "method": method}
-        yield common | {"quantity": "drift", "unit": "1", "value": run[run["measure"] == "drift max"]["value"].max()}
-        yield common | {"quantity": "error", "unit": "rad", "value": _error(run)}
+def _run_rows(run: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Yield the drift of each invariant, and the error, of one run."""
+    common = {"version": run["version"].iloc[0], "method": run["method"].iloc[0]}
+    for _, drift in run[run["measure"] == Measure.DRIFT_MAX.text].iterrows():
+        yield common | {"quantity": f"drift of {drift['quantity']}", "unit": "1", "value": drift["value"]}
+    error = run[run["measure"] == Measure.ATTITUDE_MAX.text]["value"].iloc[0]
+    yield common | {"quantity": "error", "unit": "rad", "value": error}
 
 
 def _time_rows(timed: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
@@ -159,10 +205,6 @@ def _ratio_rows(place: dict[str, Any], each: Contest | Ratios) -> Iterator[dict[
     """Yield heyoka's time over ours and the ends of its interval."""
     for quantity, value in zip(("", ", low", ", high"), (each.ratio, *each.interval), strict=True):
         yield place | {"quantity": f"heyoka's time over ours{quantity}", "value": value, "unit": "1", "method": ""}
-
-
-def _error(run: pd.DataFrame) -> float:
-    return float(run[run["measure"] == "attitude error max"]["value"].iloc[0])
 
 
 def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:

@@ -9,13 +9,22 @@ from pathlib import Path
 import jinja2
 from marks import table
 
+from conservative.reports.document.cells import angle, bound, tolerance
+
 HERE = Path(__file__).resolve().parent
 ROWS = HERE / "measured.csv"
-REPORT, TIMES, BODIES, TYPED, SCENES = "report", "times", "random bodies", "typed tolerance", "three scenes"
+ACCURACY, TIMES, BODIES, TYPED, SCENES = "accuracy", "times", "random bodies", "typed tolerance", "three scenes"
+PICTURE, CHOSEN = "picture", "chosen method"
 EACH_STEP, MANY, PRICE, CALLS = "each step", "many bodies", "price", "call"
 """Parts of measured.csv, in its order: times are those of README and of the table of three scenes without the scenes' steps."""
 STEPS = ", the scene's steps", ", without the conversion"
 RATIO, GENERAL, CLOSED = "heyoka's time over ours", "our general integrators", "our closed forms"
+KEPT = [
+    (scene, invariant)
+    for scene, momentum in (("brick_flip", "momentum"), ("lagrange_top", "vertical momentum"))
+    for invariant in ("energy", momentum)
+]
+"""What the paper's map conserves."""
 VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4"}
 
 
@@ -27,19 +36,19 @@ def read_rows() -> list[dict[str, str]]:
 
 def part_of(row: dict[str, str]) -> str:
     """Return the part to which a row belongs."""
-    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, TYPED, MANY, PRICE, CALLS)]
+    known = [each for each in (row["name"], row["scene"]) if each in (BODIES, TYPED, MANY, PRICE, CALLS, PICTURE, CHOSEN)]
     if known:
         return known[0]
     if "," in row["scene"]:
         return EACH_STEP if any(each in row["scene"] for each in STEPS) else TIMES
-    return REPORT if row["quantity"] in ("drift", "error") else TIMES
+    return ACCURACY if row["quantity"] == "error" or row["quantity"].startswith("drift of ") else TIMES
 
 
 def read_values() -> tuple[dict[tuple[str, str, str], float], dict[str, str], str]:
-    """Return the values by scene, name and quantity, the versions by name, and the last date of README's rows."""
+    """Return the values by scene, name and quantity, the versions by name, and the last date of README's times."""
     rows = read_rows()
     values = {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows}
-    dates = [row["date"] for row in rows if part_of(row) in (REPORT, TIMES, BODIES)]
+    dates = [row["date"] for row in rows if part_of(row) in (TIMES, BODIES)]
     return values, {row["name"]: row["version"] for row in rows if row["version"]}, max(dates)
 
 
@@ -52,7 +61,7 @@ def render_readme() -> str:
     """Return the text of README.md."""
     values, versions, date = read_values()
     environment = jinja2.Environment(keep_trailing_newline=True, undefined=jinja2.StrictUndefined)
-    environment.filters |= {"two_digits": two_digits, "small": small, "ratio": ratio_text}
+    environment.filters |= {"two_digits": two_digits, "small": small, "angle": angle, "bound": bound, "ratio": ratio_text}
     return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
         value=lambda *key: values[key],
         interval=lambda *place: interval(values, *place),
@@ -67,6 +76,10 @@ def render_readme() -> str:
         bodies=lambda quantity: values["all fields", BODIES, quantity],
         many=[value for key, value in values.items() if key[1:] == (MANY, RATIO) and key[0].startswith("one body, median")],
         slower=[place for place, *key in values if key == [GENERAL, f"{RATIO}, high"] and values[place, *key] < 1],
+        moving=lambda *key: values[PICTURE, *key],
+        kept=lambda name: max(values[scene, name, f"drift of {invariant}"] for scene, invariant in KEPT),
+        power=power,
+        chosen=[value for key, value in values.items() if key[1] == CHOSEN],
         version=versions,
         date=date,
     )
@@ -101,15 +114,15 @@ def render_typed() -> str:
     places = [place.rsplit(" ", 1) for place, *key in values if key == [TYPED, RATIO]]
     fields, tolerances = (list(dict.fromkeys(each)) for each in zip(*places, strict=True))
     lines = []
-    for tolerance in tolerances:
-        ratios = [ratio_text(interval(values, f"{field} {tolerance}", TYPED)) for field in fields]
-        every = f"all fields {tolerance}", TYPED
+    for typed in tolerances:
+        ratios = [ratio_text(interval(values, f"{field} {typed}", TYPED)) for field in fields]
+        every = f"all fields {typed}", TYPED
         single = [f"{values[*every, f'{RATIO}, {end}']:#.3g}" for end in ("smallest", "largest")]
         errors = [
-            " to ".join(f"{values[*every, f'{side}, {name} error']:.0e}".replace("e-0", "e-") for name in ("median", "largest"))
+            " to ".join(bound(values[*every, f"{side}, {name} error"], 1) for name in ("median", "largest"))
             for side in ("ours", "heyoka")
         ]
-        lines.append([f"{float(tolerance):.0e}".replace("e-0", "e-"), *ratios, " to ".join(single), *errors])
+        lines.append([f"{float(typed):.0e}".replace("e-0", "e-"), *ratios, " to ".join(single), *errors])
     head = ["tolerance", *(field.replace("_", " ") for field in fields), "single bodies"]
     return table([*head, "our error, rad", "heyoka's error, rad"], lines) + f"\n{origin(TYPED)}\n"
 
@@ -164,11 +177,7 @@ def render_price() -> str:
     for side in sides:
         line = [f"{side} {versions[side]}" if side in versions else side]
         for name, unit in quantities.items():
-            text = (
-                f"{value[side, name]:.1e}".replace("e-0", "e-")
-                if unit == "rad"
-                else f"{value[side, name]:#.2g}".removesuffix(".")
-            )
+            text = bound(value[side, name]) if unit == "rad" else f"{value[side, name]:#.2g}".removesuffix(".")
             least = unit != "rad" and value[side, name] == min(value[each, name] for each in sides)
             line.append(f"**{text}**" if least else text)
         lines.append(line)
@@ -207,8 +216,13 @@ def two_digits(value: float) -> str:
 
 
 def small(value: float) -> str:
-    """Return an error or a drift to one digit; below 1e-15 it is round-off."""
-    return "< 1e-15" if value < 1e-15 else f"{value:.0e}".replace("e-0", "e-") if value < 0.01 else f"{value:.1g}"
+    """Return a drift, rounded up; below 1e-15 it is round-off."""
+    return "< 1e-15" if value < 1e-15 else bound(value)
+
+
+def power(value: float) -> str:
+    """Return the smallest power of ten that is not below a value."""
+    return tolerance(10.0 ** math.ceil(math.log10(value)))
 
 
 def render_range() -> str:

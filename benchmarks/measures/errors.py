@@ -20,6 +20,9 @@ from .measure import Measure, Value
 CONSERVED, SMALL = 1e-10, 1e-3
 """Relative drift up to which a quantity is conserved, and up to which its drift is small."""
 
+OF_TRUTH = ", loads of the truth"
+"""Ends the name of the drift of a balance with the work or impulse of the truth."""
+
 
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     """Return every measure of a trajectory; `blanks(trajectory.scene)` returns the same measures without values.
@@ -82,7 +85,7 @@ def measure_drifts(trajectory: Trajectory, truth: Trajectory | None = None) -> l
     if truth is not None:
         for balance in (each for each in scene.invariants if each.supplied):
             off = trajectory.values_of(balance) - truth.values_of(balance)[:n]
-            relatives[f"{balance.name}, loads of the truth"] = np.asarray(off / balance.scale)
+            relatives[balance.name + OF_TRUTH] = np.asarray(off / balance.scale)
     for name, relative in relatives.items():
         size = sizes(relative)
         slope, stderr = secular_slope(trajectory.t, relative)

@@ -30,7 +30,7 @@ from ..measures.processes import Processes
 from .case import Case, Success
 from .declaration import Declaration, Extent
 from .line import LinePoint, list_settings, measure_line
-from .speed import Runs, check_end, keep_end, time_runs
+from .speed import Runs, check_end, keep_end, time_once, time_runs
 from .study import Progress, Study
 
 ERROR = 1e-6
@@ -86,6 +86,9 @@ def time_chosen(study: Study, chosen: Iterable[LinePoint], processes: Processes)
                 done = done if same.ok else same
             if isinstance(done, Outcome):
                 yield case.row(Value(measure, math.nan), done)
+                continue
+            if study.expected_cost(timed) > study.longest_run:
+                yield time_once(case, measure, done)
                 continue
             ready[case, measure] = timed, done.run
             if measure == Measure.TIME_SAMPLED and case.method.role == Role.ENGINE and hasattr(done.run, "own_loop"):

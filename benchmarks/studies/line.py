@@ -82,17 +82,17 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
     times: list[float] = []
     per_step = 0.0
     for case in cases:
-        expected = per_step * case.grid.n_steps
+        expected = per_step * case.grid.n_steps or study.expected_cost(case)
         needed = len(times) < FEWEST_POINTS and sum(times) + expected <= LINE_LIMIT * study.longest_run
         if not needed and expected > study.longest_run:
-            longest = f"would take about {expected:.2g} s, more than {study.longest_run:g} s"
+            longest = f"would take about {expected:.2g} s, more than {study.longest_run:g} s; raise --time-limit"
             reason = longest if expected < math.inf else "a coarser run was ended"
             yield case, Outcome(OutcomeKind.SKIPPED, reason)
             continue
         done = study.attempt(case)
         yield case, done
         if isinstance(done, Success):
-            times.append(cost_of_run(study, case, done, first=not times))
+            times.append(cost_of_run(study, case, done, first=not (times or expected)))
             per_step = times[-1] / case.grid.n_steps
         elif done.kind is OutcomeKind.TIMEOUT:
             per_step = math.inf

@@ -1,9 +1,10 @@
 """The study of motions that a report shows: those of the methods in the charts, at the steps of their users, and the exact one.
 
-A run has ten durations of its scene (`long_runs.end_of`), or one if it fails after that. It yields the errors and drifts of the
-first duration, and lines: attitudes and rates of the first duration, the drift of each invariant with its sign, and a curve on
-a sphere. The curve of a free body is its polhode: the angular momentum in principal axes, relative to its initial length. The
-curve of a body in a field is the trace of an axis, a unit vector in world axes.
+A run of a method in the charts has ten durations of its scene (`long_runs.end_of`), or one if it fails after that; a run of any
+other setting has one. It yields the errors and drifts of the first duration. Methods in the charts also have lines: attitudes
+and rates of the first duration, the drift of each invariant with its sign, and a curve on a sphere. The curve of a free body is
+its polhode: the angular momentum in principal axes, relative to its initial length. The curve of a body in a field is the trace
+of an axis, a unit vector in world axes.
 """
 
 from __future__ import annotations
@@ -52,29 +53,40 @@ ERROR = "largest attitude error"
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
-    """Yield the rows and lines of each run, the exact motion first. A run that fails has rows with its outcome and no lines."""
+    """Yield the rows of each run, and the lines of the methods in charts, the exact motion first.
+
+    A run that fails has rows with its outcome and no lines.
+    """
     drawn = select_methods(study.methods)
-    tell = study.count(progress, len(drawn) + 1)
+    tell = study.count(progress, len(study.competitors) + 1)
     for scene in study.scenes:
         tell(f"{scene.name}: exact")
         exact = truth_of_frames(study, scene)
         solver = Exact() if Exact().unsupported(scene) is None else Precise()
         grid = Grid(scene.t_end / FRAMES, FRAMES)
         yield from _lines(Case(study.name, scene, solver, grid), exact, exact, exact)
-        for method in drawn:
+        runs = {method: list_runs(study, scene, method, method in drawn) for method in study.competitors}
+        skipped = study.skip_slow([each[-1] for each in runs.values()], [each[0] for each in runs.values() if len(each) > 1])
+        for method, cases in runs.items():
             tell(f"{scene.name}: {method.name}")
-            step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
-            first = grid_for(scene, step)
-            for end in (end_of(scene), scene.t_end):
-                case = Case(study.name, scene, method, grid_for(scene, step, end))
-                done = study.attempt(case)
+            first = cases[-1].grid
+            for case in cases:
+                done = skipped.get(case) or study.attempt(case)
                 if isinstance(done, Success):
                     begin, truth = head(done.trajectory, first.n_samples), study.truth(scene, first).trajectory
                     yield from case.rows(errors.measure_errors(begin, truth))
-                    yield from _lines(case, done.trajectory, begin, exact, angle_between(truth.R_WB, begin.R_WB))
+                    if method in drawn:
+                        yield from _lines(case, done.trajectory, begin, exact, angle_between(truth.R_WB, begin.R_WB))
                     break
             if isinstance(done, Outcome):
                 yield from case.rows(errors.blanks(scene), done)
+
+
+def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[Case]:
+    """Return the runs of a method of which the first that succeeds is shown: ten durations if it is drawn, and one."""
+    step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
+    ends = dict.fromkeys((*([end_of(scene)] if drawn else []), scene.t_end))
+    return [Case(study.name, scene, method, grid_for(scene, step, end)) for end in ends]
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:

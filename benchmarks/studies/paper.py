@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from conservative.grid import grid_for
+from conservative.grid import Grid, grid_for
 from conservative.method import Role
 from conservative.outcome import Outcome
 from conservative.references.truth import Truth
@@ -30,15 +30,25 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     for scene in study.scenes:
         grids = [grid_for(scene, scene.dt * fraction) for fraction in FRACTIONS]
         tell(f"{scene.name}: truth")
-        truths = [study.truth(scene, grid) for grid in grids]
-        yield from (agreement_row(study, scene, grid.dt, truth) for grid, truth in zip(grids, truths, strict=True))
+        # Neither accuracy nor samples of a method without an order depend on dt.
+        ranks = [
+            [Case(study.name, scene, method, grid) for method in study.methods if grid is grids[0] or method.order is not None]
+            for grid in grids
+        ]
+        skipped = study.skip_slow(*ranks)
+        truths: dict[Grid, Truth] = {}
+        for grid, rank in zip(grids, ranks, strict=True):
+            if not skipped or any(case not in skipped and not case.method.unsupported(scene) for case in rank):
+                truths[grid] = study.truth(scene, grid)
+                yield agreement_row(study, scene, grid.dt, truths[grid])
         for method in study.methods:
             tell(f"{scene.name}: {method.name}")
-            for grid, truth in zip(grids, truths, strict=True):
-                case = Case(study.name, scene, method, grid)
-                yield from measure_accuracy(case, study.attempt(case), truth.trajectory)
-                if method.order is None:
-                    break  # neither accuracy nor samples depend on dt
+            for case in (case for rank in ranks for case in rank if case.method is method):
+                done = skipped.get(case) or study.attempt(case)
+                if isinstance(done, Outcome):
+                    yield from case.rows(errors.blanks(scene), done)
+                else:
+                    yield from measure_accuracy(case, done, truths[case.grid].trajectory)
 
 
 def agreement_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:

@@ -26,7 +26,6 @@ from .case import Case, Success
 from .declaration import Declaration
 from .line import LinePoint
 from .study import Progress, Study
-from .time_limit import is_known_to_end
 
 MEASURES = (
     Measure.TIME_PER_STEP,
@@ -40,8 +39,6 @@ CALL = 1e-4
 """Shortest timed sample, s. A faster run is repeated within a sample, each time from the initial state over the same motion."""
 SAME = 1e-12
 """Largest angle, rad, between two final attitudes that differ by round-off only."""
-TRIAL = 8
-"""Number of steps of the run that determines the speed of a foreign method."""
 Runs = dict[tuple[Case, Measure], tuple[Case, Callable[[], Any]]]
 """Timed cases and their runs, by the case and the measure of their rows."""
 UNCOUNTED = Outcome(OutcomeKind.UNSUPPORTED, "its engine does not count steps")
@@ -58,16 +55,11 @@ def own_loop(run: Run) -> Callable[[], Any]:
 
 
 def shorten(study: Study, case: Case) -> Case:
-    """Return the case, with fewer steps if a foreign method would exceed the time budget."""
-    if is_known_to_end(case.method):
+    """Return the case, with fewer steps if its steps are slow and would exceed the time budget."""
+    cost = study.expected_cost(case)
+    if cost <= study.longest_run:
         return case
-    few = replace(case, grid=keep_end(replace(case.grid, n_steps=min(TRIAL, case.grid.n_steps))))
-    trials = [study.attempt(few) for _ in range(2)]  # the first may compile
-    spent = [trial.cost.first_call for trial in trials if isinstance(trial, Success)]
-    if not spent:
-        return few
-    affordable = int(few.grid.n_steps * study.longest_run / max(min(spent), 1e-9))
-    n = min(case.grid.n_steps, max(few.grid.n_steps, affordable))
+    n = max(1, min(case.grid.n_steps, int(case.grid.n_steps * study.longest_run / cost)))
     return replace(case, grid=Grid(case.grid.dt, n, n))
 
 
@@ -136,9 +128,17 @@ def time_cases(study: Study, points: Iterable[LinePoint], processes: Processes) 
             done = done if same.ok else same
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.TIME, math.nan), done)
+        elif study.expected_cost(timed) > study.longest_run:
+            yield time_once(case, Measure.TIME, done)
         else:
             ready[case, Measure.TIME] = timed, done.run
     yield from time_runs(study, ready, processes)
+
+
+def time_once(case: Case, measure: Measure, done: Success) -> Measurement:
+    """Return the time of the only run of a case that is too long for rounds, s per simulated second."""
+    spent = done.cost.first_call
+    return case.time_rows(measure, [Timing(spent, spent, 1, 1)], case.grid.dt * case.grid.n_steps)[0]
 
 
 def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measurement]:

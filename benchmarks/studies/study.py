@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -18,7 +19,7 @@ from conservative.scene import Scene
 from ..measures.measurement import Measurement, Samples
 from .case import Case, Drawn, Success
 from .selection import series
-from .time_limit import attempt_here, attempt_within
+from .time_limit import attempt_here, attempt_within, find_trial, is_quick
 
 Progress = Callable[[float, str], None]
 """Called before each piece of work with the finished share of all work, 0 to 1, and a description of the next piece."""
@@ -28,6 +29,8 @@ HANG_LIMIT = 60.0
 """Shortest time limit of a run, s: a first run may compile."""
 HANG_FACTOR = 10.0
 """Ratio of the time limit of a run to the time budget."""
+SLOW_FACTOR = 100.0
+"""Ratio of the time for all slow runs of a study on one scene to the time budget of a run."""
 FindTruth = Callable[[Scene, Grid], Truth]
 """Returns the reference solution of a scene at the samples of a grid."""
 Finding = Measurement | Samples
@@ -56,7 +59,8 @@ class Study:
     truth
         Source of reference solutions; studies of the same scenes can share it.
     time_limit
-        Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
+        Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points, and slow runs on a scene
+        take up to `SLOW_FACTOR` budgets together (see `skip_slow`).
     processes
         Number of processes that time the same runs in turn, for an interval of each ratio; see `measures.processes`.
     drawn
@@ -125,6 +129,28 @@ class Study:
         """Return the result of a case whose run is to be timed; see `time_limit.attempt_here`."""
         return attempt_here(self.hang_limit, case, self.skip_missing)
 
+    def expected_cost(self, case: Case) -> float:
+        """Return the wall time, s, that a run of a case is expected to take, from a short run; 0 if its steps are quick."""
+        if is_quick(case) or case.method.unsupported(case.scene):
+            return 0.0
+        cost = find_trial(self.longest_run, self.hang_limit, case, self.skip_missing).expect(case)
+        return 0.0 if math.isnan(cost) else cost  # the run itself tells how it fails
+
+    def skip_slow(self, *ranks: Sequence[Case]) -> dict[Case, Outcome]:
+        """Return the cases on one scene that are not run, with the reason, so that all others take `SLOW_FACTOR` budgets.
+
+        Cases of the first rank come before the others, and quick ones before slow ones. All that counts is measured before.
+        """
+        left, skipped = SLOW_FACTOR * self.longest_run, dict[Case, Outcome]()
+        for rank in ranks:
+            costs = {case: self.expected_cost(case) for case in rank}
+            for case in sorted(costs, key=costs.__getitem__):
+                if costs[case] <= left:
+                    left -= costs[case]
+                else:
+                    skipped[case] = too_long(costs[case], left)
+        return skipped
+
     def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
         """Return a function to be called with what comes next, before each of `per_scene` pieces of work for each scene."""
         done, total = itertools.count(), len(self.scenes) * per_scene
@@ -140,6 +166,12 @@ class Study:
         positive_integer("processes", self.processes)
         if self.time_limit is not None:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
+
+
+def too_long(cost: float, limit: float) -> Outcome:
+    """Return the outcome of a run that is not made, because it would take `cost` s of the `limit` s that it has."""
+    text = f"would take about {cost:.2g} s, more than the {limit:.2g} s left for slow runs; raise --time-limit"
+    return Outcome(OutcomeKind.SKIPPED, text)
 
 
 Maker = Callable[[Study, Progress], Iterator[Finding]]

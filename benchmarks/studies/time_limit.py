@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import islice
 from weakref import WeakKeyDictionary
 
 from conservative.grid import Grid
@@ -21,6 +24,51 @@ from .selection import Missing
 
 _timeouts: WeakKeyDictionary[Scene, dict[Method, tuple[float, Grid]]] = WeakKeyDictionary()
 """Limit, s, and grid of the last run that was stopped, by scene and method, so that it is not tried again."""
+
+_trials: WeakKeyDictionary[Scene, dict[Method, Trial]] = WeakKeyDictionary()
+"""The short run of a method by which the cost of others is known, by scene and method."""
+TRIAL = 8
+"""Number of steps of a short run, or 1 if one step exceeds the time budget of a run."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A short run: its grid, and its wall time, s, without compilation; the time is NaN if it failed."""
+
+    grid: Grid
+    spent: float
+
+    def expect(self, case: Case) -> float:
+        """Return the wall time, s, of a run of the same method on the scene: by steps, or by duration if it chooses its own."""
+        per_step = self.spent / self.grid.n_steps
+        return per_step * case.grid.n_steps * (1.0 if case.method.order is not None else case.grid.dt / self.grid.dt)
+
+
+def is_quick(case: Case) -> bool:
+    """Return whether a case is known to be quick: it takes a fixed number of steps that call no Python functions.
+
+    Steps that call those of a scene, or a method of other people, take as long as the functions need.
+    """
+    return isinstance(case.method, Missing) or (is_known_to_end(case.method) and not case.scene.calls_python)
+
+
+def find_trial(budget: float, limit: float, case: Case, skip_missing: bool = False) -> Trial:
+    """Return a short run at the scene's step for a case that is not quick, made once for each scene and method.
+
+    `budget` and `limit` are the time budget and the time limit of a run, s. A first run may compile, so a long one is repeated.
+    """
+    known = _trials.setdefault(case.scene, {})
+    if case.method not in known:
+        for n in (1, TRIAL):
+            grid = Grid(case.scene.dt, n)  # all samples, at which some solvers start again
+            runs = (attempt_within(limit, replace(case, grid=grid), skip_missing) for _ in range(2))
+            costs = [done.cost.first_call if isinstance(done, Success) else math.nan for done in islice(runs, 1)]
+            if costs[0] > budget / 4:
+                costs += [done.cost.first_call for done in runs if isinstance(done, Success)]
+            known[case.method] = Trial(grid, min(costs))
+            if not known[case.method].spent <= budget:
+                break
+    return known[case.method]
 
 
 def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: bool = False) -> Success | Outcome:

@@ -19,7 +19,7 @@ from ..drifts import arrange_drifts, drifts_of, list_drifts
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
 from ..outcome import OK, Choice, Counters, Outcome
-from ..presentation import columns, dataset, html_table
+from ..presentation import columns, dataset, html_table, rounded_up
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -172,7 +172,8 @@ class Ensemble:
         ]
         for name, values in self.drifts.items():
             worst = -1 if np.isnan(values).all() else int(np.nanargmax(values))
-            rows.append((f"drift of {name}", "none" if worst < 0 else f"{values[worst]:.2e} at most (relative, body {worst})"))
+            largest = "none" if worst < 0 else f"{rounded_up(values[worst], 3):.2e} at most (relative, body {worst})"
+            rows.append((f"drift of {name}", largest))
         return html_table("Ensemble", rows)
 
     def _describe_outcomes(self) -> str:

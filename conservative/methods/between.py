@@ -136,10 +136,9 @@ def attitudes_at(found: Trajectory, t: Array) -> Array:
     Each is the state of the sample before it, moved forward by integration; a spline through the samples is less accurate.
     From the time at which a state cannot be moved, they are nan.
     """
-    near = SAME * float(np.diff(found.t).min(initial=math.inf))
-    row = np.clip(np.searchsorted(found.t, t + (near if math.isfinite(near) else 0.0), side="right") - 1, 0, None)
+    row = np.clip(np.searchsorted(found.t, t * (1 + ROUNDING), side="right") - 1, 0, None)
     gaps = t - found.t[row]
-    gaps[np.abs(gaps) <= near] = 0.0
+    gaps[np.abs(gaps) <= ROUNDING * t] = 0.0
     R_WB, _, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     R_WB[done:] = np.nan
     return R_WB

@@ -27,7 +27,6 @@ from .. import registry
 from ..errors import MissingEngine
 from ..grid import Grid, count_steps
 from ..method import Method, Role
-from ..needs import Need
 from ..scene import Scene
 from .projected import Projected
 from .trials import Trials, convergence_factor, parts_for
@@ -203,14 +202,13 @@ def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: floa
     duration = min(t_end, PROBE_RADIANS / rate)
     error *= min(1.0, 4 * duration / t_end)
     likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
-    calling = scene.loads or not scene.needs.isdisjoint((Need.FUNCTION, Need.TIME))
-    dt = min(duration / 2, method.card.longest / rate, math.inf if calling else likely)
+    dt = min(duration / 2, method.card.longest / rate, math.inf if scene.calls_python else likely)
     if scene.loads:  # runs at two to eight times the step have to differ everywhere (`conservative.methods.pieces`)
         breaks, step, _ = scene.smoothness(t_end)
         dt = min(dt, step, t_end / parts_for(scene) / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)
-    most = MOST_CALLING if calling else MOST_PROBED
+    most = MOST_CALLING if scene.calls_python else MOST_PROBED
     return Candidate(method, error, duration, rate, dt, runs=bodies * t_end / duration, most_steps=most)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.presentation import rounded_up
 
 from .model import Cell, Grade
 
@@ -22,6 +24,23 @@ def number(value: float, digits: int = 2) -> str:
         return DASH
     plain = value == 0 or 0.01 <= abs(value) < 1e6
     return f"{float(f'{value:.{digits}g}'):,g}" if plain else _power(f"{value:.{digits - 1}e}")
+
+
+def bound(value: float, digits: int = 2) -> str:
+    """Return a size that a motion stays within, such as an error or a drift: rounded up to `digits` digits, never down."""
+    return number(rounded_up(value, digits), digits)
+
+
+def angle(value: float, digits: int = 2) -> str:
+    """Return an attitude error, rad, rounded up, with more digits if it would be above π, the largest possible one."""
+    texts = (bound(value, more) for more in range(digits, digits + 3))
+    return next((text for text in texts if not math.isfinite(value) or value > math.pi or float(text) <= math.pi), "π")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names, at least one, as words: `a, b and c`."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def tolerance(value: float) -> str:
@@ -49,15 +68,20 @@ def numeric(value: float, text: str = "", digits: int = 2) -> Cell:
     return Cell(text or number(value, digits), value=value)
 
 
+def size(value: float) -> Cell:
+    """Return an error or a drift, rounded up, as a cell that the page sorts by its value."""
+    return numeric(value, bound(value))
+
+
 def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED, SMALL)) -> Cell:
-    """Return a size with the symbol of its grade, a dash for NaN; the default text is the size as a number.
+    """Return a size with the symbol of its grade, a dash for NaN; the default text is the size, rounded up (see `bound`).
 
     `limits` are the largest sizes that are good, and fair. By default they are those of drifts.
     """
     if math.isnan(value):
         return Cell(DASH, Grade.NONE, value=value)
     symbol, graded = ("✓", Grade.GOOD) if value <= limits[0] else ("≈", Grade.FAIR) if value <= limits[1] else ("✗", Grade.BAD)
-    return Cell(f"{symbol} {text or number(value)}", graded, value=value)
+    return Cell(f"{symbol} {text or bound(value)}", graded, value=value)
 
 
 def grade_ratio(ratio: float, note: str = "", digits: int = 3, interval: tuple[float, float] = (math.nan, math.nan)) -> Cell:

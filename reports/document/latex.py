@@ -26,6 +26,7 @@ _SIGNS = str.maketrans(
         "µ": r"\textmu{}",
         "°": r"\textdegree{}",
         "²": r"\textsuperscript{2}",
+        "π": r"$\pi$",
         "ω": r"$\omega$",
         "↕": "",
     }

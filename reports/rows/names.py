@@ -10,6 +10,7 @@ from functools import lru_cache
 import pandas as pd
 
 from conservative import registry
+from conservative.benchmarks.measures.errors import OF_TRUTH
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import outcome_of
 from conservative.benchmarks.recommendation.probe import Probe
@@ -19,6 +20,7 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 from conservative.errors import BadInput, MissingEngine, NotLoadable
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.scene import Scene
 from conservative.scenes.random_body import random_body
 
 _in_a_field = lru_cache(maxsize=1)(random_body)
@@ -106,6 +108,16 @@ def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.Da
 def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.DataFrame:
     """Return the rows of a measure, and of one quantity if it is a drift."""
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
+
+
+def largest_drifts(run: pd.DataFrame, scene: Scene) -> dict[str, float]:
+    """Return the largest drift of each invariant of a scene in the rows of a run, NaN if there is none.
+
+    The drift of a balance is the larger one of those with the loads of the method and of the truth.
+    """
+    drifts = run[run["measure"] == Measure.DRIFT_MAX.text]
+    names = [each.name for each in scene.invariants]
+    return {name: float(drifts[drifts["quantity"].isin([name, name + OF_TRUTH])]["value"].max()) for name in names}
 
 
 def outcomes(rows: pd.DataFrame) -> list[Outcome]:

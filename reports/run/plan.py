@@ -48,14 +48,16 @@ seconds after the installation, mostly to compile kernels, and a further method 
 class Plan:
     """The plan of a report: what is compared, and the studies in the order of measurement.
 
-    Engines have studies and a section of their own. `bodies` is the number of random bodies in each field, `seed` their seed.
-    `arguments` are the texts from which commands make the scenes, such as their files, by the names of the scenes.
+    Engines have studies and a section of their own. `named` are the methods that the user named. `bodies` is the number of
+    random bodies in each field, `seed` their seed. `arguments` are the texts from which commands make the scenes, such as their
+    files, by the names of the scenes.
     """
 
     scenes: tuple[Scene, ...]
     methods: tuple[Method, ...]
     studies: tuple[Study, ...]
     engines: tuple[Method, ...] = ()
+    named: tuple[Method, ...] = ()
     quick: bool = False
     skip_missing: bool = False
     png: bool = False
@@ -153,4 +155,7 @@ def plan_report(
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
         made.append(study)
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
-    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, latex, time_limit, bodies, seed, arguments)
+    asked = compared if methods else ()
+    return Plan(
+        chosen, compared, tuple(made), named, asked, quick, skip_missing, png, latex, time_limit, bodies, seed, arguments
+    )

@@ -31,6 +31,7 @@ from conservative.references.truth import solve
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..document.cells import angle
 from ..terminal.progress import Step
 
 SAMPLES = 1_000_000
@@ -309,9 +310,9 @@ def status_of(summary: dict[str, Any]) -> str:
     if attitude is None:
         return "ok, but its attitude error is not known"
     if not is_right(summary):
-        return f"inaccurate: the attitude error is {attitude:.1e} rad"
+        return f"inaccurate: the attitude error is {angle(attitude)} rad"
     if choice and not choice["reached"] and not summary["error"].get("attitude", math.inf) <= choice["error"]:
-        return f"less accurate than asked for: the attitude error is {attitude:.1e} rad"
+        return f"less accurate than asked for: the attitude error is {angle(attitude)} rad"
     return "ok"
 
 

@@ -18,7 +18,7 @@ from conservative.references.environments.environment import version_key
 from conservative.version import VERSION
 
 from ..document.badge import badge
-from ..document.cells import DASH, number
+from ..document.cells import DASH, angle
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
 from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
@@ -93,7 +93,7 @@ def _page(
 
 def _sentence(row: EngineRow) -> str:
     name, energy = f"{row.taken or 'run'} ({row.setting or 'default'})", str(row.cells["energy drift"]).lstrip("✓≈✗ ")
-    found = f"attitude error {number(row.error)} rad, energy drift {energy}"
+    found = f"attitude error {angle(row.error)} rad, energy drift {energy}"
     return f"{name}: {found if row.outcome.ok else row.outcome}"
 
 
@@ -113,9 +113,9 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
             if same[0]:
                 count = (*same, False).index(False)
                 since = f"since {'at least ' * (count == len(errors))}{versions[count - 1].partition('==')[2]}"
-                text = f"{kind}: {number(errors[0])} rad {since}"
+                text = f"{kind}: {angle(errors[0])} rad {since}"
                 if count < len(errors):
-                    text += f", {number(errors[count])} rad in {versions[count].partition('==')[2]}"
+                    text += f", {angle(errors[count])} rad in {versions[count].partition('==')[2]}"
                 items.append(Item(text, scene))
         body = list[Row]()
         for version, each in zip(versions, shown, strict=True):

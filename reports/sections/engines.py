@@ -19,7 +19,7 @@ from conservative.benchmarks.studies.selection import Missing
 from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..charts import figures, vega_embed
-from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
+from ..document.cells import DASH, angle, bound, grade, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
 from ..rows.names import ABSENT, of_measure, of_study, outcomes, with_outcome
 from ..rows.points import points as points_over
@@ -202,7 +202,7 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
     momentum = next((name for name in MOMENTA if len(of_measure(rows, Measure.DRIFT_MAX, name))), MOMENTA[0])
     cells = (
         numeric(bits),
-        numeric(error),
+        numeric(error, angle(error)),
         _order(line, expected),
         _drift(rows, "energy"),
         _drift(rows, momentum),
@@ -234,7 +234,7 @@ def _drift(rows: pd.DataFrame, quantity: str) -> Cell:
     """Return a graded drift; the direction is given if it is more than small."""
     drift = of_measure(rows, Measure.DRIFT_MAX, quantity)
     size = float(drift["value"].iloc[0]) if len(drift) else math.nan
-    return grade(size, f"{number(size)} {drift['detail'].iloc[0]}".rstrip() if size > SMALL else "")
+    return grade(size, f"{bound(size)} {drift['detail'].iloc[0]}".rstrip() if size > SMALL else "")
 
 
 def _turns(turns: float, expected: float) -> Cell:

@@ -9,7 +9,7 @@ from conservative.benchmarks.studies import paper
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH, numeric, outcome_text
+from ..document.cells import DASH, bound, numeric, outcome_text
 from ..document.model import Paragraph, Section, Style, Table, filled
 from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outcome
 
@@ -53,7 +53,8 @@ def truths(table: pd.DataFrame) -> Table:
     """Return the difference of the two independent reference solutions, for each scene and step."""
     rows = table[table["measure"] == Measure.AGREEMENT.text]
     body = [
-        [row["scene"], numeric(row["dt"], f"{row['dt']:g}"), row["label"], numeric(row["value"])] for _, row in rows.iterrows()
+        [row["scene"], numeric(row["dt"], f"{row['dt']:g}"), row["label"], numeric(row["value"], bound(row["value"]))]
+        for _, row in rows.iterrows()
     ]
     header = ["scene", "dt, s", "reference solutions", "largest angle between them, rad"]
     return Table(header, body, "Agreement of two independent reference solutions")

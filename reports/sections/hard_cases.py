@@ -15,7 +15,7 @@ from conservative.benchmarks.studies.stability import STUDY as STABILITY
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 
-from ..document.cells import DASH, grade, number, outcome_cell, tolerance
+from ..document.cells import DASH, angle, bound, grade, number, outcome_cell, tolerance
 from ..document.model import Cell, Grade, Paragraph, Row, Section, Style, Table
 from ..rows.names import of_study
 
@@ -80,12 +80,12 @@ def judge(records: list[Record]) -> Cell:
             cell = outcome_cell(outcome_of(record))
             return _judgement(cell, cell)
     errors = _values(records, Measure.ATTITUDE_MAX)
-    motion = grade(max(errors), f"{number(max(errors))} rad", (RIGHT, USABLE)) if errors else _NOTHING
+    motion = grade(max(errors), f"{angle(max(errors))} rad", (RIGHT, USABLE)) if errors else _NOTHING
     drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
     if not drifts:
         return _judgement(motion, _NOTHING)
     worst = max(drifts, key=lambda each: each["value"])
-    return _judgement(motion, grade(worst["value"], f"{number(worst['value'])} {worst['quantity']}"))
+    return _judgement(motion, grade(worst["value"], f"{bound(worst['value'])} {worst['quantity']}"))
 
 
 def _judgement(motion: Cell, invariants: Cell) -> Cell:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..document.cells import number
+from ..document.cells import bound
 from ..document.model import Document, Emphasis, Items, Paragraph, Table, filled
 
 WORDS = {"right": "is right", "wrong": "is WRONG", "undecided": "is UNDECIDED"}
@@ -18,7 +18,7 @@ def build(summary: Mapping[str, Any], name: str) -> Document:
 
     def amount(errors: Sequence[float]) -> str:
         units = zip(errors, summary["units"], strict=True)
-        return " and ".join(f"{number(error * size)} {unit}" for error, (unit, size) in units if size)
+        return " and ".join(f"{bound(error * size)} {unit}" for error, (unit, size) in units if size)
 
     verdict = f"{name} {WORDS[summary['verdict']]}: its largest error is {amount(summary['error'])}"
     verdict += f"; {amount(summary['allowed'])} {'is' if sum(size > 0 for _, size in summary['units']) == 1 else 'are'} allowed"
@@ -50,7 +50,7 @@ def build(summary: Mapping[str, Any], name: str) -> Document:
     rows = summary["rows"]
     used = [f"Compared: {compared} ({rows['compared']:,} of {rows['in file']:,} rows)."] if compared else []
     unused = [f"Not used: {column}, {reason}." for column, reason in summary["not used"].items()]
-    quantities = [[each["quantity"], number(each["largest"]), number(each["final"])] for each in summary["quantities"]]
+    quantities = [[each["quantity"], bound(each["largest"]), bound(each["final"])] for each in summary["quantities"]]
     blocks = filled(
         Paragraph(" ".join(sentences), Emphasis.LEAD),
         Paragraph(heading or unproven) if heading or unproven else None,

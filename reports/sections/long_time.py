@@ -12,7 +12,7 @@ from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
-from ..document.cells import DASH, number, numeric
+from ..document.cells import DASH, bound, number, numeric
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 
 TERMS = (
@@ -48,7 +48,7 @@ def as_table(table: pd.DataFrame) -> Table:
         for quantity in quantities:
             key = (Measure.ATTITUDE_MAX.text, "") if quantity == ATTITUDE else (Measure.DRIFT_MAX.text, quantity)
             growth = number(value.get((Measure.GROWTH.text, quantity), math.nan))
-            cells.append(numeric(value[key], f"{number(value[key])} ({growth})") if key in value else DASH)
+            cells.append(numeric(value[key], f"{bound(value[key])} ({growth})") if key in value else DASH)
         failed = members[members["outcome"] != OutcomeKind.OK]
         rows.append([str(scene), str(name), *cells, ", ".join(failed["outcome"] + ": " + failed["reason"])])
     header = ["scene", "method", "turns", *(f"{each} (p)" for each in quantities), "how it ended"]

@@ -18,7 +18,7 @@ from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
-from ..document.cells import DASH, factor, grade_ratio, number, numeric, ratio_text, tolerance
+from ..document.cells import DASH, bound, factor, grade_ratio, numeric, ratio_text, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, with_outcome, without_outcome
 from ..rows.points import joined, points
@@ -85,7 +85,7 @@ def truths(table: pd.DataFrame) -> str:
     if not len(good):
         return "No body has two reference solutions that agree."
     dropped = f" They differ by more on {len(rows) - len(good)}, which are not compared." if len(rows) > len(good) else ""
-    return f"Two reference solutions agree within {number(good['value'].max(), 1)} rad on {len(good)} bodies.{dropped}"
+    return f"Two reference solutions agree within {bound(good['value'].max(), 1)} rad on {len(good)} bodies.{dropped}"
 
 
 def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str = "") -> Section:

@@ -12,6 +12,7 @@ from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import PROBE_LIMIT, Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
+from ..document.cells import angle, bound
 from ..document.model import Block, Document, Emphasis, Items, Paragraph, Section, Table
 from ..rows.names import method_text, setting_text
 
@@ -71,7 +72,7 @@ def answer_lines(recommendation: Recommendation, scene: str) -> Iterator[str]:
         return
     probe = best.best
     yield (
-        f"Use {method_text(best)} with {setting_text(probe)}. To expect: attitude error {probe.expected:.1e} rad, drift: "
+        f"Use {method_text(best)} with {setting_text(probe)}. To expect: attitude error {angle(probe.expected)} rad, drift: "
         f"{drift_text(probe.drifts)}; {best.cost * 1e6:.3g} µs per simulated second."
     )
     scene = shlex.quote(scene)
@@ -120,7 +121,7 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
         cost = "" if math.isnan(advice.cost) else f"{advice.cost * 1e6:.3g}"
         names, drift = (method_text(advice), setting_text(probe), cost), drift_text(probe.drifts)
         if advice.reached:
-            reaching.append((*names, f"{probe.expected:.1e}", drift))
+            reaching.append((*names, angle(probe.expected), drift))
         else:
             failing.append((*names, f"{probe.holds:.2g} s", _expected(probe), drift))
     if reaching:
@@ -150,10 +151,10 @@ def notes(recommendation: Recommendation) -> list[str]:
         f"Fastest: {fastest}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
         f"conserved: relative drifts below {NEGLIGIBLE:g}; grows: steadily; lost: an error of π rad or more.",
-        f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
-        f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
+        f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {bound(truth.agreement_rad)} rad over "
+        f"the first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
-        f"{amplified.final_size:.2g} rad within {amplified.t[-1]:.4g} s{after} ({amplified.label}): {growth}.",
+        f"{angle(amplified.final_size)} rad within {amplified.t[-1]:.4g} s{after} ({amplified.label}): {growth}.",
         "Times: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
         *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in advice if not a.general),
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
@@ -164,17 +165,17 @@ def notes(recommendation: Recommendation) -> list[str]:
 def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:
     order = "" if advice.order is None else "no order seen" if advice.order.reason else f"order {advice.order.slope:.2f}"
     for i, probe in enumerate(advice.probes):
-        error = f"{probe.error:.2e}" if probe.outcome.ok else str(probe.outcome)
+        error = angle(probe.error, 3) if probe.outcome.ok else str(probe.outcome)
         name = (method_text(advice), order)[i] if i < 2 else ""
         setting = setting_text(probe) + (" <-" if probe is advice.best else "")
         yield name, setting, f"{probe.length:.4g}", error, _expected(probe)
 
 
 def _expected(probe: Probe) -> str:
-    return f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
+    return angle(probe.expected) if probe.expected < math.pi else "lost"
 
 
 def drift_text(drifts: Sequence[ExpectedDrift]) -> str:
     """Return the relative drifts to expect; an arrow marks a steady drift, `conserved` stands for round-off."""
-    large = [f"{d.name} {d.expected:.0e}{' (grows)' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
+    large = [f"{d.name} {bound(d.expected, 1)}{' (grows)' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
     return ", ".join(large) or "conserved"

@@ -109,8 +109,9 @@ def brief(
     measured: Measured, points: Mapping[str, pd.DataFrame], summaries: Callable[[], Mapping[str, summary.Summary]]
 ) -> Iterator[Block]:
     """Yield what the terminal shows: a table of each scene, and sentences."""
-    for name, each in points.items():
-        yield attempt(f"The table of {name}", partial(closing.scene_table, measured.rows, each, name))
+    for scene in measured.plan.scenes:
+        table = partial(closing.scene_table, measured.rows, points[scene.name], scene, bool(measured.plan.named))
+        yield attempt(f"The table of {scene.name}", table)
     yield Paragraph(f"{closing.LEGEND}\n")
     tables = attempt("The tables of engines", lambda: engines.tables(measured))
     yield from [tables] if isinstance(tables, Paragraph) else tables

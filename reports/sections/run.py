@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH
+from ..document.cells import DASH, angle, bound
 from ..document.model import Block, Document, Facts, Items, Table
 from ..run.single_run import is_right, status_of
 
@@ -31,19 +31,19 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "method", summary["label"]
     yield "status", status_of(summary)
     if choice := summary["choice"]:
-        yield "chosen for", f"an attitude error of {choice['error']:g} rad; estimated {choice['estimate']:.1e} rad"
+        yield "chosen for", f"an attitude error of {choice['error']:g} rad; estimated {angle(choice['estimate'])} rad"
     if "better" in summary["error"]:
         yield "more accurate", _advice(summary["error"])
     yield "run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"
     yield "work", ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
     error = summary["error"]
-    for name, unit in (("attitude", "rad"), ("rate", "rad/s")):
-        yield f"{name} error", error.get("reason") or f"{error[name]:.1e} {unit}"
+    for name, unit, shown in (("attitude", "rad", angle), ("rate", "rad/s", bound)):
+        yield f"{name} error", error.get("reason") or f"{shown(error[name])} {unit}"
     if "truth" in error:
         yield "error against", f"{error['truth']}, largest of {error['samples']} samples"
     for name, value in summary["drift"].items():
-        yield f"drift of {name}", f"{value:.2e} (relative)" if not math.isnan(value) else DASH
-    yield "orthonormality", f"{summary['orthonormality']:.2e}"
+        yield f"drift of {name}", f"{bound(value, 3)} (relative)" if not math.isnan(value) else DASH
+    yield "orthonormality", bound(summary["orthonormality"], 3)
     if last := summary["last"]:
         yield f"at t = {last['t']:g} s", ""
         yield from ((f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1))
@@ -54,7 +54,7 @@ def _advice(error: dict[str, Any]) -> str:
     if error["better"] is None:
         return "no accurate run was found; use a shorter --dt or a shorter --t-end"
     end = ", and no run that was tried is accurate for longer" if error["better"]["shorter"] else ""
-    return f"{error['better']['command']} (attitude error {error['better']['attitude']:.1e} rad{end})"
+    return f"{error['better']['command']} (attitude error {angle(error['better']['attitude'])} rad{end})"
 
 
 def _numbers(values: Iterable[float]) -> str:
@@ -77,7 +77,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
             summary["typed"],
             status_of(summary) if not summary["outcome"].ok else status_of(summary).partition(":")[0].partition(",")[0],
             *(_cell(summary.get("drift", {}).get(name)) for name in drifts),
-            *(_cell(summary["error"].get(name)) for name in ("attitude", "rate")),
+            *(_cell(summary["error"].get(name), shown) for name, shown in (("attitude", angle), ("rate", bound))),
             f"{summary['counters']['steps']:,}" if "counters" in summary else DASH,
             f"{summary['wall_time']:.2g}" if "wall_time" in summary else DASH,
         ]
@@ -86,5 +86,5 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
     return Table(header, rows, title)
 
 
-def _cell(value: float | None) -> str:
-    return DASH if value is None or math.isnan(value) else f"{value:.1e}"
+def _cell(value: float | None, shown: Callable[[float], str] = bound) -> str:
+    return DASH if value is None else shown(value)

@@ -16,7 +16,7 @@ from conservative.scene import Scene
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
 from ..document.attempt import attempt
-from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
+from ..document.cells import DASH, bound, grade, number, numeric, outcome_cell, size, tolerance
 from ..document.model import Block, Cell, Emphasis, Figure, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, of_measure, of_study, outcomes
@@ -137,10 +137,10 @@ def drift(table: pd.DataFrame, scene: str) -> Table:
         for invariant in invariants:
             slope, error = _value(row, Measure.DRIFT_SLOPE, invariant), _value(row, Measure.DRIFT_SLOPE_STDERR, invariant)
             cells += [
-                numeric(_value(row, Measure.DRIFT_MAX, invariant)),
-                numeric(slope, f"{number(slope)} ± {number(error, 1)}"),
+                size(_value(row, Measure.DRIFT_MAX, invariant)),
+                numeric(slope, f"{number(slope)} ± {bound(error, 1)}"),
             ]
-        body.append([*cells, numeric(_value(row, Measure.ORTHONORMALITY))])
+        body.append([*cells, size(_value(row, Measure.ORTHONORMALITY))])
     return Table(header, body, f"{scene}: largest relative drift at the scene's step, and its slope", Style.FILTERED)
 
 
@@ -155,7 +155,7 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
     header = ["method", *(f"{measure}, {unit}, dt {step:g}" for measure, unit in _ERRORS for step in steps)]
     keys = [(measure.text, step) for measure, _ in _ERRORS for step in steps]
-    body: list[Row] = [[name, *(numeric(float(row.get(key, math.nan))) for key in keys)] for name, row in _lines(wide, *keys)]
+    body: list[Row] = [[name, *(size(float(row.get(key, math.nan))) for key in keys)] for name, row in _lines(wide, *keys)]
     return Table(header, body, f"{scene}: error of attitude and rates", Style.FILTERED)
 
 

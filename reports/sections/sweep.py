@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ..document.cells import angle, bound
 from ..document.model import Document, Facts
 from ..run.sweep import rate_text
 
@@ -34,10 +35,10 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield "error", error["reason"]
         else:
             advice = "" if error["reached"] else "; the motions are inaccurate: use --error 1e-6 without --methods and --dt"
-            yield "error", f"{error['estimate']:.2g} rad, of the scene itself{advice}"
+            yield "error", f"{angle(error['estimate'])} rad, of the scene itself{advice}"
     else:
         reached = "" if error["reached"] else ", so the target is not reached"
-        estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
+        estimate = f"{angle(error['estimate'])} rad at most, estimated on {error['bodies']:,} bodies"
         yield "error", f"{estimate}; target: {error['asked']:g} rad{reached}"
     bodies, steps = (rate_text(summary[key]) for key in ("bodies_per_second", "body_steps_per_second"))
     before = f"; {summary['found_before']:,} bodies were finished before" if summary["found_before"] else ""
@@ -45,7 +46,7 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name, drift in summary["drift"].items():
         text = "none: no body has this invariant, or all bodies failed"
         if drift is not None:
-            text = f"{drift['largest']:.2e} at most (body {drift['body']}), median {drift['median']:.1e} (relative)"
+            text = f"{bound(drift['largest'], 3)} at most (body {drift['body']}), median {bound(drift['median'])} (relative)"
         yield f"drift of {name}", text
     yield "angle from the mean attitude", "median, and 5th to 95th percentile of the bodies"
     for row in summary["angle_from_mean"]:

@@ -12,7 +12,7 @@ from conservative.benchmarks.versions.engine import EngineComparison, EngineLine
 from conservative.benchmarks.versions.times import Ratio
 from conservative.outcome import Outcome, OutcomeKind
 
-from ..document.cells import DASH, grade, number, numeric, outcome_cell, outcome_text
+from ..document.cells import DASH, angle, bound, grade, number, numeric, outcome_cell, outcome_text
 from ..document.model import Check, Document, Emphasis, Facts, Items, Paragraph, Row, Section, Style, Table, filled
 
 NOTHING_CHANGED = "No change."
@@ -144,7 +144,7 @@ def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
         seen.version,
         *(numeric(slope, DASH if math.isnan(slope) else order_text(slope)) for slope in slopes),
         *(grade(abs(drift), drift_text(drift)) for drift in drifts),
-        numeric(seen.error.value),
+        numeric(seen.error.value, angle(seen.error.value)),
         outcome_cell(Outcome(seen.outcome.kind)),  # its reason is in the list of unfinished runs
         DASH if time is None else numeric(time.value, _ratio_text(time) if varies else number(time.value)),
         numeric(1e6 * step_time),
@@ -204,4 +204,4 @@ def order_text(order: float) -> str:
 
 def drift_text(drift: float) -> str:
     """Return a relative drift as text, in percent from `PERCENT` on."""
-    return f"{100 * drift:.2g} %" if PERCENT <= abs(drift) < math.inf else number(drift, 1)
+    return f"{bound(100 * drift)} %" if PERCENT <= abs(drift) < math.inf else bound(drift, 1)

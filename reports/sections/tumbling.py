@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +12,16 @@ from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, motion, speed
+from conservative.invariants import find_energy
 from conservative.method import Role
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..document.attempt import attempt
-from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
+from ..document.cells import DASH, angle, bound, grade, listed, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
 from ..rows import lines
-from ..rows.names import MethodClass, of_classes, of_measure, of_study, outcomes
+from ..rows.names import MethodClass, largest_drifts, of_classes, of_measure, of_study, outcomes
 from .hard_cases import RIGHT, USABLE
 from .measured import Measured, of_scene
 from .summary import MIDDLE
@@ -34,46 +35,57 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Result:
-    """The run of a method: largest drifts (relative) and attitude error (rad), order, and time per step (s); NaN if unknown.
+    """The run of a method: largest drift of each invariant (relative), attitude error (rad), order, and time per step (s).
 
-    `name` has the tolerance of an adaptive method, `line` has not.
+    Unknown numbers are NaN. `name` has the tolerance of an adaptive method, `line` has not. `pictured`: charts have its motion.
     """
 
     method: str
     name: str
     line: str
     ours: bool
+    pictured: bool
     dt: float
     outcome: Outcome
-    energy: float
-    momentum: float
+    drifts: Mapping[str, float]
     error: float
     order: float
     time: float
 
+    @property
+    def family(self) -> str:
+        """Name of the method without its setting."""
+        return self.method.partition(":")[0]
+
 
 def results(measured: Measured) -> list[Result]:
-    """Return the results on the main scene: engines, the largest error first, then the paper's map and our fastest method."""
-    scene = measured.main_scene.name
-    rows, here = of_study(measured.rows, motion.STUDY.name, scene), measured.rows[measured.rows["scene"] == scene]
-    points = of_scene(measured.points, scene)
+    """Return the results on the main scene: engines, the largest error first, then ours.
+
+    If methods are named, they are all. Otherwise they are those in the charts: engines, the paper's map and our fastest method.
+    """
+    plan, scene = measured.plan, measured.main_scene
+    rows, here = of_study(measured.rows, motion.STUDY.name, scene.name), measured.rows[measured.rows["scene"] == scene.name]
+    points = of_scene(measured.points, scene.name)
     best = cheapest(of_classes(costs(points, [MIDDLE]), MethodClass.GENERAL))
     families = {PAPER_MAP, *points[points["name"] == (best.name if best else "")]["family"]}
     orders, times = lines.orders(here), of_measure(here, Measure.TIME_PER_STEP).groupby("method")["value"].last()
+    charts = {method.name for method in motion.select_methods((*plan.methods, *plan.engines))}
+    few = rows["method"].isin(charts) & ((rows["role"] == Role.ENGINE) | rows["family"].isin(families))
     found = []
-    for method, run in rows[(rows["role"] == Role.ENGINE) | rows["family"].isin(families)].groupby("method", sort=False):
-        drifts = run[run["measure"] == Measure.DRIFT_MAX.text]
+    for method, run in rows[few | rows["method"].isin([each.name for each in plan.named])].groupby("method", sort=False):
         name, line, role, dt = run[["name", "line", "role", "dt"]].iloc[0]
-        values = [drifts[drifts["quantity"].str.contains(part)]["value"].max() for part in ("energy", "moment")]
-        values += [of_measure(run, Measure.ATTITUDE_MAX)["value"].max()]
+        values = [of_measure(run, Measure.ATTITUDE_MAX)["value"].max()]
         values += [known.get(method, math.nan) for known in (orders, times)]
-        found.append(Result(str(method), name, line, role != Role.ENGINE, dt, outcomes(run)[0], *map(float, values)))
+        pictured, drifts = bool(few[run.index[0]]), largest_drifts(run, scene)
+        numbers = map(float, values)
+        found.append(Result(str(method), name, line, role != Role.ENGINE, pictured, dt, outcomes(run)[0], drifts, *numbers))
     return sorted(found, key=lambda each: (each.ours, math.isnan(each.error), -each.error))
 
 
 def drawn(found: Sequence[Result]) -> list[str]:
     """Return the methods that the first screens draw: those that ran, without the most accurate engines if there are many."""
-    engines, ours = ([each.method for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
+    shown = [each for each in found if each.outcome.ok and each.pictured]
+    engines, ours = ([each.method for each in shown if each.ours is side] for side in (False, True))
     return [*engines[: MOST - 1 - len(ours)], *ours]
 
 
@@ -106,45 +118,58 @@ def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list
 
 
 def _sentence(found: Sequence[Result], scene: Scene) -> str:
+    """Return the largest error and change of energy, and the errors at both ends of what is compared.
+
+    They are those of this engine, of the most accurate engine, and of our methods, each at its worst and at its best setting.
+    """
     engines, ours = ([each for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
     parts, others = [], dict[str, float]()
     if engines:
-        worst = engines[0]
-        energy = f"{100 * worst.energy:.2g} %" if worst.energy > SMALL else f"{number(worst.energy, 1)} of it"
-        wrong = f"is wrong by {number(worst.error)} rad ({math.degrees(worst.error):.2g}°)"
-        parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong} and its energy changes by {energy}.")
-        family = [each for each in engines[1:] if each.method.partition(":")[0] == worst.method.partition(":")[0]]
-        others = {each.line: each.error for each in (*family[-1:], *engines[1:][-1:])}  # its best setting, the best engine
-    if ours:
-        best = min(ours, key=lambda each: each.error)
-        others[f"`{best.method}` of the Python package `conservative`"] = best.error
+        worst, best = engines[0], engines[-1]
+        wrong = f"is wrong by {angle(worst.error)} rad ({bound(math.degrees(worst.error))}°)"
+        energy = find_energy(scene.invariants)
+        change = worst.drifts[energy.name] if energy else math.nan
+        size = f"{bound(100 * change)} %" if change > SMALL else f"{bound(change, 1)} of it"
+        changes = "" if math.isnan(change) else f" and its {energy.name if energy else ''} changes by {size}"
+        parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong}{changes}.")
+        for family in dict.fromkeys((worst.family, best.family)):
+            settings = [each for each in engines if each.family == family]
+            others |= {each.line: each.error for each in (settings[0], settings[-1]) if each is not worst}
+    ours = sorted(ours, key=lambda each: each.error)
+    for each, name in zip((*ours[:1], *ours[1:][-1:]), (" of the Python package `conservative`", ""), strict=False):
+        others[f"`{each.method}`{name}"] = each.error
     if others:
-        first, *rest = (f"{name} {{}}by {number(error)} rad" for name, error in others.items())
+        first, *rest = (f"{name} {{}}by {angle(error)} rad" for name, error in others.items())
         parts.append(", ".join([first.format("is wrong "), *(each.format("") for each in rest)]) + ".")
     return " ".join(parts)
 
 
 def table(found: Sequence[Result], scene: Scene) -> Table:
     """Return the results as a table with grades."""
-    drift = f"✓ to {tolerance(CONSERVED)}, ✗ above {tolerance(SMALL)}"
-    header = ["method", "step, s", f"energy drift ({drift})", f"momentum drift ({drift})"]
+    header = ["method", "step, s", *(f"drift of {each.name}" for each in scene.invariants)]
     header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
     rows: list[Row] = []
+    failed: dict[tuple[str, str], list[Result]] = {}
     for each in found:
         step = numeric(each.dt) if each.name == each.line else Cell("adaptive", value=math.nan)
         if not each.outcome.ok:
-            rows.append([each.name, step, outcome_cell(each.outcome), *[DASH] * 4])
+            failed.setdefault((each.family, str(each.outcome)), []).append(each)
             continue
-        drifts = (grade(value) for value in (each.energy, each.momentum))
         order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
-        error = grade(each.error, limits=(RIGHT, USABLE))
-        rows.append([each.name, step, *drifts, error, order, numeric(1e6 * each.time)])
+        error = grade(each.error, angle(each.error), (RIGHT, USABLE))
+        rows.append([each.name, step, *map(grade, each.drifts.values()), error, order, numeric(1e6 * each.time)])
+    for alike in failed.values():  # settings that failed in the same way share a row
+        names, reason = ", ".join(each.name for each in alike), outcome_cell(alike[0].outcome, reason=True)
+        rows.append([names, DASH, reason, *[DASH] * (len(header) - 3)])
     moments, rate = ", ".join(f"{each:.3g}" for each in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
-    caption = f"Largest values over {scene.t_end:.3g} s. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
+    caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
+    caption += f"✗ above {tolerance(SMALL)}. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
-    if ours := [each.line for each in found if each.ours]:
-        caption += f" Ours: {' and '.join(ours)}."
-    if still := [each.line for each in found if each.energy <= CONSERVED and each.momentum <= CONSERVED and each.error > RIGHT]:
-        caption += f" Conservation is not accuracy: {still[0]} conserves both, and its attitude is wrong."
+    if ours := list(dict.fromkeys(each.family for each in found if each.ours)):
+        caption += f" Ours: {listed(ours)}."
+    kept = [each for each in found if each.drifts and max(each.drifts.values()) <= CONSERVED]
+    if still := [each.line for each in kept if each.error > RIGHT]:
+        names = listed([each.name for each in scene.invariants])
+        caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."
     caption += f" Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit)."
     return Table(header, rows, caption)

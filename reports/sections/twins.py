@@ -18,7 +18,7 @@ from conservative.benchmarks.twins.script import script_of
 from conservative.method import Method
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH, number
+from ..document.cells import DASH, bound, number
 from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table, filled
 from ..rows.names import of_measure, of_study
 
@@ -115,7 +115,7 @@ def _cell(twins: Twins) -> str:
 def _sentence(twins: Twins) -> str:
     size = f"{number(twins.factor)} times what rounding explains" if np.isfinite(twins.factor) else ""
     if not twins.allowed and np.isfinite(twins.difference):
-        size = f"{number(twins.difference)} apart, where the same bits are expected"
+        size = f"{bound(twins.difference)} apart, where the same bits are expected"
     return "; ".join(filter(None, (twins.threshold, size, twins.detail))) or twins.outcome
 
 

@@ -9,6 +9,7 @@ import pytest
 import conservative as cv
 from conservative.outcome import OK
 from conservative.reports.animation.frames import make_panels
+from conservative.reports.document import cells
 from conservative.reports.document.model import Facts
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.sections import run, speed, sweep
@@ -53,6 +54,40 @@ def test_angles_of_a_sweep_are_in_the_unit_beside_them():
     (text,) = (value for name, value in facts.facts if name == "  at t = 1 s")
     numbers = [float(word.rstrip("°,")) for word in text.split() if word.rstrip(",").endswith("°")]
     assert numbers == pytest.approx([math.degrees(each) for each in (0.5, 0.1, 1.5)], rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.0547, "0.055"),
+        (0.05, "0.05"),
+        (1.0001e-10, "1.1e-10"),
+        (0.07, "0.07"),
+        (999999.5, "1.0e6"),
+        (0.0, "0"),
+        (-0.171, "-0.18"),
+    ],
+)
+def test_an_error_or_a_drift_is_rounded_up(value, shown):
+    assert cells.bound(value) == shown
+    assert abs(float(shown)) >= abs(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(0.0547, "0.055"), (2.38, "2.4"), (3.1137, "3.12"), (3.14159, "π"), (math.pi, "π")]
+)
+def test_an_attitude_error_is_not_above_the_largest_possible(value, shown):
+    assert cells.angle(value) == shown
+
+
+def test_no_size_is_shown_smaller_than_it_is():
+    for value in 10 ** np.random.default_rng(7).uniform(-17, 8, 500):
+        for digits in (1, 2, 3):
+            assert (
+                value
+                <= float(cells.bound(value, digits).replace(",", "")) * (1 + 1e-15)
+                <= value * (1 + 10.0 ** (1 - digits)) * (1 + 1e-14)
+            )
 
 
 @pytest.mark.parametrize(("ours", "theirs", "words"), [(1.0, 4.0, "4.0 times as fast as"), (4.0, 1.0, "4.0 times as slow as")])

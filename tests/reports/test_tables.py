@@ -176,11 +176,11 @@ def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds()
         "method": "reduced",
         "setting": "dt = 0.25 s",
         "µs per simulated s": "4",
-        "error to expect, rad": "2.0e-05",
+        "error to expect, rad": "2.0e-5",
         "drift to expect": "conserved",
     }
     shown = dict(zip(failing.header, failing.rows[0], strict=True))
-    assert (shown["µs per simulated s"], shown["reaches the error for"], shown["to expect, rad"]) == ("4", "7 s", "2.0e-05")
+    assert (shown["µs per simulated s"], shown["reaches the error for"], shown["to expect, rad"]) == ("4", "7 s", "2.0e-5")
     assert dict(zip(probes.header, probes.rows[0], strict=True))["run, s"] == "3"
 
 
@@ -201,10 +201,10 @@ def bumped():
 
 def test_the_largest_drift_is_shown_and_not_the_last(bumped):
     assert bumped.drift(bumped.scene.invariants[0])[-1] < 1e-12
-    assert "2.00e-03 (relative)" in bumped._repr_html_()
+    assert "2.01e-03 (relative)" in bumped._repr_html_()
     summary = single_run.summarize(bumped, cv.Reduced(), 0.1)
     assert summary["drift"]["energy"] == pytest.approx(2.001e-3, rel=1e-6)
-    assert "2.00e-03 (relative)" in markdown.render(single.build([summary | {"error": {"reason": "not computed"}}]))
+    assert "2.01e-3 (relative)" in markdown.render(single.build([summary | {"error": {"reason": "not computed"}}]))
     assert (summary["last"]["t"], summary["last"]["energy"]) == (bumped.t[-1], bumped.energy[-1])
 
 

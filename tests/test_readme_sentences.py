@@ -1,0 +1,358 @@
+"""Each sentence of README.md with a number, or about what is conserved, has a row: measured, or computed here."""
+
+import importlib
+import re
+from importlib import metadata
+
+import numpy as np
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+import conservative as cv
+from conservative import registry
+from conservative.benchmarks import contest
+from conservative.benchmarks.studies import random
+from conservative.benchmarks.studies.engines_at_one_step import count_turns_over
+
+from .pages import FENCE, INDENTED, ROOT
+
+NUMBER = re.compile(r"(?<![\w.-])\d[\d,]*(?:\.\d+)?(?:e-?\d+)?(?!\w)")
+TELLING = re.compile(r"\d|\bconserve[sd]?\b|\bdrifts?\b")
+BRICK, TOP = registry.scene("brick_flip"), registry.scene("lagrange_top")
+
+
+@pytest.fixture(autouse=True)
+def _beside(monkeypatch):
+    """The files of the program import each other by their names."""
+    monkeypatch.syspath_prepend(ROOT / ".ci" / "readme")
+
+
+def sentences():
+    """Return the sentences of README.md without its code, tables, headings and the targets of its links."""
+    text = INDENTED.sub("", FENCE.sub("", (ROOT / "README.md").read_text(encoding="utf-8")))
+    text = re.sub(r"\]\([^)]*\)", "]", re.sub(r"^[|#].*$", "", text, flags=re.MULTILINE))
+    found = []
+    for paragraph in re.split(r"\n\s*\n|\n(?=\* )", text):
+        found += re.split(r"(?<=[.:])\s+(?=[A-Z`*\[!])", " ".join(paragraph.replace("**", "").split()))
+    return [re.sub(r"`[^`]*`", lambda code: code[0] if "e-" in code[0] else "`x`", each) for each in found]
+
+
+def told(sentence):
+    """Return the numbers of a sentence."""
+    return [float(each.replace(",", "")) for each in NUMBER.findall(sentence)]
+
+
+class Rows:
+    """The rows of measured.csv."""
+
+    def __init__(self):
+        self.program = importlib.import_module("measured")
+        self.measure = importlib.import_module("measure")
+        self.value, self.version, self.date = self.program.read_values()
+
+    def ratios(self, *place):
+        return [Near(each) for each in self.program.interval(self.value, *place)]
+
+    def slower(self, *place):
+        """The ratio of our time to heyoka's, with its ends."""
+        mean, low, high = self.program.interval(self.value, *place)
+        return [Near(1 / mean), Near(1 / high), Near(1 / low)]
+
+    def loses(self, *place):
+        """Whether heyoka is faster."""
+        return self.program.interval(self.value, *place)[2] < 1
+
+    def bodies(self, quantity):
+        return self.value["all fields", self.program.BODIES, quantity]
+
+    def of(self, name, what=""):
+        """The values of a name and a quantity, by place."""
+        ratio = self.program.RATIO + what
+        return {place: value for (place, *key), value in self.value.items() if key == [name, ratio]}
+
+
+class Near(float):
+    """A time or a ratio, which is rounded to two digits."""
+
+    def allows(self, shown):
+        return abs(shown - self) <= 0.06 * self
+
+
+class Up(float):
+    """An error or a drift, which is rounded up to two digits or to a power of ten."""
+
+    def allows(self, shown):
+        return self <= shown <= 1.1 * self or (self <= shown <= 10 * self and np.log10(shown).is_integer())
+
+
+def installed(name, extras, found):
+    """Return the sizes, bytes, of the packages that a package with some extras needs, without those that are not here."""
+    for text in metadata.distribution(name).requires or ():
+        needed = Requirement(text)
+        if needed.marker and not any(needed.marker.evaluate({"extra": each}) for each in extras or {""}):
+            continue
+        if (key := (needed.name.lower(), *sorted(needed.extras))) not in found:
+            files = metadata.distribution(needed.name).files or ()
+            found[key] = sum(file.size or 0 for file in files)
+            installed(needed.name, needed.extras, found)
+    return found
+
+
+def chosen(rows):
+    drifts = [value for (_, name, _), value in rows.value.items() if name == rows.program.CHOSEN]
+    assert len(drifts) == len(registry.list_scenes())
+    return [Up(max(drifts)), len(drifts)]
+
+
+def moving(rows, *names):
+    """Return the numbers of motions of the picture. Energy and momentum drift, except those of the paper's map."""
+    for name in rows.measure.MOVING:
+        drifts = [rows.value["picture", name, f"drift of {each}"] for each in ("energy", "momentum")]
+        assert max(drifts) < 1e-15 if name == "reduced" else min(drifts) > 1e-12  # measured 7e-16, and 5e-11 or more
+    return [Up(rows.value["picture", name, "error"]) for name in names]
+
+
+def steps(rows):
+    """Return the steps of the picture, ms: those of users."""
+    assert registry.method("mujoco:Euler").card.usual_dt == rows.value["picture", "MuJoCo, default", "step"]
+    return [Near(1e3 * rows.value["picture", name, "step"]) for name in ("MuJoCo, default", "PyBullet")]
+
+
+def conserved(rows):
+    kept = [
+        ("brick_flip", "energy"),
+        ("brick_flip", "momentum"),
+        ("lagrange_top", "energy"),
+        ("lagrange_top", "vertical momentum"),
+    ]
+    kept = [rows.value[scene, "reduced", f"drift of {name}"] for scene, name in kept]
+    return [Up(max(kept)), Up(100 * rows.value["lagrange_top", "reduced", "drift of axial momentum"])]
+
+
+def turned(rows):
+    exact = cv.integrate(BRICK, dt=0.01, method=registry.method("exact"))
+    assert count_turns_over(exact) == 2
+    return [BRICK.t_end]
+
+
+def python(rows):
+    allowed = SpecifierSet(metadata.metadata("conservative-rotation")["Requires-Python"])
+    assert [minor for minor in range(30) if allowed.contains(f"3.{minor}")] == [11, 12, 13, 14]
+    size = sum({key[0]: size for key, size in installed("conservative-rotation", {"all"}, {}).items()}.values())
+    assert 1.4e9 < size < 2e9  # measured 1.69e9 with Python 3.11
+    return [3.11, 3.14, 1.7]
+
+
+def at_the_steps(rows):
+    assert (BRICK.dt, TOP.dt) == (0.01, 0.01)
+    turns = [Near(float(np.linalg.norm(scene.w_WB_B0)) * scene.dt) for scene in (BRICK, TOP)]
+    return [0.01, *turns, registry.method("heyoka").tol, registry.method("scipy:loop=compiled").rtol]
+
+
+def of_bodies(rows):
+    errors = sorted({float(place.split()[1]) for place in rows.of(rows.program.BODIES)}, reverse=True)
+    fields = {place.split()[0] for place in rows.of(rows.program.BODIES)}
+    assert (len(errors), len(fields)) == (11, 5)
+    assert "12 rad" in random.__doc__
+    return [12, rows.bodies("bodies in each field"), errors[0], errors[-1], 100 * contest.CONFIDENCE]
+
+
+def cases(rows):
+    lost, opened = rows.bodies("cases lost"), rows.bodies("cases open")
+    unreached = rows.program.count_unreached(rows.value)
+    return [rows.bodies("cases"), *([lost] if lost else []), *([opened] if opened else []), *([unreached] if unreached else [])]
+
+
+def ends(rows, name):
+    """Return the smallest and the largest ratio of a part, with their intervals."""
+    every = sorted(rows.program.interval(rows.value, place, name) for place in rows.of(name) if "all" not in place)
+    return [Near(each) for ratio in (every[0], every[-1]) for each in ratio]
+
+
+def typed(rows):
+    name = rows.program.TYPED
+    tolerances = sorted({float(each.split()[-1]) for each in rows.of(name)})
+    single = [min(rows.of(name, ", smallest").values()), max(rows.of(name, ", largest").values())]
+    return [tolerances[-1], tolerances[0], *ends(rows, name), *map(Near, single)]
+
+
+def once(rows):
+    assert importlib.import_module("price_program").TOL == 1e-9
+    first = [rows.value["price", side, "first run of another body"] for side in ("conservative", "heyoka")]
+    return [1e-6, Near(1e3 * first[0]), 1e-9, Near(1e3 * first[1])]
+
+
+def fastest_on(scene, durations):
+    def check(rows):
+        found = map(float, re.findall(rf"{scene}:t_end=(\d+)", rows.measure.TIMES[1]))
+        assert [registry.scene(scene).t_end, *found] == pytest.approx(durations, rel=0.01)
+        sides = [(scene, name) for name in ("ours", "closed form")]
+        return [*durations, *(each for side in sides for each in (rows.ratios, rows.slower)[rows.loses(*side)](*side))]
+
+    return check
+
+
+def accurate(scene):
+    return lambda rows: [Up(rows.value[scene, name, "error"]) for name in ("heyoka", "ours")]
+
+
+def slower_place(rows):
+    (place,) = [place for place, high in rows.of(rows.program.GENERAL, ", high").items() if high < 1]
+    return [20, 1e-6, *rows.ratios(place, rows.program.GENERAL)]
+
+
+def price(*quantities):
+    def check(rows):
+        return [Near(scale * rows.value["price", side, name]) for side, name, scale in quantities]
+
+    return check
+
+
+def columns(rows):
+    """Each table has a column for each invariant of its scene."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for title, scene in (("brick", BRICK), ("top", TOP)):
+        names = " | ".join(each.name for each in scene.invariants)
+        assert f"| {title} | drift of {names} | error, rad | time, µs |" in text
+    return []
+
+
+def many(rows):
+    errors = [1e-3, 1e-9]
+    ratios = [rows.value[f"one body, median, {error} rad", rows.program.MANY, rows.program.RATIO] for error in ("1e-3", "1e-9")]
+    return [Near(ratios[0]), errors[0], Near(ratios[1]), errors[1]]
+
+
+def cited(rows):
+    assert "COMPDYN 2013" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    return [2013]
+
+
+FIRST = "first run of another body"
+CLAIMS = {
+    "The methods that it chooses conserve": chosen,
+    r"\* `x` is the integrator of Krenk and Nielsen": lambda rows: [cv.Reduced().order],
+    "In 6 s the attitude error of MuJoCo's default": lambda rows: [BRICK.t_end, *moving(rows, "MuJoCo, default", "PyBullet")],
+    "The error of the paper's map stays within": lambda rows: moving(rows, "reduced"),
+    "The brick of Krenk and Nielsen turns over twice": turned,
+    "MuJoCo's default integrator and PyBullet have the steps": steps,
+    "MuJoCo's RK4 at the same step stays within": lambda rows: moving(rows, "MuJoCo, RK4"),
+    r"The paper's map \(`x`\) takes steps of": lambda rows: [1e3 * BRICK.dt],
+    "In a clone of this repository": python,
+    "The two scenes of Krenk and Nielsen's paper": lambda rows: [BRICK.t_end, Near(TOP.t_end)],
+    r"\*Drift\* is the largest relative change": columns,
+    "They are for steps of": at_the_steps,
+    r"\*Time\* does not belong to these settings": lambda rows: [rows.measure.ERROR],
+    r"\* Random bodies, which our closed forms do not solve": lambda rows: ends(rows, rows.program.BODIES),
+    "These are geometric means for motions of": of_bodies,
+    "Of these 1100 cases": cases,
+    r"\* Without knowing the error": typed,
+    "With all code compiled": once,
+    r"\* Motions that our closed forms solve": fastest_on("brick_flip", [6, 24, 96]),
+    "On the top": fastest_on("lagrange_top", [0.63, 2, 8]),
+    "At these steps `x`, the paper's integrator": conserved,
+    "Its attitude error is": lambda rows: [
+        *(Up(rows.value[each, "reduced", "error"]) for each in ("brick_flip", "lagrange_top")),
+        cv.Reduced().order,
+    ],
+    "Measured on": lambda rows: [float(rows.date[:4])],
+    "Parentheses contain intervals": lambda rows: [100 * contest.CONFIDENCE],
+    r"\* heyoka is more accurate than `x` on the brick": accurate("brick_flip"),
+    r"\* heyoka is more accurate than `x` on the top": accurate("lagrange_top"),
+    r"\* heyoka is [\d.]+ \(.*\) times as fast as `x` on the top": lambda rows: [
+        *rows.slower("lagrange_top", "closed form"),
+        0.63,
+        2,
+        8,
+    ],
+    r"\* heyoka is faster than our general integrators": slower_place,
+    r"\* A mean is not every body": lambda rows: [Near(rows.bodies("smallest ratio")), Near(rows.bodies("largest ratio"))],
+    r"\* A single call for a new body": lambda rows: [
+        1e-6,
+        *price(("heyoka", FIRST, 1e3))(rows),
+        1e-6,
+        *price(("conservative", FIRST, 1e3))(rows),
+    ],
+    r"\* One run in a new process": lambda rows: [
+        *price(("heyoka", "one run", 1))(rows),
+        1e-6,
+        *price(("conservative", "one run", 1))(rows),
+    ],
+    r"\* For many starts of one body": many,
+    "A final 0 marks the initial state": lambda rows: [0],
+    "Nielsen, ": cited,
+}
+"""A row for each sentence, by its beginning: a function of the rows of measured.csv that returns its numbers in order."""
+
+
+def named(sentence):
+    """Return the rows of a sentence."""
+    return [row for beginning, row in CLAIMS.items() if re.match(beginning, sentence)]
+
+
+def telling():
+    return [each for each in sentences() if TELLING.search(each)]
+
+
+def test_each_sentence_with_a_number_or_about_conservation_has_a_row():
+    assert [each for each in telling() if len(named(each)) != 1] == []
+    assert len(telling()) > 30
+
+
+@pytest.mark.parametrize("sentence", ["It conserves energy.", "It takes 3 ms.", "Its energy drifts."])
+def test_a_sentence_without_a_row_is_found(sentence):
+    assert TELLING.search(sentence)
+    assert named(sentence) == []
+
+
+@pytest.mark.parametrize("sentence", telling(), ids=lambda sentence: sentence[:40])
+def test_the_numbers_of_a_sentence_are_those_of_its_row(sentence):
+    (row,) = named(sentence)
+    expected, shown = row(Rows()), told(sentence)
+    assert len(shown) == len(expected), (shown, expected)
+    assert all(
+        want.allows(number) if isinstance(want, Near | Up) else number == pytest.approx(want, rel=1e-12)
+        for number, want in zip(shown, expected, strict=True)
+    ), (shown, expected)
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "The error of the paper's map stays within 0.05 rad, and it conserves both.]",
+        "In 6 s the attitude error of MuJoCo's default integrator reaches 0.6 rad and that of PyBullet 1 rad, and both drift.",
+    ],
+)
+def test_a_number_that_is_rounded_down_is_found(sentence):
+    with pytest.raises(AssertionError):
+        test_the_numbers_of_a_sentence_are_those_of_its_row(sentence)
+
+
+FEW = ("kovalevskaya_top", "sprung_body", "lagrange_top", "brick_flip", "tumbling_satellite", "thrown_box", "volterra_gyrostat")
+"""A scene of each kind of motion, with the largest drifts of all first."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=() if each in FEW else pytest.mark.slow) for each in registry.list_scenes()]
+)
+def test_the_methods_that_are_chosen_conserve(name):
+    method, drift = importlib.import_module("measure").chosen_drift(name)
+    (limit, _), rows = chosen(Rows()), Rows()
+    assert drift <= 1e-13, method  # measured 3.1e-14 for the integral of Kovalevskaya's top, and at most 5.7e-15 elsewhere
+    assert limit <= 1e-13
+    assert (name, rows.program.CHOSEN, "largest drift") in rows.value
+
+
+@pytest.mark.parametrize("scene", [BRICK, TOP], ids=lambda scene: scene.name)
+def test_the_rows_of_the_papers_map_are_measured(scene):
+    """It does not conserve the momentum about the axis of the top."""
+    run, exact = (cv.integrate(scene, dt=scene.dt, method=registry.method(name)) for name in ("reduced", "exact"))
+    rows = Rows().value
+    assert run.error(exact).max() == pytest.approx(rows[scene.name, "reduced", "error"], rel=1e-6)  # measured 4e-12
+    for each in scene.invariants:
+        drift, row = (
+            float(np.linalg.norm(np.atleast_2d(run.drift(each).T).T, axis=1).max()),
+            rows[scene.name, "reduced", f"drift of {each.name}"],
+        )
+        assert drift == pytest.approx(row, rel=1e-6, abs=1e-15)
