@@ -12,7 +12,7 @@ import numpy as np
 
 from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
-from .check import describe
+from .check import describe, has_masked
 from .deferred_imports import ROOMS, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
 from .grid import Grid
@@ -281,6 +281,8 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
             return f"{name} as a {type(values).__name__}"
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
+        if has_masked(values):
+            return f"{name} with masked entries"
     frame: Any = result.frame
     if frame is not None and (scene.flight is None or [np.shape(each) for each in frame] != [(n, 3)] * 2):
         return "positions and velocities that are not two arrays (n, 3) in free flight"
