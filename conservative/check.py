@@ -55,7 +55,7 @@ def describe(value: object) -> str:
 
 
 def has_masked(value: object) -> bool:
-    """Return whether an array, or one in nested lists or tuples, has masked entries. NumPy would convert what is below the mask.
+    """Return whether an array, or one in nested lists or tuples, has masked entries. NumPy drops the mask.
 
     The attribute `mask` of arrays is NumPy's, and that of packages with masked arrays of their own.
     """
@@ -122,7 +122,7 @@ def require_size(inertia: Array) -> None:
 
 
 def real_array(value: object) -> Array | None:
-    """Return `value` as a new array of floats, finite or not; None if it is not an array of real numbers, or has masked entries."""
+    """Return `value` as a new array of floats, finite or not; None if it has masked entries, or is not of real numbers."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
     try:

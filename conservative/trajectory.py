@@ -277,12 +277,10 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
             return "a failure of another type"
         n = len(result.t) if isinstance(result.t, np.ndarray) else n
     for name, values, shape in (("t", result.t, (n,)), ("R_WB", result.R_WB, (n, 3, 3)), ("w_WB_B", result.w_WB_B, (n, 3))):
-        if not isinstance(values, np.ndarray):
-            return f"{name} as a {type(values).__name__}"
+        if not isinstance(values, np.ndarray) or has_masked(values):
+            return f"{name} as a {type(values).__name__}{' with masked entries' * has_masked(values)}"
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
-        if has_masked(values):
-            return f"{name} with masked entries"
     frame: Any = result.frame
     if frame is not None and (scene.flight is None or [np.shape(each) for each in frame] != [(n, 3)] * 2):
         return "positions and velocities that are not two arrays (n, 3) in free flight"
