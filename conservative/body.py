@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array, triple
-from .check import PickledByFields, read_inertia, read_only, set_fields
+from .check import PickledByFields, numbers, read_inertia, read_only, set_fields
 from .errors import ImpossibleInertia
 from .needs import Need, Needs
 from .potentials.load import Given, RotorMomentum
@@ -121,9 +121,10 @@ class RigidBody(PickledByFields):
 
         Times (...), s, matter if the rotor has a motor.
         """
-        of_body = np.asarray(w_WB_B, dtype=float) @ self.inertia
+        of_body = numbers("w_WB_B", w_WB_B) @ self.inertia
         if self.motor is not None:
-            return of_body + np.array([self.motor.at(each) for each in np.ravel(t).tolist()]).reshape(*np.shape(t), 3)
+            times = numbers("t", t)
+            return of_body + np.array([self.motor.at(each) for each in times.ravel().tolist()]).reshape(*times.shape, 3)
         return of_body if self.rotor_momentum is None else of_body + self.rotor_momentum
 
     def rotor_along(self, R_BF: Array) -> tuple[float, float, float] | None:

@@ -13,9 +13,9 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple, TypeVar
 
-from .check import describe, real_number
+from .check import describe, real_number, set_fields
 from .errors import BadInput, nearest
-from .needs import FIELDS, Needs
+from .needs import FIELDS, Needs, read_needs
 from .version import VERSION
 
 T = TypeVar("T")
@@ -133,6 +133,9 @@ class Card:
     kernel: str = ""
     structure: Callable[[Any], Structure | None] = lambda method: None
     takes: Needs = FIELDS
+
+    def __post_init__(self) -> None:
+        set_fields(self, takes=read_needs("takes", self.takes))
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

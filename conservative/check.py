@@ -48,10 +48,20 @@ _UNIT = 4 * np.finfo(float).eps
 def describe(value: object) -> str:
     """Return `repr(value)`, at most 200 characters of it, or the type if `repr` fails."""
     try:
-        text = repr(value)
+        text = f"{'masked entries in ' * has_masked(value)}{value!r}"
     except Exception:  # an integer of 5,000 digits, or a user's class
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= 200 else f"{text[:200]}..."
+
+
+def has_masked(value: object) -> bool:
+    """Return whether an array, or one in nested lists or tuples, has masked entries. NumPy drops the mask.
+
+    The attribute `mask` of arrays is NumPy's, and that of packages with masked arrays of their own.
+    """
+    if isinstance(value, list | tuple):
+        return any(type(each) is not float and has_masked(each) for each in value)
+    return isinstance(value, np.ndarray) and type(value) is not np.ndarray and bool(np.any(getattr(value, "mask", False)))
 
 
 def finite_array(
@@ -112,10 +122,12 @@ def require_size(inertia: Array) -> None:
 
 
 def real_array(value: object) -> Array | None:
-    """Return `value` as a new array of floats, finite or not; None if it is not an array of real numbers."""
+    """Return `value` as a new array of floats, finite or not; None if it has masked entries, or is not of real numbers."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
     try:
+        if has_masked(value):
+            return None
         with np.errstate(all="ignore"):
             array = np.asarray(value)
             if array.dtype.kind == "O":
@@ -126,6 +138,14 @@ def real_array(value: object) -> Array | None:
             return np.array(array, dtype=float)
     except Exception:  # rows of unequal length, integers beyond the range of floats, or a user's `__array__`
         return None
+
+
+def numbers(argument: str, value: ArrayLike) -> Array:
+    """Return numbers of any shape, finite or not, as floats."""
+    array = real_array(value)
+    if array is None:
+        raise BadInput(argument, describe(value), "real numbers")
+    return array
 
 
 def _in_range(size: float) -> bool:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from .errors import NotWritten
 from .posix import NO_LOCK, lock, release
@@ -60,6 +60,28 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
         left = memoryview(content)
         while left:
             left = left[raw.write(left) :]
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a file for reading. Raise `OSError` for a pipe or a device: opening or reading it could go on for ever."""
+    stream = open(path, "rb", opener=_open_at_once)  # noqa: SIM115  # Path.open has no opener; the caller closes it
+    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        return stream
+    stream.close()
+    raise OSError(errno.EINVAL, "a pipe or a device, not a file", str(path))
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))  # otherwise a pipe waits for a writer
+
+
+def read_bytes(path: Path, largest: int) -> bytes:
+    """Return the content of a file. Raise `OSError` for a pipe or a device, and for more bytes than `largest`."""
+    with open_file(path) as stream:
+        content = stream.read(largest + 1)
+    if len(content) > largest:
+        raise OSError(errno.EFBIG, f"more than {largest} bytes", str(path))
+    return content
 
 
 def safe_name(text: str) -> str:

@@ -12,8 +12,9 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Any
 
+from .check import describe
 from .deferred_imports import ENGINES, METHODS, list_entries, load_entry
-from .errors import MissingEngine, NotLoadable
+from .errors import BadInput, MissingEngine, NotLoadable
 
 
 class Need(StrEnum):
@@ -47,11 +48,20 @@ ROTATION: Needs = FIELDS | {Need.FLIGHT}
 """Parts taken by methods that integrate the rotation in any field: in free flight the position follows from it."""
 
 
+def read_needs(argument: str, value: Any) -> Needs:
+    """Return a set of members of `Need`. Raise `BadInput` for anything else, such as texts: nothing would ever need them."""
+    wrong = [each for each in value if not isinstance(each, Need)] if isinstance(value, set | frozenset) else [value]
+    if wrong:
+        allowed = f"a set of members of conservative.Need: {', '.join(f'Need.{each.name}' for each in Need)}"
+        raise BadInput(argument, describe(wrong[0]), allowed)
+    return frozenset(value)
+
+
 def needs_of(part: Any) -> Needs:
     """Return the needs of a part of a scene; a user's potential without the attribute `needs` is of Python functions."""
     if part is None:
         return frozenset()
-    own: Needs = getattr(part, "needs", frozenset({Need.FUNCTION}))
+    own = read_needs("needs", getattr(part, "needs", frozenset({Need.FUNCTION})))
     return own | {Need.TIME} if getattr(part, "time_dependent", False) and Need.TURNING not in own else own
 
 

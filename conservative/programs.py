@@ -14,7 +14,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import tomllib
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from pathlib import Path
 
 from .errors import BadInput
 from .posix import is_own
+from .scene_files.toml_reader import read
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,11 @@ def list_programs() -> dict[str, Program]:
 
 def read_programs(file: Path) -> dict[str, Program]:
     """Return the programs in a file by name. Raise `BadInput` as `list_programs`."""
+    allowed = 'a table [engines] of texts, such as my_engine = "build/my_engine"'
+    commands = read(file, allowed).texts("engines", allowed)
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8")).get("engines", {})
-        if wrong := next(filter(re.compile(r"[@=:,\s]").search, table.keys()), None):
+        if wrong := next(filter(re.compile(r"[@=:,\s]").search, commands), None):
             raise ValueError(f"the name {wrong!r} has one of '@', '=', ':' and ',', or a space")  # no command could take it
-        return {name: Program(name, file, command) for name, command in table.items() if shlex.split(command)}
-    except (OSError, ValueError, AttributeError) as error:
-        raise BadInput(str(file), str(error), 'a table [engines] of texts, such as my_engine = "build/my_engine"') from None
+        return {name: Program(name, file, command) for name, command in commands.items() if shlex.split(command)}
+    except ValueError as error:  # or a quote without another one
+        raise BadInput(str(file), str(error), allowed) from None

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
-from .check import describe
+from .check import describe, has_masked
 from .deferred_imports import ROOMS, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
 from .grid import Grid
@@ -288,8 +288,8 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
             return "a failure of another type"
         n = len(result.t) if isinstance(result.t, np.ndarray) else n
     for name, values, shape in (("t", result.t, (n,)), ("R_WB", result.R_WB, (n, 3, 3)), ("w_WB_B", result.w_WB_B, (n, 3))):
-        if not isinstance(values, np.ndarray):
-            return f"{name} as a {type(values).__name__}"
+        if not isinstance(values, np.ndarray) or has_masked(values):
+            return f"{name} as a {type(values).__name__}{' with masked entries' * has_masked(values)}"
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
     frame: Any = result.frame

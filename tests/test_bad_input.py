@@ -45,6 +45,10 @@ def field(**changed):
     return cv.FunctionPotential(**arguments | changed)
 
 
+class Texts(cv.UniformGravity):
+    needs = frozenset({"gravity"})
+
+
 API = [
     # bodies
     (lambda: cv.RigidBody((1, 2, NAN)), "inertia", "nan", "three positive moments"),
@@ -137,6 +141,11 @@ API = [
     (lambda: scene(extra_invariants=[1.0]), "extra_invariants", "[1.0]", "Invariants"),
     (lambda: scene(potential=cv.UniformGravity), "potential", "UniformGravity", "a Potential"),
     (lambda: scene(name="a\0b"), "name", "x00", "a text"),
+    (lambda: cv.Card(takes={"gravity"}), "takes", "'gravity'", "Need.GRAVITY"),
+    (lambda: cv.Card(takes="rotors"), "takes", "'rotors'", "Need.ROTOR"),
+    (lambda: cv.Card(takes=frozenset({"uniform gravity", cv.Need.ROTOR})), "takes", "'uniform gravity'", "Need.GRAVITY"),
+    (lambda: cv.Card(takes=[cv.Need.GRAVITY]), "takes", "Need.GRAVITY", "a set of members"),
+    (lambda: scene(potential=Texts(1.0, (0, 0, 1))), "needs", "'gravity'", "Need.GRAVITY"),
     (lambda: cv.Invariant("i", "J", 0.0, len), "scale", "0.0", "above 0"),
     (lambda: cv.Invariant("i", "J", 1.0, None), "evaluate", "None", "a function"),
     (lambda: body_from_mjcf("a\0b", "arm"), "path", "x00", "without NUL"),

@@ -7,12 +7,12 @@ my_method = "6x: the gyroscopic torque is computed"
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
+from conservative.scene_files.toml_reader import read
 
 TABLE = "accept-slower"
 
@@ -33,12 +33,8 @@ def read_prices(texts: Sequence[str], file: Path) -> dict[str, Price]:
 
     Raises `BadInput` for a text or a line that is not one.
     """
-    prices = dict[str, Price]()
-    try:
-        lines = tomllib.loads(file.read_text(encoding="utf-8")).get(TABLE, {}) if file.is_file() else {}
-        lines = {name: str(text) for name, text in lines.items()}
-    except (OSError, ValueError, AttributeError) as error:
-        raise BadInput(str(file), str(error), f'a table [{TABLE}] of texts, such as my_method = "6x: the reason"') from None
+    prices, allowed = dict[str, Price](), f'a table [{TABLE}] of texts, such as my_method = "6x: the reason"'
+    lines = read(file, allowed).texts(TABLE, allowed) if file.is_file() else {}
     for text in [*(f"{name}={text}" for name, text in lines.items()), *texts]:
         found = re.fullmatch(r"(.+?)=\s*(\d+(?:\.\d+)?)x(?::\s*(.*\S))?\s*", text)
         if not found or float(found[2]) <= 1 or (len(prices) < len(lines) and not found[3]):

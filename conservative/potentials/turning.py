@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arithmetic import cosine, product, scale, sine
 from ..attitude import Array, from_quaternion, triple
-from ..check import describe, positive_number, replace_unchecked, set_fields, unit_vector
+from ..check import describe, numbers, positive_number, replace_unchecked, set_fields, unit_vector
 from ..errors import BadInput
 from ..needs import Need, Needs, needs_of
 from .gravity_gradient import GravityGradient
@@ -49,7 +49,7 @@ class Orbit:
 
     def R_WO(self, t: ArrayLike) -> Array:
         """Return the attitudes of the axes O in the world, (..., 3, 3), at times (...), s."""
-        half = np.asarray(self.rate / 2 * np.asarray(t, dtype=float))[..., None]
+        half = np.asarray(self.rate / 2 * numbers("t", t))[..., None]
         return from_quaternion(np.concatenate([np.cos(half), np.sin(half) * self.normal_W], axis=-1))
 
     def gravity_gradient(self, inertia: ArrayLike, direction_W: ArrayLike) -> Turning:

@@ -19,7 +19,7 @@ from conservative.deferred_imports import list_entries
 from conservative.errors import BadInput, MissingEngine
 from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
-from conservative.scene_files.toml_reader import key_lines
+from conservative.scene_files.toml_reader import read
 
 from ..worker.client import START_LIMIT
 from .engine_method import EngineMethod, engine_class
@@ -97,7 +97,7 @@ def register(program: Program, undo: bool = False) -> Program:
     if new:
         program_class(program)
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
-    numbers = key_lines("\n".join(lines))
+    numbers = read(file).lines if lines else {}
     if place := numbers.get(("engines", name)):
         lines[place - 1 : place] = new
     elif place := numbers.get(("engines",)):

@@ -1,6 +1,9 @@
 """Scenes from TOML files: every form of every part, fields that turn, and mistakes reported with line and key."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -8,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry, shapes
-from conservative.scene_files import scene_file
-from conservative.scene_files.toml_reader import LARGEST, BadFile, key_lines
+from conservative.scene_files import scene_file, toml_reader
+from conservative.scene_files.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
 
 AXIS, ANGLE = np.array([0.3, -1.2, 0.7]), 0.83
 R = Rotation.from_rotvec(ANGLE * AXIS / np.linalg.norm(AXIS)).as_matrix()
@@ -201,7 +204,7 @@ BAD = {
     "empty name": ('name = ""\n' + GOOD, 1, "name", "''"),
     "nan weight": (replaced("12.5", "nan"), 14, "potential.weight", "nan"),
     "too large an integer": (replaced("12.5", "1" + 400 * "0"), 14, "potential.weight", "1000"),
-    "integer of 9,999 digits": (replaced("12.5", 9999 * "1"), 20, "", "not TOML"),
+    "integer of 9,999 digits": (replaced("12.5", 9999 * "1"), 14, "", "not TOML"),
     "not symmetric": (replaced("[3.1, 0.2, -0.1]", "[3.1, 0.9, -0.1]"), 6, "body.inertia", "not symmetric"),
     "no direction": (replaced(str(AXIS.tolist()), "[0, 0, 0]"), 19, "start.R_WB.axis", "[0.0, 0.0, 0.0]"),
     "empty attitude": (body_of("inertia = [1, 2, 3]").split("R_WB")[0] + "R_WB = {}", 10, "start.R_WB", "empty table"),
@@ -218,7 +221,12 @@ BAD = {
     "not TOML": (replaced("dt = 0.01", "dt = = 0.01"), 3, "", "Invalid value"),
     "twice": (replaced("dt = 0.01", "dt = 0.01\ndt = 0.02"), 4, "", "Cannot overwrite"),
     "not UTF-8": (GOOD.encode() + b"\n# \xff", 22, "", "not UTF-8"),
-    "deep": (replaced("12.5", 5000 * "["), None, "", "not TOML"),
+    "hexadecimal of 5,000 digits": (replaced("12.5", "0x" + 5000 * "f"), 14, "potential.weight", "an integer"),
+    "deep": (replaced("12.5", 5000 * "["), 14, "", "at most 32 deep"),
+    "deep arrays": (replaced("12.5", 40 * "[" + 40 * "]"), 14, "", "at most 32 deep"),
+    "deep inline tables": (replaced("12.5", 400 * "{a = " + "1" + 400 * "}"), 14, "", "at most 32 deep"),
+    "a key of many parts": (replaced("weight =", "weight" + " . 'a'" * 20_000 + "=="), 14, "", "a key of more than 32 parts"),
+    "a header of many parts": (replaced("[start]", '[start."a.b"' + 20_000 * ".b" + "]"), 17, "", "a key of more than"),
 }
 
 
@@ -233,6 +241,43 @@ def test_a_mistake_is_reported_with_file_line_key_and_value(written, name):
     assert error.argument == f"{path}, line {error.line}" + (f": {key}" if key else "")
     assert got in str(error)
     assert error.allowed
+
+
+def nested(depth):
+    return {"parts": "a." * depth + "a = 1", "arrays": "a = " + "[" * depth + "]" * depth}
+
+
+@pytest.mark.parametrize("form", ["parts", "arrays"])
+def test_the_depth_of_keys_and_arrays_is_bounded_before_it_is_parsed(written, form, monkeypatch):
+    read(written(nested(DEEPEST - 1)[form]))
+    texts = f'a = "{"b." * 99}"\nc = """\n{"d." * 99}"""  # {"e." * 99}\n"{"f." * 99}" = [\n1.5,\n2.5]'
+    assert read(written(texts)).lines == {("a",): 1, ("c",): 2, ("f." * 99,): 4}
+    if form == "parts":
+        monkeypatch.setattr(toml_reader.tomllib, "loads", lambda text: pytest.fail("parsed, which takes the cube of its parts"))
+    with pytest.raises(BadFile, match="32 deep"):
+        read(written(nested(DEEPEST + 1)[form]))
+
+
+def test_a_statement_of_many_lines_is_parsed_once(written, monkeypatch):
+    """Earlier versions parsed up to each of its line ends, and refused more than 100 lines."""
+    parsed, loads = [], toml_reader.tomllib.loads
+    monkeypatch.setattr(toml_reader.tomllib, "loads", lambda text: parsed.append(len(text)) or loads(text))
+    text = "t = [\n" + "1, 2,\n" * 2000 + "]\nu = 1"
+    assert read(written(text)).lines == {("t",): 1, ("u",): 2003}
+    assert sum(parsed) <= 2 * len(text)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in folders")
+@pytest.mark.parametrize("kind", ["pipe", "/dev/zero", "/dev/full", "/dev/stdin of a pipe"])
+def test_a_pipe_and_a_device_are_refused(tmp_path, kind):
+    place = tmp_path / "pipe.toml"
+    if kind == "pipe":
+        os.mkfifo(place)
+    else:
+        place.symlink_to(kind.split()[0])
+    command = [sys.executable, "-c", "import sys; from conservative.scene_files.scene_file import load; load(sys.argv[1])"]
+    made = subprocess.run([*command, place], input="t_end = 1", text=True, capture_output=True, timeout=100, check=False)
+    assert "got a pipe or a device, not a file; expected a TOML file" in made.stderr
 
 
 @pytest.mark.parametrize("make", [lambda path: path / "no.toml", lambda path: path])
