@@ -22,7 +22,7 @@ ENGINES = "conservative.engines"
 ROOMS = "conservative.rooms"
 """Group of what this room uses of the rooms above it, which it cannot import."""
 DEFAULT_METHOD = "reduced"
-"""Name of the default method of `integrate`, `Reduced()`."""
+"""Name of the method of `integrate` for a given step, `Reduced()`."""
 _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "conservative engines list"}
 """Commands that list the names of a group."""
 

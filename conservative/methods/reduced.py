@@ -1,4 +1,4 @@
-"""The paper's map in three unknowns: the default method."""
+"""The paper's map in three unknowns: the default method for a given step."""
 
 from __future__ import annotations
 

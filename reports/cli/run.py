@@ -80,7 +80,7 @@ def run(
 
     Without --methods and --dt, the method and the step are chosen for an attitude error of 1e-6 rad. With --methods or --dt,
     every step is stored, of longer runs a million evenly spaced ones. If the run fails, the files contain the samples before
-    the failure, and the exit code is 1. It is also 1 if the attitude error is above 0.1 rad.
+    the failure. The exit code is 1 if a run fails or its attitude error is above 0.1 rad.
     """
     if files["parquet"] is not None:
         require_extra("conservative run --parquet", "parquet", "pyarrow")

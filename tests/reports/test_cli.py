@@ -213,8 +213,9 @@ NAMED = ["brick_flip:disturbance=1e-6", "tumbling_satellite"]
 
 def run_as_json(*arguments):
     done = conservative("run", *arguments, "--json")
-    assert done.exit_code == 0, done.output
-    return json.loads(done.stdout)
+    found = json.loads(done.stdout)
+    assert done.exit_code == int(found["status"].startswith("inaccurate")), done.output
+    return found
 
 
 @pytest.mark.parametrize(

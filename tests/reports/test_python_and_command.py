@@ -29,9 +29,8 @@ def test_python_and_the_command_line_answer_alike(name):
         found = cv.integrate(registry.scene(name))
     asked = run(name, "--no-truth")
     assert asked["outcome"]["kind"] == found.outcome.kind.value
-    assert (
-        (asked["method"], asked["choice"]["error"]) == (found.choice.method.name, found.choice.error) == (asked["method"], 1e-6)
-    )
+    assert asked["method"] == found.choice.method.name
+    assert asked["choice"]["error"] == found.choice.error == 1e-6
     assert asked["choice"]["reached"] == found.choice.reached == (name not in DEAR)
     assert asked["last"]["t"] == pytest.approx(found.t[-1], rel=1e-12)
     allowed = max(2e-6, 2 * found.choice.estimate)
@@ -42,18 +41,17 @@ def test_the_top_is_integrated_to_the_error_of_the_command():
     """It was "ok" and 2.21 rad off, with `Reduced` and steps of 0.01 s for any body."""
     top = cv.scenes.lagrange_top()
     found = cv.integrate(top)
-    exact = cv.integrate(top, method="exact")
-    assert exact.t[-1] == pytest.approx(found.t[-1])
+    exact = cv.integrate(top, method="exact", t_eval=[0.0, top.t_end])
     assert angle_between(found.R_WB[-1], exact.R_WB[-1]) < 1e-6  # measured: 1e-13
 
 
 def test_a_method_alone_takes_the_step_of_the_scene():
     for scene in (cv.scenes.brick_flip(), cv.scenes.stable_satellite()):
-        found = cv.integrate(scene, method="projected")
+        found = cv.integrate(scene, method="taylor")
         assert found.t[1] == scene.dt
-        many = cv.integrate_many(scene, w_WB_B0=scene.w_WB_B0[None] * [[1.0], [1.1]], method="projected", threads=1)
+        many = cv.integrate_many(scene, w_WB_B0=scene.w_WB_B0[None] * [[1.0], [1.1]], method="taylor", threads=1)
         assert many.grid.dt == scene.dt
-    short = cv.integrate(cv.scenes.stable_satellite(), method="projected", t_end=1.0)
+    short = cv.integrate(cv.scenes.stable_satellite(), method="taylor", t_end=1.0)
     assert short.t[-1] == 1.0
 
 
