@@ -1,5 +1,7 @@
 """The paper's equations, identity by identity, on generic parameters."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,31 @@ def test_papers_period_error_of_the_top(dt, error):
     exact = rotation_about((0, 0, 1), 10 * trajectory.t[-1]) @ scene.R_WB0 @ scene.potential.com_B
     off = abs((trajectory.R_WB[-1] @ scene.potential.com_B - exact)[0])
     assert off == pytest.approx(error, abs=1e-4)  # measured 0.05999, 0.02044, 0.00509
+
+
+def off_start(rate: Any) -> Any:
+    """Return a method whose first sample has another rate, rad/s."""
+
+    class Off(cv.Convected):
+        def prepare(self, scene, grid):
+            run = super().prepare(scene, grid)
+
+            def moved():
+                found = run()
+                found.w_WB_B[0] += rate
+                return found
+
+            return moved
+
+    return Off()
+
+
+@pytest.mark.parametrize(
+    ("J", "off"), [((1, 1, 1e-12), (1e-5, 0, 0)), ((1, 1, 1e-12), (0, 0, 0.01)), ((1, 2, 2), (0, 0, 1e-5))]
+)
+def test_a_first_sample_of_a_rod_is_compared_up_to_round_off_of_its_momentum(J: Any, off: Any) -> None:
+    # The momentum has round-off of 1e-16, which over 1e-12 is a rate of 1e-4 rad/s about the axis, and no mistake.
+    scene = cv.Scene("rod", cv.RigidBody(J), rotation_about((0.3, 0.4, -0.8), 0.9), (0.7, -0.4, 0.0), 0.1)
+    kinds = [method.solve(scene, cv.Grid(1e-3, 10, 1)).outcome.kind for method in (cv.Convected(), off_start(off))]
+    assert kinds[0] is not cv.OutcomeKind.INVALID
+    assert kinds[1] is cv.OutcomeKind.INVALID
