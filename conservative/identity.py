@@ -118,6 +118,10 @@ def fields_of_motion(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.metadata.get("of motion", True))
 
 
+def _is_dataclass(kind: Any) -> bool:
+    return is_dataclass(kind)
+
+
 def _top(module: object) -> str:
     return module.partition(".")[0] if isinstance(module, str) else ""
 
@@ -188,7 +192,7 @@ class _Walk:
         if kind is frozenset:
             yield sorted(self._all(value))
             return
-        if is_dataclass(kind) and _top(kind.__module__) == _PACKAGE and "<" not in kind.__qualname__:
+        if _is_dataclass(kind) and _top(kind.__module__) == _PACKAGE and "<" not in kind.__qualname__:
             yield [(name, self.follow(getattr(value, name))) for name in fields_of_motion(kind)]
             return
         self.fixed = False
@@ -384,7 +388,7 @@ def _keeps_values(kind: type) -> bool:
 @cache
 def _derived_names(kind: Any) -> frozenset[str]:
     """Return the attributes of a frozen dataclass that follow from its fields: cached properties, and those not of motion."""
-    if not is_dataclass(kind) or not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+    if not _is_dataclass(kind) or not kind.__dataclass_params__.frozen:
         return frozenset()
     cached = {name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property)}
     return frozenset(cached | {each.name for each in fields(kind)} - {*fields_of_motion(kind)})
