@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import builtins
 import dis
+import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import takewhile
 from types import CodeType, MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
@@ -21,6 +23,8 @@ MISSING: Any = type("Missing", (), {"__repr__": lambda self: "MISSING"})()
 """A name without a value."""
 _SKIPPED = frozenset(["RESUME", "NOP", "PUSH_NULL", "EXTENDED_ARG", "PRECALL", "COPY_FREE_VARS", "MAKE_CELL", "NOT_TAKEN"])
 _WHILE_IMPORTING = frozenset(["POP_TOP", "SWAP"])
+_ATTRIBUTES = frozenset(["LOAD_ATTR", "LOAD_METHOD"])
+_TWO = re.compile(r"((?:LOAD|STORE)_FAST(?:_BORROW)?)_((?:LOAD|STORE)_FAST(?:_BORROW)?)")
 
 
 class Read(NamedTuple):
@@ -49,66 +53,57 @@ class Reads:
 @lru_cache(maxsize=1024)
 def reads_of(code: CodeType) -> Reads:
     """Return the reads of a code, without the functions in it."""
-    steps = [each for each in dis.get_instructions(code) if each.opname not in _SKIPPED]
+    steps = list(_list_steps(code))
     bound, imports = _list_imports(steps)
     reads, written, writes_global = list(imports), set[str](), False
-    for i, step in enumerate(steps):
-        kind, argument = step.opname, step.argval
+    for i, (kind, name) in enumerate(steps):
         if kind in ("STORE_GLOBAL", "DELETE_GLOBAL"):
             writes_global = True
-        elif kind in ("STORE_DEREF", "DELETE_DEREF") and argument in code.co_freevars:
-            written.add(argument)
+        elif kind in ("STORE_DEREF", "DELETE_DEREF") and name in code.co_freevars:
+            written.add(name)
         elif kind.startswith("LOAD_"):
-            names = argument if isinstance(argument, tuple) else (argument,)
-            attributes = _attributes_after(steps, i)
-            for j, name in enumerate(names):
-                after = attributes if j == len(names) - 1 else ()  # of the last one, which is on top
-                if name in bound and ("FAST" in kind or "DEREF" in kind) and "CLOSURE" not in kind:
-                    origin = bound[name]
-                    reads.append(origin._replace(attributes=origin.attributes + after))
-                elif kind in ("LOAD_GLOBAL", "LOAD_NAME") or "DICT_OR_GLOBALS" in kind:
-                    reads.append(Read(name, after))
-                elif ("DEREF" in kind or "CLASSDEREF" in kind) and name in code.co_freevars:
-                    reads.append(Read(name, after, free=True))
+            after = tuple(each for _, each in takewhile(lambda step: step[0] in _ATTRIBUTES, steps[i + 1 :]))
+            if ("FAST" in kind or "DEREF" in kind) and name in bound:
+                origin = bound[name]
+                reads.append(origin._replace(attributes=origin.attributes + after))
+            elif kind in ("LOAD_GLOBAL", "LOAD_NAME") or "DICT_OR_GLOBALS" in kind:
+                reads.append(Read(name, after))
+            elif "DEREF" in kind and name in code.co_freevars:
+                reads.append(Read(name, after, free=True))
     return Reads(tuple(dict.fromkeys(reads)), MappingProxyType(bound), frozenset(written), writes_global)
 
 
-def _attributes_after(steps: list[dis.Instruction], i: int) -> tuple[str, ...]:
-    found = []
-    for step in steps[i + 1 :]:
-        if step.opname not in ("LOAD_ATTR", "LOAD_METHOD"):
-            break
-        found.append(step.argval)
-    return tuple(found)
+def _list_steps(code: CodeType) -> Iterator[tuple[str, Any]]:
+    """Yield names and arguments of instructions. Those that are two in one, such as LOAD_FAST_LOAD_FAST, are divided."""
+    for each in dis.get_instructions(code):
+        if isinstance(each.argval, tuple) and (two := _TWO.fullmatch(each.opname)):
+            yield from zip(two.groups(), each.argval, strict=True)
+        elif each.opname not in _SKIPPED:
+            yield each.opname, each.argval
 
 
-def _list_imports(steps: list[dis.Instruction]) -> tuple[dict[str, Read], list[Read]]:
+def _list_imports(steps: list[tuple[str, Any]]) -> tuple[dict[str, Read], list[Read]]:
     """Return the variables that imports bind, and reads of those that are more than modules."""
     bound: dict[str, Read] = {}
     reads: list[Read] = []
     current = item = None
-    for i, step in enumerate(steps):
-        kind = step.opname
+    for i, (kind, argument) in enumerate(steps):
         if kind == "IMPORT_NAME":
-            level, names = (_constant(steps[i - 2]), _constant(steps[i - 1]))
-            whole = step.argval if names or level else step.argval.partition(".")[0]
+            (_, level), (_, names) = steps[i - 2 : i]
+            whole = argument if names or level else argument.partition(".")[0]
             current, item, direct = Read(whole, imported=True, level=level or 0), None, names is None
         elif current is None:
             continue
         elif kind == "IMPORT_FROM":
-            item = current._replace(attributes=(*current.attributes, step.argval))
+            item = current._replace(attributes=(*current.attributes, argument))
             current = item if direct else current
-        elif kind.startswith("STORE_") and isinstance(step.argval, str):
-            bound[step.argval] = item or current
+        elif kind.startswith("STORE_"):
+            bound[argument] = item or current
             if item is not None and not direct:
                 reads.append(item)
         elif kind not in _WHILE_IMPORTING:
             current = None
     return bound, reads
-
-
-def _constant(step: dis.Instruction) -> Any:
-    return step.argval if step.opname.startswith("LOAD_") else None
 
 
 def resolve(

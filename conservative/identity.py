@@ -36,7 +36,7 @@ def _names(text: str) -> frozenset[str]:
 
 PURE = _names(f"""
     {_PACKAGE} abc bisect builtins cmath collections contextlib copy copyreg dataclasses datetime decimal enum fractions
-    functools heapq itertools math numbers numpy operator scipy statistics types typing
+    functools heapq itertools math numba numbers numpy operator scipy statistics types typing
     _bisect _collections _collections_abc _functools _heapq _operator
 """)
 """Packages whose functions depend on their arguments only, and whose functions and classes are represented by their names."""
@@ -60,8 +60,8 @@ _OF_CONSTRUCTION = _names("""
 """)
 """Methods that make or copy an instance, which matter if its class is called."""
 _NUMBERS = frozenset({bool, int, float, complex, str, bytes, type(None), type(...), type(NotImplemented)})
-_OF_KERNELS = "_callback"
-"""Attribute that kernels add to a value (`conservative.potentials.callback`)."""
+_OF_KERNELS = f"{_PACKAGE}.potentials.callback"
+"""Module of an attribute that kernels add to a value."""
 _MOST_PARTS = 10_000
 """Largest number of parts, 0.2 s of work: a table of another package can lead to all of its code."""
 NOT_OF_MOTION = {"of motion": False}
@@ -116,6 +116,10 @@ def digest(value: object) -> str:
 def fields_of_motion(kind: Any) -> tuple[str, ...]:
     """Return the names of the fields of a dataclass that its digest contains."""
     return tuple(field.name for field in fields(kind) if field.metadata.get("of motion", True))
+
+
+def _is_dataclass(kind: Any) -> bool:
+    return is_dataclass(kind)
 
 
 def _top(module: object) -> str:
@@ -188,7 +192,7 @@ class _Walk:
         if kind is frozenset:
             yield sorted(self._all(value))
             return
-        if is_dataclass(kind) and _top(kind.__module__) == _PACKAGE and "<" not in kind.__qualname__:
+        if _is_dataclass(kind) and _top(kind.__module__) == _PACKAGE and "<" not in kind.__qualname__:
             yield [(name, self.follow(getattr(value, name))) for name in fields_of_motion(kind)]
             return
         self.fixed = False
@@ -238,7 +242,7 @@ class _Walk:
                 cells[name] = MISSING
         yield self._follow_code(code, value.__globals__, cells)
         yield self._all((value.__defaults__, value.__kwdefaults__))
-        yield [(name, self.follow(each)) for name, each in sorted(vars(value).items()) if name != "__wrapped__"]
+        yield [(name, self.follow(each)) for name, each in sorted(vars(value).items())]
         self.in_library = before
 
     def _follow_code(self, code: CodeType, known: Mapping[str, Any], cells: Mapping[str, Any]) -> str:
@@ -324,10 +328,11 @@ class _Walk:
         if hasattr(kind, "__next__") or (not _is_pure(name) and _top(name) in PURE):
             raise _NotFollowed(f"a value of type {name}")
         yield self._follow_class(kind, called=False)
-        before, self.in_library = self.in_library, _is_pure(name)
+        before, self.in_library = self.in_library, _top(name) in (_PACKAGE, "numpy", "scipy")
         derived = _derived_names(kind)
         attributes = sorted(getattr(value, "__dict__", {}).items())
-        yield [(key, self.follow(each)) for key, each in attributes if key not in derived and key != _OF_KERNELS]
+        own = [(key, each) for key, each in attributes if key not in derived and type(each).__module__ != _OF_KERNELS]
+        yield [(key, self.follow(each)) for key, each in own]
         for base in kind.__mro__:
             for key, slot in sorted(vars(base).items()):
                 if isinstance(slot, MemberDescriptorType):
@@ -383,7 +388,7 @@ def _keeps_values(kind: type) -> bool:
 @cache
 def _derived_names(kind: Any) -> frozenset[str]:
     """Return the attributes of a frozen dataclass that follow from its fields: cached properties, and those not of motion."""
-    if not is_dataclass(kind) or not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+    if not _is_dataclass(kind) or not kind.__dataclass_params__.frozen:
         return frozenset()
     cached = {name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property)}
     return frozenset(cached | {each.name for each in fields(kind)} - {*fields_of_motion(kind)})

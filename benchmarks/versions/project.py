@@ -51,7 +51,7 @@ LOST, OTHER, FAR = 0.1, 1.0, 3.0
 than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
 SLOW = 1.0
 """Duration of a run, s, above which a row is measured with fewer points."""
-_ADAPTER, _DESCRIPTION = (str(Path(each.__file__).resolve()) for each in (inside, description))
+_ADAPTER, _DESCRIPTION = str(Path(inside.__file__).resolve()), str(Path(description.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]

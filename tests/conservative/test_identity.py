@@ -203,6 +203,20 @@ def metaclass(k):
     return Own()
 
 
+def wrapped(k):
+    @functools.wraps(lambda t: k * t)
+    def torque(t):
+        return torque.__wrapped__(t)
+
+    return torque
+
+
+def hidden(k):
+    made = Bound(1.0)
+    made._callback = lambda t: k * t
+    return made
+
+
 def list_with_attribute(k):
     class Own(list):
         def __call__(self, t):
@@ -236,6 +250,8 @@ MADE = {
     "a property": property_of,
     "a class with a metaclass": metaclass,
     "a list with an attribute": list_with_attribute,
+    "a wrapped function": wrapped,
+    "an attribute with a function": hidden,
     "a dictionary with a default": lambda k: defaultdict(float, {0.0: k}).__getitem__,
     "a queue": lambda k: deque([k]).__getitem__,
     "a partial": lambda k: functools.partial(operator.mul, k),
@@ -326,6 +342,7 @@ UNKNOWN = {
     "a dictionary of modules": lambda: lambda t: sys.modules[MODULE].k * t,
     "a module that is passed on": lambda: lambda t: getattr(gains, "k") * t,  # noqa: B009  # on purpose
     "a module under another name": lambda: alias,
+    "a module in a partial": lambda: functools.partial(lambda t, xp: xp.random.rand() * t, xp=np),
     "a module as a default": lambda: lambda t, place=gains: place.k * t,
     "the dictionary of globals": lambda: lambda t: globals()["K"] * t,
     "the globals of a function": lambda: lambda t: alias.__globals__["K"] * t,

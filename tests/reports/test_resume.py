@@ -1,12 +1,14 @@
 """Files of unfinished reports, their resumption, and interruptions of a real process."""
 
 import json
+import os
 import re
 import shlex
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from conservative import BadInput, NotConverged
+from conservative import BadInput, NotConverged, Torque
 from conservative.benchmarks.measures.measurement import Samples
 from conservative.method import Role
 from conservative.reports import report
@@ -92,6 +94,23 @@ def test_a_report_with_other_versions_or_source_is_not_resumed(key, part, unfini
     done = CliRunner().invoke(main, [*SMALL, "--resume"])
     assert done.exit_code == 2
     assert part in done.stderr
+
+
+def test_a_report_of_a_changed_scene_is_not_resumed(unfinished):
+    """Its step, or a torque beside the field, or a torque that cannot be compared; the name is the same."""
+    source, made = provenance(SMALL), plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    (brick,) = made.scenes
+    environment = Torque(lambda t: (0, 0, float(os.environ.get("TEST_GAIN", "1"))))
+    changes = {
+        "step 0.02 s": {"dt": 0.02},
+        "scenes: brick_flip": {"torque": Torque((0, 0, 1e-9))},
+        "'brick_flip' with": {"torque": environment},
+    }
+    assert checkpoint.begin(made, Path("report"), source, resume=True).results
+    for part, change in changes.items():
+        other = replace(made, scenes=(brick.rename("brick_flip", **change),))
+        with pytest.raises(BadInput, match=f"^resume: got .*{part}"):
+            checkpoint.begin(other, Path("report"), source, resume=True)
 
 
 def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
