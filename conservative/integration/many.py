@@ -21,7 +21,7 @@ from .blocks import list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
 from .memory import Memory, write_memory
-from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads
+from .one import DEFAULT_DT, interrupt_of, read_method, read_target, require_support, warn_of_loads, warn_of_rods
 from .shared_choice import choose_for_all, require_steps
 from .store import write_store
 
@@ -118,6 +118,7 @@ def integrate_many(
             grid = grid_for(bodies.first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
             require_support(chosen, bodies.first)
             warn_of_loads(bodies.first, chosen, grid.dt)
+            warn_of_rods(bodies.first, chosen, grid.dt)
             if len(bodies) > 1:  # the run of a single body raises the error itself
                 require_steps(chosen, bodies, grid)
         else:

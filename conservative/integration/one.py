@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
-from ..errors import BadInput, LoadNotResolved, Unsupported
+from ..errors import BadInput, LoadNotResolved, RotationNotResolved, Unsupported
 from ..grid import MOST_STEPS, grid_for
-from ..method import Method
+from ..method import Method, Role
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced
 from ..methods.search import candidates
+from ..methods.units import bound_rate
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -37,6 +38,19 @@ def warn_of_loads(scene: Scene, method: Method, dt: float) -> None:
     """Warn if fixed steps, s, are too long for a function of time; adaptive methods are told the longest step."""
     if scene.loads and method.order is not None and dt > scene.smoothness().step:
         warnings.warn(LoadNotResolved(dt, *scene.smoothness()[1:]), stacklevel=3)
+
+
+ROD, RESOLVED = 100.0, 0.5
+"""Ratio of principal moments above which a body is a rod, and the longest step in radians of its fastest rotation."""
+
+
+def warn_of_rods(scene: Scene, method: Method, dt: float) -> None:
+    """Warn if fixed steps, s, are too long for the rotation of a rod about its axis that the errors of a method can produce."""
+    if scene.body.condition <= ROD or method.order is None or method.role not in (Role.OURS, Role.BASELINE):
+        return
+    rate = scene.derive(bound_rate)
+    if dt * rate > RESOLVED and method.follows_fastest(scene):
+        warnings.warn(RotationNotResolved(method.name, dt, rate, RESOLVED / rate), stacklevel=3)
 
 
 _REDUCED = Reduced()
@@ -108,6 +122,8 @@ def integrate(
         The method does not support the scene.
     LoadNotResolved
         A warning: the steps are too long for a torque, damping or motor that is a function of time without `breaks`.
+    RotationNotResolved
+        A warning: the steps are too long for the rotation about the axis of a rod that errors of the method can produce.
     NotConverged
         The equations of a step could not be solved.
     Diverged
@@ -137,6 +153,7 @@ def integrate(
             grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
             warn_of_loads(scene, method, grid.dt)
+            warn_of_rods(scene, method, grid.dt)
             if at is None:
                 trajectory = method.solve(scene, grid)
             else:

@@ -109,6 +109,9 @@ class NoSquish(Splitting):
     card: ClassVar[Card] = replace(Splitting.card, takes=Splitting.card.takes | {Need.FLIGHT})
     kind: ClassVar[str] = "AXES"
 
+    def follows_fastest(self, scene: Scene) -> bool:
+        return True  # a rotation about one principal axis moves momentum to the axis of a rod, also of a free one
+
 
 @dataclass(frozen=True)
 class Rattle(Splitting):
@@ -157,6 +160,9 @@ class LieVariational(Rattle):
 
     family: ClassVar[str] = "lie_variational"
     kind: ClassVar[str] = "MIDDLE"
+
+    def follows_fastest(self, scene: Scene) -> bool:
+        return not scene.free  # its torque in the middle acts on both ends, which only at short steps leaves the axis alone
 
 
 def convert(scene: Scene, method: Splitting) -> tuple[str, PrincipalStart, Any]:
