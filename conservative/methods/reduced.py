@@ -58,7 +58,7 @@ class Reduced(Method):
     This map has order 2. Symmetric compositions of it have order 4 to 10 and conserve the same quantities.
 
     In a field, rods need short steps: if the smallest moment is a fraction r of the others, the error is proportional to
-    dt^2/r. `integrate` warns (`RotationNotResolved`) if a step is longer than 0.5 rad of the fastest rotation that the energy allows.
+    dt^2/r. `integrate` warns (`RotationNotResolved`) if the energy allows a rotation of more than 0.5 rad in a step.
 
     Parameters
     ----------
