@@ -213,7 +213,7 @@ def test_a_start_at_rest_near_an_equilibrium_is_not_moved_by_round_off(off: floa
 @pytest.mark.attack
 def test_random_starts_at_rest_near_an_equilibrium() -> None:
     # Errors are compared with what 1e-15 rad at the start make of the motion.
-    for seed in range(25):
+    for seed in range(8):
         draw = np.random.default_rng(seed)
         J, point, axis = draw.uniform(1.0, 1.9, 3), draw.standard_normal(3), draw.standard_normal(3)
         R, off = rotation_about(axis, draw.uniform(0, 3)), 10 ** draw.uniform(-6, -2)
