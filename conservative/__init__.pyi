@@ -19,6 +19,7 @@ from .errors import NotConverged as NotConverged
 from .errors import NotRun as NotRun
 from .errors import NotWritten as NotWritten
 from .errors import PotentialFailed as PotentialFailed
+from .errors import RotationNotResolved as RotationNotResolved
 from .errors import SceneNotCompared as SceneNotCompared
 from .errors import TorqueFailed as TorqueFailed
 from .errors import Unsupported as Unsupported

@@ -35,7 +35,9 @@ class RigidBody(PickledByFields):
     ----------
     inertia
         Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component has
-        to be 1e-60 to 1e60 kg m^2, beside a field or a load 1e-30 to 1e30. A rod has no third moment: (1e-9 I, I, I).
+        to be 1e-60 to 1e60 kg m^2, beside a field or a load 1e-30 to 1e30. A rod has no third moment: (1e-9 I, I, I),
+        without a rate about the first axis. Integrate it to an error, `integrate(scene, error=1e-6)`: many methods need very
+        short steps for a rod (see `Reduced`).
     rotor_momentum
         Momentum h (3,) of a rotor, kg m^2/s, body axes; None or zeros without one. The angular momentum is J w + h.
         The kinetic energy is w'J w / 2, without the energy of the rotor itself. For a rotor with moment I about its

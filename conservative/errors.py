@@ -271,6 +271,19 @@ class SceneNotCompared(UserWarning):
         )
 
 
+class RotationNotResolved(UserWarning):
+    """Steps are too long for the rotation of a rod about its axis. Attributes: `dt`, s, and `rate`, rad/s, the fastest one."""
+
+    def __init__(self, method: str, dt: float, rate: float, longest: float) -> None:
+        self.dt, self.rate = dt, rate
+        super().__init__(
+            f"Steps of {dt:g} s do not resolve the rotation of this rod about its axis: its energy allows {rate:.3g} rad/s, "
+            f"{dt * rate:.3g} rad in a step. {method} can produce this rotation by its errors, also if the exact motion has "
+            f"none, and its result can be completely wrong. Use steps of at most {longest:.3g} s, or an error instead of a "
+            "method and a step: integrate(scene, error=1e-6)"
+        )
+
+
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka", "lxml"),

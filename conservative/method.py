@@ -15,6 +15,7 @@ from .card import Role as Role
 from .drifts import drifts_of
 from .errors import InvalidResult, Unsupported
 from .grid import Grid, grid_for
+from .invariants import AXIAL_MOMENTUM
 from .needs import Needs, lacking
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find_mistake
@@ -155,6 +156,14 @@ class Method(ABC):
     def longest_step(self, scene: Scene) -> float:
         """Return the longest step size for the scene, s; inf without a limit."""
         return math.inf
+
+    def follows_fastest(self, scene: Scene) -> bool:
+        """Return whether steps have to resolve the fastest rotation that the energy allows, also if the exact motion has none.
+
+        Default: in fields, unless body and field are symmetric about one axis and the method conserves the momentum about it.
+        The error of a step is otherwise a momentum about the axis of a rod, whose small moment makes it a fast rotation.
+        """
+        return not scene.free and (scene.symmetry_axis_B is None or AXIAL_MOMENTUM not in self.conserves)
 
     @abstractmethod
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -21,7 +21,7 @@ from .blocks import list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, read_ensemble
 from .inputs import read_bodies
 from .memory import Memory, write_memory
-from .one import interrupt_of, read_error, read_method, read_step, read_target, require_support, warn_of_loads
+from .one import interrupt_of, read_error, read_method, read_step, read_target, require_support, warn_of_steps
 from .shared_choice import choose_for_all, require_steps
 from .store import open_store, write_store
 
@@ -127,7 +127,7 @@ def integrate_many(
             chosen = read_method(method, bodies.first)
             grid = grid_for(bodies.first, read_step(bodies.first, dt, t_end), t_end, sample_every)
             require_support(chosen, bodies.first)
-            warn_of_loads(bodies.first, chosen, grid)
+            warn_of_steps(bodies.first, chosen, grid)
             if len(bodies) > 1:  # the run of a single body raises the error itself
                 require_steps(chosen, bodies, grid)
         else:

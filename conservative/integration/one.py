@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
-from ..errors import BadInput, LoadNotResolved, Unsupported
+from ..errors import BadInput, LoadNotResolved, RotationNotResolved, Unsupported
 from ..grid import MOST_STEPS, Grid, grid_for
-from ..method import Method
+from ..method import Method, Role
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced
 from ..methods.search import candidates
+from ..methods.units import bound_rate
 from ..outcome import Progress
 from ..potentials.smoothness import find_unresolved
 from ..scene import Scene
@@ -34,15 +35,34 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
-def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
+def warn_of_steps(scene: Scene, method: Method, grid: Grid) -> None:
+    """Warn if the steps of a grid are too long for a load or for the rotation of a rod; see `integrate`."""
+    _warn_of_loads(scene, method, grid)
+    _warn_of_rods(scene, method, grid.dt)
+
+
+def _warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
     if not scene.loads or method.order is None:
         return
     if grid.dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:]), stacklevel=3)
+        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:]), stacklevel=4)
     for load in scene.loads:
         if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
-            warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=3)
+            warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)
+
+
+ROD, RESOLVED = 100.0, 0.5
+"""Ratio of principal moments above which a body is a rod, and the longest step in radians of its fastest rotation."""
+
+
+def _warn_of_rods(scene: Scene, method: Method, dt: float) -> None:
+    """Warn if fixed steps, s, are too long for the rotation of a rod about its axis that the errors of a method can produce."""
+    if scene.body.condition <= ROD or method.order is None or method.role not in (Role.OURS, Role.BASELINE):
+        return
+    rate = scene.derive(bound_rate)
+    if dt * rate > RESOLVED and method.follows_fastest(scene):
+        warnings.warn(RotationNotResolved(method.name, dt, rate, RESOLVED / rate), stacklevel=4)
 
 
 _REDUCED = Reduced()
@@ -117,6 +137,8 @@ def integrate(
     LoadNotResolved
         A warning: the steps are too long for a torque, damping or motor that is a function of time without `breaks`, or a
         table with more corners than steps. Steps are divided at the corners of a table, so its samples are right.
+    RotationNotResolved
+        A warning: the steps are too long for the rotation about the axis of a rod that errors of the method can produce.
     NotConverged
         The equations of a step could not be solved.
     Diverged
@@ -147,7 +169,7 @@ def integrate(
             method = read_method(method, scene)
             grid = grid_for(scene, read_step(scene, dt, t_end), t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
-            warn_of_loads(scene, method, grid)
+            warn_of_steps(scene, method, grid)
             if at is None:
                 trajectory = method.solve(scene, grid)
             else:

@@ -51,10 +51,14 @@ class Reduced(Method):
         Q_n+1 = Q_n Cay(dt w*)
         Q_n+1 L_n+1 = Q_n L_n + dt tau*        tau* = sum_j qbar_j x (-V*_j)
 
-    follows from the paper's (22) to (26) without approximation. Energy, world momentum (or its vertical component) and
-    orthonormality are conserved to round-off; the axial momentum of a top is not.
+    follows from the paper's (22) to (26) without approximation. Energy, world momentum (in a field, its component along the
+    field's axis) and orthonormality are conserved to round-off. The axial momentum of a top is not: with steps of 0.01 s it
+    changes by 1.2 % on `lagrange_top`.
 
     This map has order 2. Symmetric compositions of it have order 4 to 10 and conserve the same quantities.
+
+    In a field, rods need short steps: if the smallest moment is a fraction r of the others, the error is proportional to
+    dt^2/r. `integrate` warns (`RotationNotResolved`) if the energy allows a rotation of more than 0.5 rad in a step.
 
     Parameters
     ----------

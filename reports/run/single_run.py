@@ -19,7 +19,7 @@ from conservative.attitude import Array, angle_between, orthonormality
 from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid, grid_for
 from conservative.integration import one
-from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_loads
+from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_steps
 from conservative.invariants import sizes
 from conservative.method import Method
 from conservative.methods.search import candidates
@@ -172,7 +172,7 @@ def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None
 
 def run_on(scene: Scene, method: Method, grid: Grid) -> Trajectory:
     """Return the trajectory on a grid; a failure ends it early, or before its first sample if an engine crashes."""
-    warn_of_loads(scene, method, grid)
+    warn_of_steps(scene, method, grid)
     try:
         return method.solve(scene, grid)
     except IntegrationFailed as failure:

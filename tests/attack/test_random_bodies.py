@@ -177,6 +177,7 @@ def test_units_change_nothing(seed, method, time, inertia):
 sizes_of_numbers = st.floats(-DECADES, DECADES).map(lambda decades: 10.0**decades)
 
 
+@pytest.mark.filterwarnings("ignore::conservative.RotationNotResolved")
 @tries(500)
 @given(st.lists(sizes_of_numbers, min_size=8, max_size=8), st.sampled_from(OURS), st.booleans(), st.booleans())
 def test_extreme_numbers_are_refused_or_integrated(numbers, method, round_body, heavy):

@@ -151,6 +151,24 @@ def test_no_special_value_makes_it_walk(order, dt):
         assert grown.rms < 5e-15  # measured 4e-16 to 2.7e-15
 
 
+@pytest.mark.parametrize(
+    ("scene", "method", "dt", "invariant", "steps", "drift"),
+    [
+        (cv.scenes.nutating_top(), cv.Reduced(), 0.005, "vertical momentum", 1_000_000, 8e-14),
+        (cv.scenes.lagrange_top(), cv.Splitting(order=4), 0.002, "vertical momentum", 100_000, 4e-13),
+        (cv.scenes.symmetric_body(), cv.Lame(), 0.05, "momentum", 100_000, 1.1e-13),
+    ],
+    ids=["nutating_top", "lagrange_top", "symmetric_body"],
+)
+def test_symmetric_bodies_drift_linearly_as_published(scene, method, dt, invariant, steps, drift):
+    """The rows of DERIVATION.md, section 12."""
+    found = method.solve(scene, Grid(dt, steps, steps // 2))
+    assert found.ok, found.failure
+    half, end = np.linalg.norm(np.reshape(found.drift(invariant), (3, -1)), axis=1)[1:]
+    assert end == pytest.approx(drift, rel=0.5)  # measured 6.7e-14, 4.2e-13 and 1.07e-13
+    assert end / half == pytest.approx(2, abs=0.5)  # measured 1.8 to 2.0
+
+
 def random_body_in(field, index):
     scene = cv.scenes.random_body(field, 31, index)
     return scene, 0.05 / float(np.linalg.norm(scene.w_WB_B0))

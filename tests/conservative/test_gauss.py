@@ -127,9 +127,9 @@ def test_round_off_of_invariants_does_not_grow() -> None:
 @pytest.mark.parametrize("potential", [None, cv.UniformGravity(2.0, (0.0, 0.0, 0.8))])
 @pytest.mark.parametrize("spin", [0.0, 3.0])
 def test_the_rate_about_the_axis_of_a_rod_does_not_drift(potential, spin) -> None:
-    # Round-off of the axial momentum, divided by the moment of the rod, was a rate of 7e-5 rad/s after 5 s.
+    # Round-off of the axial momentum, divided by the moment of the rod, was a rate of 1e-4 rad/s after 5 s.
     rod = cv.Scene("rod", cv.RigidBody((1, 1, 1e-12)), rotation_about((0.3, 0.4, -0.8), 0.9), (0.7, -0.4, spin), 5.0, potential)
     run = cv.integrate(rod, 0.01, cv.Gauss())
-    assert np.abs(run.w_WB_B[:, 2] - spin).max() < 1e-15 * max(spin, 1)  # measured 0; before up to 1.1e-4
+    assert np.abs(run.w_WB_B[:, 2] - spin).max() < 1e-15 * max(spin, 1)  # measured 0; before up to 1.3e-4
     exact = cv.integrate(rod, 0.01, cv.registry.method("exact"))
-    assert run.error(exact).max() < 1e-13  # measured 1e-14
+    assert run.error(exact).max() < 1e-13  # measured 2.1e-15

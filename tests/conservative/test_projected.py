@@ -208,3 +208,25 @@ def test_a_start_at_rest_near_an_equilibrium_is_not_moved_by_round_off(off: floa
     for n in (50, 200, 800):  # measured at most 1.2e-11 and 3.4e-9; with round-off corrected 1.4e-9 and 1.6e-6
         run = cv.integrate(case.scene(), case.t_end / (12 * n), cv.Projected(), sample_every=n)
         assert independent.angle_between(run.R_WB, truth).max() < 2e-13 / off
+
+
+@pytest.mark.attack
+def test_random_starts_at_rest_near_an_equilibrium() -> None:
+    # Errors are compared with what 1e-15 rad at the start make of the motion.
+    for seed in range(8):
+        draw = np.random.default_rng(seed)
+        J, point, axis = draw.uniform(1.0, 1.9, 3), draw.standard_normal(3), draw.standard_normal(3)
+        R, off = rotation_about(axis, draw.uniform(0, 3)), 10 ** draw.uniform(-6, -2)
+        turn = math.pi - off if draw.random() < 0.7 else off
+        anchor = draw.uniform(0.3, 1.5) * (rotation_about(np.cross(R @ point, draw.standard_normal(3)), turn) @ (R @ point))
+        field = ("spring", 1.0, point, anchor, 0.0) if seed % 2 else ("gravity", 2.0, R.T @ np.array((0, 0, 1.0)))
+        start = rotation_about((1, 2, 0), off) @ R if seed % 2 == 0 else R
+        case = Case(tuple(J), start, (0.0, 0.0, 0.0), 12.0, field)
+        times = np.linspace(0.0, case.t_end, 5)
+        truth = motion(case, times)[0]
+        moved = motion(replace(case, R0=rotation_about((1, 1, 1), 1e-15) @ start), times)[0]
+        allowed = 30 * independent.angle_between(truth, moved).max() + 1e-11
+        for n in (400, 1600):
+            run = cv.integrate(case.scene(), case.t_end / (4 * n), cv.Projected(), sample_every=n)
+            error = independent.angle_between(run.R_WB, truth).max()
+            assert error < allowed, (seed, n, error, allowed)
