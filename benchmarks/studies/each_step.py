@@ -30,7 +30,7 @@ from ..measures.processes import Processes
 from .case import Case, Success
 from .declaration import Declaration, Extent
 from .line import LinePoint, list_settings, measure_line
-from .speed import Runs, check_end, keep_end, time_once, time_runs
+from .speed import Runs, check_end, is_timed_once, keep_end, time_once, time_runs
 from .study import Progress, Study
 
 ERROR = 1e-6
@@ -87,7 +87,7 @@ def time_chosen(study: Study, chosen: Iterable[LinePoint], processes: Processes)
             if isinstance(done, Outcome):
                 yield case.row(Value(measure, math.nan), done)
                 continue
-            if study.expected_cost(timed) > study.longest_run:
+            if is_timed_once(study, timed):
                 yield time_once(case, measure, done)
                 continue
             ready[case, measure] = timed, done.run

@@ -19,7 +19,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .selection import at_tolerance, takes_exact_steps, tolerance_setting
-from .study import Study
+from .study import Study, too_long
 
 FEWEST_POINTS = 4
 """Smallest number of points, as far as `LINE_LIMIT` allows."""
@@ -85,9 +85,8 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
         expected = per_step * case.grid.n_steps or study.expected_cost(case)
         needed = len(times) < FEWEST_POINTS and sum(times) + expected <= LINE_LIMIT * study.longest_run
         if not needed and expected > study.longest_run:
-            longest = f"would take about {expected:.2g} s, more than {study.longest_run:g} s; raise --time-limit"
-            reason = longest if expected < math.inf else "a coarser run was ended"
-            yield case, Outcome(OutcomeKind.SKIPPED, reason)
+            ended = Outcome(OutcomeKind.SKIPPED, "a coarser run was ended")
+            yield case, too_long(expected, f"{study.longest_run:g} s") if expected < math.inf else ended
             continue
         done = study.attempt(case)
         yield case, done

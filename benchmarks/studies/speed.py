@@ -128,11 +128,16 @@ def time_cases(study: Study, points: Iterable[LinePoint], processes: Processes) 
             done = done if same.ok else same
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.TIME, math.nan), done)
-        elif study.expected_cost(timed) > study.longest_run:
+        elif is_timed_once(study, timed):
             yield time_once(case, Measure.TIME, done)
         else:
             ready[case, Measure.TIME] = timed, done.run
     yield from time_runs(study, ready, processes)
+
+
+def is_timed_once(study: Study, case: Case) -> bool:
+    """Return whether a run that calls Python functions is too long for rounds: five of them would take most of a report."""
+    return case.scene.calls_python and study.expected_cost(case) > study.longest_run
 
 
 def time_once(case: Case, measure: Measure, done: Success) -> Measurement:

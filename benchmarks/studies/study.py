@@ -148,7 +148,7 @@ class Study:
                 if costs[case] <= left:
                     left -= costs[case]
                 else:
-                    skipped[case] = too_long(costs[case], left)
+                    skipped[case] = too_long(costs[case], f"the {left:.2g} s left for slow runs")
         return skipped
 
     def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
@@ -168,9 +168,9 @@ class Study:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
 
 
-def too_long(cost: float, limit: float) -> Outcome:
-    """Return the outcome of a run that is not made, because it would take `cost` s of the `limit` s that it has."""
-    text = f"would take about {cost:.2g} s, more than the {limit:.2g} s left for slow runs; raise --time-limit"
+def too_long(cost: float, limit: str) -> Outcome:
+    """Return the outcome of a run that is not made, because it would take `cost` s, and its limit in words."""
+    text = f"would take about {float(f'{cost:.2g}'):,g} s, more than {limit}; raise --time-limit"
     return Outcome(OutcomeKind.SKIPPED, text)
 
 

@@ -24,7 +24,7 @@ from ..rows.points import points as points_over
 from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
 
-COLUMNS = ("error, rad", "energy drift", "world momentum drift", "turns over")
+COLUMNS = ("error, rad", "energy drift", "world momentum drift", "axial momentum drift", "turns over")
 SAME = 0.1
 """Largest relative difference of two errors that are called equal, between versions."""
 TERMS = (

@@ -16,6 +16,7 @@ from conservative.benchmarks.studies import engines_at_one_step, engines_over_st
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.benchmarks.studies.selection import Missing
+from conservative.invariants import AXIAL_MOMENTUM
 from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..charts import figures, vega_embed
@@ -31,7 +32,7 @@ USABLE = 0.1
 """Largest attitude error over the run, rad, of a usable step."""
 ERROR = 1e-3
 """Attitude error, rad, at which a simulated second is timed."""
-MOMENTA = ("momentum", "vertical momentum")
+MOMENTA = ("momentum", "vertical momentum", "momentum along the field's axis")
 """Names of the conserved momentum in the world: of a free body, and about the axis of a field."""
 AT_ITS_BEST = "at its best"
 FAR_FROM_ORDER = 0.5
@@ -55,6 +56,7 @@ COLUMNS = (
     ),
     ("energy drift", "largest relative drift of the run, and whether energy was gained or lost at the end."),
     ("world momentum drift", "the same of the conserved momentum: of a free body, or about the axis of a field."),
+    ("axial momentum drift", "the same of the momentum about the axis of a symmetric body; – if it is not conserved."),
     ("turns over", "number of flips of the free body, and of the exact motion: the quality of the motion."),
     ("longest step, s", f"longest measured step with an error of at most {USABLE:g} rad; – if there is none."),
     ("µs a step", "wall time at the scene's step, the fastest of interleaved rounds, measured in the engine's process."),
@@ -206,6 +208,7 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
         _order(line, expected),
         _drift(rows, "energy"),
         _drift(rows, momentum),
+        _drift(rows, AXIAL_MOMENTUM),
         _turns(_value(rows, Measure.TURNS_OVER), _value(rows, Measure.TURNS_OVER_TRUE)),
         numeric(longest_step),
         numeric(step_time * 1e6, digits=3),
