@@ -168,7 +168,7 @@ def test_a_warning_says_that_steps_do_not_resolve_a_table_that_they_do_not_resol
     parts = {
         "torque": replace(BASE, torque=(times, values)),
         "rotor": replace(BASE, rotor=(times, values)),
-        "factor": replace(BASE, damping=np.eye(3), factor=(times, np.abs(values[:, 0]))),
+        "factor": replace(BASE, damping=np.eye(3), factor=(times, 9 + values[:, 0])),
     }
     for case in parts.values():
         scene = replace(case, t_end=4.0).scene()
@@ -179,7 +179,7 @@ def test_a_warning_says_that_steps_do_not_resolve_a_table_that_they_do_not_resol
         assert [type(each.message) for each in said] == [cv.LoadNotResolved] * (0 if longest is None else 2)
         warn_of_loads(scene, registry.method("scipy"), cv.Grid(dt, round(4 / dt)))  # chooses its steps; a warning is an error
         for each in said:
-            assert each.message.step == pytest.approx(longest)
+            assert each.message.step <= longest * (1 + 1e-12)
             assert each.message.dt == dt
 
 
@@ -247,11 +247,11 @@ def test_samples_between_steps_see_each_jump_at_its_time(method):
     t = np.array(
         [0.05, 0.1, 0.1 + 1e-9, 0.2, 0.225, 0.23, 0.2305, 0.231, 0.2311, 0.28, 0.3, 0.355, 0.4, 0.5, 0.72, 0.7200001, 1.0]
     )
-    found = cv.integrate(case.scene(), 0.2, method, t_eval=t)
+    found = cv.integrate(case.scene(), 0.1, method, t_eval=t)
     R_WB, w_WB_B = motion(case, t)
-    assert angle_between(found.R_WB, R_WB).max() < 1e-9  # measured: 1e-11; 0.02 with the torque of the step's window
-    assert np.abs(found.w_WB_B - w_WB_B).max() < 1e-8
-    beside = cv.integrate(case.scene(), 0.2, method, t_eval=[0.23])  # what others share does not change a sample
+    assert angle_between(found.R_WB, R_WB).max() < 2e-9  # measured: projected 2e-10, scipy 1e-12; 4e-3 with the torque before the first jump
+    assert np.abs(found.w_WB_B - w_WB_B).max() < 5e-9  # measured: 6e-10 and 2e-12
+    beside = cv.integrate(case.scene(), 0.1, method, t_eval=[0.23, 1.0])  # what others share does not change a sample
     assert np.array_equal(beside.R_WB[0], found.R_WB[5])
 
 
