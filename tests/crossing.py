@@ -32,6 +32,12 @@ TIMES = np.array((0.0, 0.5, 0.8, 0.8, 1.3, 2.0))
 VALUES = np.array(((0, 1, 2), (1, -1, 0.5), (0, 0, 0), (2, 1, -1), (1, 3, 0), (0.5, 1, 0)), dtype=float)
 RAMP = (0.0, 0.4, 1.1, 2.0)
 MOMENTA = np.array(((0.3, -0.2, 0.1), (0.5, -0.9, 0.8), (1.5, 0.3, -0.6), (0.1, 0.4, 0.9)))
+STEPS = 10
+_RANDOM = np.random.default_rng(50)
+_CORNER_TIMES = np.sort(np.concatenate([[0.0, 2.0], np.linspace(0.2, 1.8, 9), _RANDOM.uniform(0, 2, 50)]))
+CORNERS = (_CORNER_TIMES, 2 * _RANDOM.normal(size=(61, 3)))
+CORNER_FACTOR = (_CORNER_TIMES, _RANDOM.uniform(0, 2, 61))
+"""Tables with six corners in a step of ten, of which one is at its end."""
 MASS, COM = 2.0, np.array((0.25, -0.3, 0.2))
 
 

@@ -11,6 +11,7 @@ import pickle
 import re
 import shlex
 import sys
+import warnings
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,7 +36,7 @@ from conservative.references.truth import reference
 from conservative.reports.cli.main import main
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 
-from .crossing import APART, RIGHT, ROWS, Row, write_file
+from .crossing import APART, CORNER_FACTOR, CORNERS, RIGHT, ROWS, STEPS, J, Row, write_file
 from .independent import Case, angle_between, matrix_of, motion, place
 
 
@@ -126,6 +127,24 @@ def integrate(cell: Cell) -> None:
 
 def integrate_samples(cell: Cell) -> None:
     cell.check(cell.row.t, cv.integrate(cell.row.scene(), 0.005, t_eval=cell.row.t).R_WB)
+
+
+def integrate_corners(cell: Cell) -> None:
+    """Beside the part there is a table with more corners than steps: samples at and between steps, alone and of many bodies."""
+    case = cell.row.case
+    added: dict[str, Any] = {"torque": CORNERS} if case.torque is None else {"damping": 0.3 * J, "factor": CORNER_FACTOR}
+    case = replace(case, **added)
+    scene = cell.row.scene(case)
+    method = "projected" if case.flight is None else "reduced"
+    right = motion(case, np.linspace(0, case.t_end, STEPS + 1))[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cv.LoadNotResolved)
+        alone = cv.integrate(scene, case.t_end / STEPS, method)
+        between = cv.integrate(scene, case.t_end / STEPS, method, t_eval=cell.row.t)
+        many = cv.integrate_many(scene, w_WB_B0=starts(case), dt=case.t_end / STEPS, method=method, threads=1)
+    assert angle_between(alone.R_WB, right).max() < 1e-4
+    assert angle_between(between.R_WB, motion(case, cell.row.t)[0]).max() < 1e-4
+    check_many(replace(cell, row=replace(cell.row, case=case)), many)
 
 
 def integrate_error(cell: Cell) -> None:
@@ -361,6 +380,7 @@ COMMANDS = {
 ENTRIES = (
     integrate,
     integrate_samples,
+    integrate_corners,
     integrate_error,
     integrate_many,
     integrate_many_error,

@@ -1,7 +1,8 @@
 """Steps that end where a load is not smooth: at its break points a step is divided, and each part sees one side of a jump.
 
-A run consists of pieces between break points: whole steps, and parts of a step before and after a point. Each is a run of the
-kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay those of the grid.
+A run consists of pieces between break points: whole steps, and parts of a step before, between and after points. Each is a run
+of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay those of the grid: a
+piece says whether its steps are whole, and which samples it fills, because a part can be as long as a step and one step too.
 
 A part of a step is divided into more steps, the shorter the steps of the grid are. Otherwise runs with different steps would be
 the same between two points that are close, and their difference would say nothing about their errors.

@@ -32,7 +32,7 @@ _TIMES = "two or more times (n,), s, that do not decrease; two equal ones are a 
 _SIZED = 33
 """Times at which the size of a function is taken."""
 _END = 1e-9
-"""Relative tolerance of the end of a table, that of the number of steps (`conservative.grid`)."""
+"""Relative tolerance of the end of a table, whose times may be rounded to ten digits."""
 _STRAIGHT = 1e-12
 """A row of a table is no corner if the slope changes by less than this share of the slopes."""
 _CONTINUOUS = 1e-9

@@ -202,7 +202,7 @@ def _compare(times: Array, rows: Array, dt: float, n_steps: int) -> Array:
 
     A table is linear between its times and held after them; at a jump a step has the value of its own side.
     """
-    ends = dt * np.arange(n_steps + 1)
+    ends: Array = dt * np.arange(n_steps + 1, dtype=float)
     sums = np.vstack([np.zeros(rows.shape[1]), np.cumsum(np.diff(times)[:, None] * (rows[1:] + rows[:-1]) / 2, axis=0)])
 
     def at(t: Array, side: Any) -> tuple[Array, Array]:
@@ -215,7 +215,7 @@ def _compare(times: Array, rows: Array, dt: float, n_steps: int) -> Array:
         return value, sums[i] + inside * (rows[i] + value) / 2 + (after - inside) * value
 
     (first, low), (last, high) = at(ends[:-1], "right"), at(ends[1:], "left")
-    middle = at((ends[1:] + ends[:-1]) / 2, "right")[0]
+    middle = at(ends[:-1] + dt / 2, "right")[0]
     mean, rule = (high - low) / np.diff(ends)[:, None], (first + 4 * middle + last) / 6
     size = np.maximum(np.abs(mean), np.abs(rule)).mean(axis=0).max()
     return np.abs(rule - mean).max(axis=1) / (size or 1.0)
