@@ -296,7 +296,9 @@ ID = "file.py::test_x[1]"
 @pytest.fixture
 def gate(tmp_path, monkeypatch):
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-    return pytest_gate.Gate(SimpleNamespace(rootpath=tmp_path, getoption={"conservative_gate_baseline": "kept.json"}.get))
+    return pytest_gate.Gate(
+        SimpleNamespace(rootpath=tmp_path, getoption={"conservative_gate_baseline": "kept.json"}.get), SUITE
+    )
 
 
 def benchmark(info=INFO, **changes):
