@@ -11,6 +11,7 @@ import tarfile
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from conservative.errors import BadInput
 from conservative.registry import Name, read_name
@@ -40,6 +41,10 @@ def pytest_addoption(parser):
     parser.addoption("--browser", action="store_true", help="Also run the tests that need chromium and its driver.")
     parser.addoption("--engines", metavar="NAME[@VERSION],...", default="", help="Also run the tests of these engines.")
     parser.addoption("--attack", action="store_true", help="Also run the tests that search for failures at random.")
+
+
+settings.register_profile("default", deadline=None)  # no verdict depends on how busy the machine is
+settings.load_profile("default")
 
 
 def pytest_configure(config):

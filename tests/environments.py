@@ -6,20 +6,31 @@ import signal
 import subprocess
 import sys
 import sysconfig
+import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
+PATIENCE = 1800.0
+"""Time limit, s, of what must end by itself: only a hang reaches it, on however busy a machine."""
 LEAN = {"numpy", "scipy", "numba", "mpmath", "lazy-loader", "click", "rich"}
 """Required packages without an extra."""
 PYTEST = "import sys\nfrom pytest import console_main\nsys.exit(console_main())\n"
 
 
+def wait_until(ready):
+    """Wait until a condition holds."""
+    end = time.monotonic() + PATIENCE
+    while not ready():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
 def build(source, target, folder):
     """Return the wheel or sdist that hatchling builds of a folder; no network."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", folder]
-    subprocess.run(command, cwd=source, env=variables(), check=True, capture_output=True, timeout=120)
+    subprocess.run(command, cwd=source, env=variables(), check=True, capture_output=True, timeout=PATIENCE)
     (built,) = folder.glob("*.whl" if target == "wheel" else "*.tar.gz")
     return built
 
@@ -34,7 +45,7 @@ def run_python(code, *arguments, **changed):
     """Run code in a fresh interpreter, with this checkout in front; return its exit code, output and errors."""
     command = [sys.executable, "-c", code, *arguments]
     environment = variables(**{"PYTHONPATH": str(ROOT), **changed})
-    done = subprocess.run(command, env=environment, cwd="/", capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, env=environment, cwd="/", capture_output=True, text=True, timeout=PATIENCE, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -70,7 +81,7 @@ class Environment:
     @classmethod
     def create(cls, folder, *wheels):
         """Make an environment with the packages of this one, and wheels."""
-        subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=120)
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=PATIENCE)
         environment = cls(folder)
         links = folder / "packages"
         links.mkdir()
@@ -86,7 +97,7 @@ class Environment:
         if wheels:
             pip = [sys.executable, "-m", "pip", "--python", environment.python]
             options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-index"]
-            subprocess.run([*pip, "install", *options, *wheels], env=variables(), check=True, timeout=120)
+            subprocess.run([*pip, "install", *options, *wheels], env=variables(), check=True, timeout=PATIENCE)
         return environment
 
     @property
@@ -103,7 +114,7 @@ class Environment:
             env=variables(**path, **changed),
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=PATIENCE,
             check=False,
         )
         return done.returncode, done.stdout + done.stderr

@@ -37,6 +37,7 @@ from conservative.reports.cli.main import main
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 
 from .crossing import APART, CORNER_FACTOR, CORNERS, RIGHT, ROWS, STEPS, J, Row, write_file
+from .environments import PATIENCE
 from .independent import Case, angle_between, matrix_of, motion, place
 
 
@@ -226,13 +227,13 @@ def stored(cell: Cell) -> None:
 
 def dask(cell: Cell) -> None:
     pytest.importorskip("distributed")
-    from .conservative.test_cluster import LIMIT, open_client, start, start_scheduler
+    from .conservative.test_cluster import open_client, start, start_scheduler
 
     with ExitStack() as stack:
         address = start_scheduler(stack, cell.folder)
-        client = stack.enter_context(open_client(address, LIMIT))
+        client = stack.enter_context(open_client(address, PATIENCE))
         start(stack, cell.folder, "worker", address, "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
-        client.wait_for_workers(1, timeout=LIMIT)
+        client.wait_for_workers(1, timeout=PATIENCE)
         given = {"w_WB_B0": starts(cell.row.case), "dt": 0.005, "sample_every": 100}
         check_many(cell, cv.integrate_many(cell.row.scene(), **given, client=client))
 

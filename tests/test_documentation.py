@@ -18,6 +18,7 @@ from conservative import registry
 from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.reports.cli.main import main
 
+from .environments import PATIENCE
 from .pages import ROOT, blocks, dead_links, pages, shell_lines
 
 NOTEBOOKS = ROOT / "reports" / "documentation"
@@ -121,7 +122,7 @@ def test_a_notebook_runs_and_is_checked_in_without_outputs(name, expected, tmp_p
     nbformat.validate(notebook)
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert not [cell.id for cell in cells if cell.outputs or cell.execution_count]
-    NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
+    NotebookClient(notebook, timeout=PATIENCE, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
     shown = "".join(str(cell.outputs[-1].get("data")) for cell in cells if cell.outputs)
     for part in expected:
         assert part in shown

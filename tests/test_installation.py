@@ -16,7 +16,7 @@ from trove_classifiers import classifiers
 from conservative.errors import EXTRAS
 from conservative.version import VERSION
 
-from .environments import LEAN, ROOT, run_python, variables
+from .environments import LEAN, PATIENCE, ROOT, run_python, variables
 
 ROOMS = ("references", "benchmarks", "reports")
 IMPORTED_AS = {
@@ -85,7 +85,7 @@ def test_an_extra_is_checked_for_its_own_packages(requirements, extra):
 
 def check_schema(name, *paths):
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{name}", *map(str, paths)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
 
 
 def test_citation_and_workflows_follow_their_schemas(tmp_path):
@@ -176,7 +176,7 @@ def test_no_module_is_imported_under_two_names(program, doubles):
 def test_the_suite_has_one_name_for_any_path(path):
     command = [sys.executable, "-m", "pytest", "--benchmark", "--collect-only", "-q", "-k", "lagrange_top-lame", path]
     done = subprocess.run(
-        command, cwd=ROOT, env=variables(PYTHONPATH=str(ROOT)), capture_output=True, text=True, timeout=300, check=False
+        command, cwd=ROOT, env=variables(PYTHONPATH=str(ROOT)), capture_output=True, text=True, timeout=PATIENCE, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "benchmarks/suite/test_speed.py::test_speed[lagrange_top-lame-dt0.01]" in done.stdout

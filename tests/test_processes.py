@@ -8,7 +8,7 @@ import sys
 import psutil
 import pytest
 
-from .environments import ROOT, programs, variables
+from .environments import PATIENCE, ROOT, programs, variables
 
 SLEEP = "import time; print('ready', flush=True); time.sleep(600)"
 PARENT = """
@@ -25,10 +25,10 @@ def test_children_of_a_program_end_with_the_test(parent_ends):
         code = PARENT.replace("child.wait()", "") if parent_ends else PARENT
         parent = start([sys.executable, "-c", code], stdout=subprocess.PIPE)
         child = psutil.Process(int(parent.stdout.readline()))
-        assert not parent_ends or parent.wait(60) == 0
+        assert not parent_ends or parent.wait(PATIENCE) == 0
         assert child.is_running()
     assert parent.returncode == (0 if parent_ends else -signal.SIGKILL)
-    child.wait(60)  # raises if it is still running
+    child.wait(PATIENCE)  # raises if it is still running
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
@@ -36,7 +36,7 @@ def test_a_program_can_be_interrupted(start, number):
     process = start([sys.executable, "-c", SLEEP], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     assert process.stdout.readline() == b"ready\n"
     process.send_signal(number)
-    assert process.wait(60) == -number
+    assert process.wait(PATIENCE) == -number
 
 
 @pytest.mark.slow
@@ -46,6 +46,6 @@ def test_a_program_can_be_interrupted_where_a_shell_ignores_signals(start):
     process = start(
         ["sh", "-c", f"trap '' INT HUP; exec {inner}"], cwd=ROOT, env=variables(), stdout=subprocess.PIPE, text=True
     )
-    out, _ = process.communicate(timeout=300)
+    out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, out
     assert "2 passed" in out

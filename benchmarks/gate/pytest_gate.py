@@ -21,7 +21,6 @@ from conservative.errors import NotWritten
 
 from ..measures.origin import commit, machine_title
 from . import baseline, compare, results
-from .pytest_plugin import SUITE
 from .results import Results, Row, Status
 
 Made = pytest.Item | pytest.Collector | list[pytest.Item | pytest.Collector] | None
@@ -57,14 +56,14 @@ class GateItem(pytest.Item):
 class Gate:
     """The hooks of a gated run."""
 
-    def __init__(self, config: pytest.Config) -> None:
+    def __init__(self, config: pytest.Config, suite: Path) -> None:
         self.root = config.rootpath
         self.baseline = self.root / config.getoption("conservative_gate_baseline")
         self.folder = self.root / results.FOLDER
         self.rows: dict[str, Row] = {}
         self.verdict: compare.Verdict | None = None
         self.nothing = ""
-        self.config = config
+        self.config, self.suite = config, suite
         self.read: set[str] = set()
         self.classes: set[str] = set()
         self.benchmarks: set[str] = set()
@@ -106,17 +105,17 @@ class Gate:
 
     def finish(self) -> compare.Verdict:
         """Write the results to the folder, and return the verdict. Raise `NothingToCompare`."""
-        before, problem = None, None
+        before: baseline.Baseline | baseline.NoBaseline
         try:
             before = baseline.read(self.baseline)
         except baseline.NoBaseline as error:
-            problem = error
-        ids = self.benchmarks | (before.rows.keys() if before else set())
+            before = error
+        ids = self.benchmarks | (set() if isinstance(before, Exception) else before.rows.keys())
         run = Results(machine_title(), self.rows, commit(self.root), tuple(sorted(filter(self.is_left_out, ids))))
         results.write(run, self.folder / results.FILE)
-        if before is None:
+        if isinstance(before, Exception):
             self.nothing = "no baseline"
-            raise problem
+            raise before
         try:
             self.verdict = compare.judge(before, run)
         except baseline.NothingToCompare as error:
@@ -144,7 +143,7 @@ class Gate:
 
     def has_file(self, name: str) -> bool:
         """Return whether the suite or the project has a file of a name, outside of folders that pytest does not search."""
-        if (SUITE / name).is_file():
+        if (self.suite / name).is_file():
             return True
         hidden = self.config.getini("norecursedirs")
         for _, folders, files in os.walk(self.root):

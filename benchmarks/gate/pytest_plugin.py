@@ -70,7 +70,7 @@ def pytest_configure(config: pytest.Config) -> None:
             raise pytest.UsageError("--gate: got -n, under which workers disturb each other's times; allowed with -n0")
         from .pytest_gate import Gate
 
-        config.pluginmanager.register(Gate(config), "conservative_gate")
+        config.pluginmanager.register(Gate(config, SUITE), "conservative_gate")
 
 
 @pytest.hookimpl(optionalhook=True, tryfirst=True)

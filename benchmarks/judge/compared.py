@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array, to_quaternion
 from conservative.scene import Scene
 
-from .motion import Equations, States, closed, truth
+from .motion import ANGLE, Equations, States, closed, truth
 
 FLOOR = 1e-9  # errors that round-off makes in double precision
 SIGMAS = 7.0  # of noise, that the largest error may have
@@ -33,14 +32,33 @@ def take_rows(data: States, rows: Any) -> States:
     return None if data[0] is None else data[0][rows], None if data[1] is None else data[1][rows]
 
 
+@dataclass
+class Effort:
+    """The work that a search may still do. It is counted, because the clock depends on how busy the machine is.
+
+    The unit is a stretch of a solution (`Equations.flow`), one to three milliseconds on an idle machine.
+    """
+
+    left: float
+
+    def spend(self, stretches: float) -> None:
+        """Count work."""
+        self.left -= stretches
+
+    @property
+    def over(self) -> bool:
+        """True if no work is left."""
+        return self.left <= 0
+
+
 @dataclass(frozen=True, eq=False)
 class Compared:
     """Rows of a file and the scene whose motion they should be, from its initial state at `start`, s.
 
     `allowed` and `noise` (2,) are errors of attitudes, rad, and rates, relative to `scale`, rad/s. `free` says which of six
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
-    the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. A search ends at the
-    time `limit`, s, of the monotonic clock. `rounded` are the errors that digits make; with an allowed error of the user, which
+    the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
+    the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
     alone decides, it is that.
     """
 
@@ -54,7 +72,7 @@ class Compared:
     free: tuple[int, ...] = ()
     growth: float = 1e6
     stride: int = 1
-    limit: float = math.inf
+    effort: Effort = field(default_factory=lambda: Effort(math.inf))
     rounded: tuple[float, float] = (0.0, 0.0)
 
     def take(self, rows: Any) -> Compared:
@@ -129,6 +147,7 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
+        self.effort.spend((1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
@@ -164,7 +183,7 @@ class Compared:
             R, w = evaluate(p[None])
             now = (part.differences(R, w)[0] * weights).ravel()
             for _ in range(most):
-                if monotonic() > self.limit:
+                if self.effort.over:
                     break
                 R, w = evaluate(p + np.concatenate([small * np.eye(6 + len(extra))[i][None] for i in moved]))
                 slopes = ((part.differences(R, w) * weights).reshape(len(moved), -1) - now) / small[moved][:, None]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import combinations, product
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -16,14 +15,14 @@ from conservative.attitude import Array
 from conservative.needs import Need
 
 from . import mistakes
-from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Solution, exact
+from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
 from .explanation import PROVEN, Explanation, attempt, explain
 from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
 from .motion import Equations, closed, truth
 from .steps import PARTS, STEPS_AT_MOST, find_steps
 
 FEWEST, MOST = 100, 2500  # rows that are explained
-LIMIT = 60.0  # s, after which the search ends
+EFFORT = 30_000  # stretches, after which the search ends: about a minute; the tests of this package take up to 4,344
 MOST_BREAKS = 50  # of loads, if numbers are fitted
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 NOT_INTEGRAL = "The rates are right, but the attitudes are not their integral: they follow"
@@ -51,13 +50,13 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
-    case = replace(case.take(slice(None, None, stride)), stride=stride, limit=monotonic() + LIMIT)
+    case = replace(case.take(slice(None, None, stride)), stride=stride, effort=Effort(EFFORT))
     tried = units
     for name, search in SEARCHES.items() if len(case.t) > 3 and not any(each.explains for each in units) else ():
         tell(name)
         for each in search(case, quaternion):
             tried.append(each)
-            if monotonic() > case.limit:
+            if case.effort.over:
                 break
         if search in (_readings, _attitudes, find_steps) and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
@@ -68,7 +67,7 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
         tried = [replace(each, explains=False) for each in tried]
     explaining = [each for each in tried if each.explains]
     if not explaining:
-        notes = [f"The search ended after {LIMIT:g} s."] * (monotonic() > case.limit)
+        notes = ["The search ended before everything was tried: it takes too many trial motions."] * case.effort.over
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
         return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)

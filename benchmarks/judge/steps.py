@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from .explanation import Explanation, attempt
 from .mistakes import STEPS, Step
 from .motion import Equations, truth
 
+CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
 STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows
 
 
@@ -54,9 +54,11 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
         last, wanted = int(numbers[-1]), set(numbers.tolist())
         with np.errstate(all="ignore"):
             for number in range(last + 1):
-                if number % 256 == 0 and monotonic() > case.limit:
-                    kept += [y * np.nan] * (n - len(kept))
-                    break
+                if number % CHUNK == 0:
+                    case.effort.spend(CHUNK_EFFORT)
+                    if case.effort.over:
+                        kept += [y * np.nan] * (n - len(kept))
+                        break
                 if number in wanted:
                     kept.append(y)
                 if number < last:
@@ -109,7 +111,7 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
     for left, parts, name in ranked[:5]:
         if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
             continue
-        if monotonic() > case.limit:
+        if case.effort.over:
             return
         for count in sorted({parts, *linear.others(STEPS[name], parts)}, key=lambda n: abs(n - parts)):
             for most in (2000, STEPS_AT_MOST):  # steps

@@ -56,7 +56,7 @@ class EngineMethod(AdapterMethod):
     def at_version(cls, version: str) -> type[EngineMethod]:
         """Return the class of a version, whose family is `exudyn@1.13.6`; of the newest one if it is empty."""
         if not version:
-            return cls.__mro__[1] if cls.version else cls  # type: ignore[return-value]
+            return cls.__mro__[1] if cls.version else cls
         if cls.version:
             return cls.__mro__[1].at_version(version)  # type: ignore[attr-defined]
         names = {"version": version, "family": f"{cls.family}@{version}", "__module__": cls.__module__, "__doc__": cls.__doc__}

@@ -20,4 +20,4 @@ def count(usual):
 
 def tries(usual):
     """Return settings for an attack by Hypothesis, which shrinks what it finds and tries it first next time."""
-    return settings(max_examples=count(usual), deadline=None, suppress_health_check=list(HealthCheck))
+    return settings(max_examples=count(usual), suppress_health_check=list(HealthCheck))

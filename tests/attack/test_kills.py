@@ -29,7 +29,7 @@ from ..references.trial_engine import Trial
 from .effort import SEED, count
 
 pytestmark = pytest.mark.attack
-HANG, PATIENCE = 600, 60  # s after which a command hangs for sure, without and after a signal
+HANG, PATIENCE = 1800, 1800  # s after which a command hangs for sure, without and after a signal
 REPORT = ["report", "--quick", "--scenes", "brick_flip", "--methods", "moser_veselov:order=2"]
 TIMES = ("s", "s/s")  # units of rows whose values differ from one run to the next
 SAME = ("study", "scene", "method", "label", "role", "dt", "quantity", "measure", "unit", "outcome")
@@ -54,7 +54,7 @@ def end_at(moment, number, arguments, folder):
             process.send_signal(number)
             _, err = process.communicate(timeout=PATIENCE)
         finally:
-            going_on = psutil.wait_procs(children, timeout=30)[1]
+            going_on = psutil.wait_procs(children, timeout=PATIENCE)[1]
             for child in going_on:
                 child.kill()
         assert not going_on

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from ..environments import PATIENCE
+
 pytestmark = pytest.mark.slow
 
 SOURCE = Path(__file__).parent.parent / "example_package"
@@ -19,7 +21,7 @@ def project(tmp_path_factory):
     """The package as its authors have it: a folder, and an environment in which it is installed."""
     folder = tmp_path_factory.mktemp("example")
     shutil.copytree(SOURCE, folder / "source")
-    subprocess.run([*INSTALL, "--target", folder / "installed", folder / "source"], check=True, timeout=120)
+    subprocess.run([*INSTALL, "--target", folder / "installed", folder / "source"], check=True, timeout=PATIENCE)
     (folder / "source" / "pytest.ini").write_text("[pytest]\naddopts = -p no:cacheprovider\n")
     return folder
 
@@ -33,7 +35,7 @@ def run(project, *command):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=PATIENCE,
         check=False,
     )
     return done.returncode, done.stdout + done.stderr

@@ -10,7 +10,7 @@ from conservative import registry
 from conservative.benchmarks.recommendation.recommend import Question, list_engines, recommend
 from conservative.outcome import OutcomeKind
 
-from ..environments import ROOT, variables
+from ..environments import PATIENCE, ROOT, variables
 from .foreign_engines import Fast, Harmful, Slow
 
 ENTRY_POINTS = """[conservative.methods]
@@ -59,7 +59,9 @@ def installed(tmp_path):
 
 
 def python(variables, *arguments):
-    done = subprocess.run([sys.executable, *arguments], env=variables, cwd=ROOT, capture_output=True, text=True, timeout=600)
+    done = subprocess.run(
+        [sys.executable, *arguments], env=variables, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE
+    )
     return done.returncode, done.stdout + done.stderr
 
 

@@ -19,6 +19,7 @@ from conservative.method import Role
 from conservative.outcome import OK, OutcomeKind
 from conservative.references.exact.method import Exact
 
+from ..environments import PATIENCE
 from .generic_study import TURN, truth
 
 KINDS = ("not converged", "wrong branch", "diverged", "timeout", "unsupported", "crashed")
@@ -65,7 +66,7 @@ class Staged(cv.Method):
             if self.how == "crashed":
                 raise RuntimeError("planted")
             if self.how == "timeout":
-                time.sleep(60)
+                time.sleep(PATIENCE)
             return cv.Trajectory(scene, grid.t, R, w, self.label, failure=failure)
 
         return run
@@ -77,7 +78,7 @@ def staged(how):
 
 @pytest.mark.parametrize("how", KINDS)
 def test_every_kind_of_failure_is_named(how, monkeypatch):
-    monkeypatch.setattr(stability, "LIMIT", 5.0)
+    monkeypatch.setattr(stability, "LIMIT", 5.0 if how == "timeout" else PATIENCE)
     measured = rows(staged(how))
     assert measured[how, Measure.LONGEST_STEP].value == pytest.approx(0.7)
     assert measured[how, Measure.LONGEST_STEP].outcome == OK

@@ -22,6 +22,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
 from conservative.references.worker.client import close_workers
 
+from ..environments import PATIENCE
 from .foreign_engines import Fast, Harmful, Slow
 from .generic_study import SCENE, truth
 
@@ -45,7 +46,7 @@ def copy_of(scene):
 @pytest.mark.parametrize("name", ["scipy", "mujoco:RK4", "heyoka", "pinocchio"])
 def test_a_run_in_a_worker_is_the_same_bit_for_bit(scene, name):
     case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
-    here, there = attempt(case), attempt_within(60.0, case, apart=True)
+    here, there = attempt(case), attempt_within(PATIENCE, case, apart=True)
     if isinstance(here, Outcome):
         assert here == there
         return
@@ -61,8 +62,8 @@ def test_a_run_in_a_worker_is_the_same_bit_for_bit(scene, name):
     ("how", "limit", "kind", "reason"),
     [
         ("hang", 0.5, OutcomeKind.TIMEOUT, "after 0.5 s"),
-        ("exit", 60.0, OutcomeKind.CRASHED, "exit code 3"),
-        ("abort", 60.0, OutcomeKind.CRASHED, "signal 6 (SIGABRT)"),
+        ("exit", PATIENCE, OutcomeKind.CRASHED, "exit code 3"),
+        ("abort", PATIENCE, OutcomeKind.CRASHED, "signal 6 (SIGABRT)"),
     ],
 )
 @pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
@@ -102,7 +103,7 @@ def test_a_method_that_cannot_be_sent_runs_here():
             with self.lock:
                 return super().prepare(scene, grid)
 
-    assert isinstance(attempt_within(60.0, Case("any", SCENE, Held(), grid_for(SCENE, 0.05))), Success)
+    assert isinstance(attempt_within(PATIENCE, Case("any", SCENE, Held(), grid_for(SCENE, 0.05))), Success)
 
 
 @pytest.mark.parametrize("name", ["paper", "convergence", "speed", "work_precision", "long_runs", "motion", "stability"])

@@ -16,14 +16,14 @@ import conservative as cv
 from conservative.integration import blocks, cluster
 from conservative.integration.cluster import open_client, require_versions
 
+from ..environments import PATIENCE
+
 distributed = pytest.importorskip("distributed")
 
 N, KILLED = 24, 9
 """Number of bodies (one per block), and number of results when a worker is killed."""
 RETRIES = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"}
 """Time limit of a scheduler to reach a dead worker: 30 s by default."""
-LIMIT = 60.0
-"""Time limit for processes to start on a busy machine, s."""
 
 
 def start(stack, folder, program, *arguments):
@@ -38,7 +38,7 @@ def start(stack, folder, program, *arguments):
 
 def start_scheduler(stack, folder):
     """Start a scheduler and return its address."""
-    file, end = folder / "scheduler.json", time.monotonic() + LIMIT
+    file, end = folder / "scheduler.json", time.monotonic() + PATIENCE
     start(stack, folder, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
     while not file.exists() and time.monotonic() < end:
         time.sleep(0.05)
@@ -60,12 +60,12 @@ def test_a_worker_that_is_killed_loses_nothing_and_nothing_comes_twice(tmp_path,
     alone, done = run(), []
     with ExitStack() as stack:
         address = start_scheduler(stack, tmp_path)
-        client = stack.enter_context(open_client(address, LIMIT))
+        client = stack.enter_context(open_client(address, PATIENCE))
         with pytest.raises(cv.BadInput, match=r"client: got a scheduler at tcp.* without workers"):
             run(client=client)
         options = "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1"
         workers = [start(stack, tmp_path, "worker", address, *options) for _ in range(2)]
-        client.wait_for_workers(2, timeout=LIMIT)
+        client.wait_for_workers(2, timeout=PATIENCE)
 
         def kill_one(progress):
             done.append(progress.done)

@@ -81,7 +81,7 @@ def test_conserves_every_invariant(name: str, dt: float) -> None:
     assert orthonormality(trajectory.R_WB).max() < 1e-14  # measured 5e-15, of the axes that eigh gives the body
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6), st.sampled_from([-1.0, 1.0]), st.floats(0.01, 20.0))
 def test_one_step_is_two_half_steps(seed: int, side: float, dt: float) -> None:
     scene = top(seed, side)

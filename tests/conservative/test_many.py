@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import threading
@@ -26,6 +27,7 @@ from conservative.methods.many import Block, pause
 from conservative.methods.trials import Estimate
 from conservative.trajectory import Trajectory
 
+from ..environments import wait_until
 from .one_body import BODY, TURN, body_in_axes
 
 
@@ -449,8 +451,13 @@ def test_failures_come_back_from_other_processes(failure):
     assert str(again) == str(failure)
 
 
+WAITING = threading.Event()
+"""Set when a block waits for ever."""
+
+
 def wait_for_ever(block):
     """Run in pieces without end."""
+    WAITING.set()
     while True:
         time.sleep(0.01)
         pause()
@@ -459,13 +466,19 @@ def wait_for_ever(block):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 2)
-    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     begun = threading.active_count()
-    timer.start()
+    WAITING.clear()
+
+    def interrupt():
+        WAITING.wait()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    sender = threading.Thread(target=interrupt)
+    sender.start()
     with pytest.raises(KeyboardInterrupt):
         cv.integrate_many(scene(), *starts(FEW), method=Damaged(wait_for_ever), threads=threads, **EVERY_OTHER)
-    timer.join()
-    assert threading.active_count() == begun
+    sender.join()
+    wait_until(lambda: threading.active_count() == begun)  # a thread that is just starting is not joined
 
 
 def test_a_failure_of_one_block_ends_the_others(monkeypatch):
@@ -479,7 +492,7 @@ def test_a_failure_of_one_block_ends_the_others(monkeypatch):
 
     with pytest.raises(RuntimeError, match="broken"):
         cv.integrate_many(scene(), *starts(3), method=Damaged(fail), threads=2, **EVERY_OTHER)
-    assert threading.active_count() == begun
+    wait_until(lambda: threading.active_count() == begun)
 
 
 THOUSAND = 1000

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ..environments import ROOT, variables
+from ..environments import PATIENCE, ROOT, variables
 
 SCRIPT = Path(__file__).with_name("other_processor.py")
 
@@ -16,7 +16,7 @@ SCRIPT = Path(__file__).with_name("other_processor.py")
 def run(*arguments, **environment):
     command = [sys.executable, str(SCRIPT), *map(str, arguments)]
     changed = variables(PYTHONPATH=str(ROOT), **environment)
-    return subprocess.run(command, env=changed, capture_output=True, text=True, timeout=300, check=True).stdout
+    return subprocess.run(command, env=changed, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def scene_in(potential, t_end=5.0):
 
 
 @potentials
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(R=matrices)
 def test_gradient_is_that_of_the_energy(potential, R):
     step, gradient = 1e-5, potential.gradient(R)
@@ -56,7 +56,7 @@ def test_gradient_is_that_of_the_energy(potential, R):
 
 
 @potentials
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(R_0=matrices, R_1=matrices)
 def test_finite_derivative_gives_the_difference_of_energy(potential, R_0, R_1):
     gained = np.sum(potential.finite_derivative(R_0, R_1) * (R_1 - R_0))
@@ -64,7 +64,7 @@ def test_finite_derivative_gives_the_difference_of_energy(potential, R_0, R_1):
 
 
 @potentials
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(R=attitudes, exponent=st.floats(-18, -3))
 @example(R=rotation_about((0.1875, 0.40625, 1.0), 3.125), exponent=-11.0)  # a small energy, by cancellation
 def test_finite_derivative_of_a_tiny_step_is_the_gradient(potential, R, exponent):

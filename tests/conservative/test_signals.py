@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -21,8 +22,8 @@ from conservative.method import Run
 from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
 
-HANG = 120
-"""Time limit of a program that does not hang, s."""
+from ..environments import PATIENCE, run_python
+
 INTERRUPT = """
 import os, signal, sys, threading
 import conservative as cv
@@ -31,8 +32,8 @@ from conservative import registry
 for text in sys.argv[1:]:
     scene, method = (find(name) for find, name in zip((registry.scene, registry.method), text.split()))
     cv.integrate(scene, 1e-9, method, 2e-8)
-    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
         dt = 1.0 if "tolerance" in text else 1e-9  # steps of a tolerance do not depend on dt
         cv.integrate(scene, dt, method, 1e9 * dt, sample_every=10**9)
     except KeyboardInterrupt:
@@ -60,7 +61,7 @@ def test_an_interrupt_ends_runs_of_a_billion_steps() -> None:
         cv.integrate(registry.scene(scene), 1e-9, registry.method(method), 2e-8)
     runs = [f"{scene} {method}" for scene, method in LONG_RUNS]
     command = [sys.executable, "-P", "-c", INTERRUPT, *runs]
-    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, timeout=HANG)
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, timeout=PATIENCE)
     assert done.stdout.splitlines() == runs
 
 
@@ -85,15 +86,39 @@ class Stop(BaseException):
 
 
 @contextmanager
-def alarms(interval: float, handler: object) -> Iterator[None]:
-    """Raise an alarm every `interval` seconds."""
-    before = signal.signal(signal.SIGALRM, handler)  # type: ignore[arg-type]
-    signal.setitimer(signal.ITIMER_REAL, interval, interval)
+def signals(handler: Callable[[], object], wait: float = 0.05, times: int = 1) -> Iterator[None]:
+    """Send signals from another thread, each after the last one was handled; none comes after the block.
+
+    `wait`, s, lets the block get to its work. If it does not, the signal comes a little early.
+    """
+    handled, over = threading.Event(), threading.Event()
+
+    def handle(number: int, frame: object) -> None:
+        handled.set()
+        if not over.is_set():
+            handler()
+
+    def send() -> None:
+        over.wait(wait)
+        for _ in range(times):
+            if over.is_set():
+                return
+            handled.clear()
+            os.kill(os.getpid(), signal.SIGUSR1)
+            handled.wait()
+
+    before, sender = signal.signal(signal.SIGUSR1, handle), threading.Thread(target=send)
+    sender.start()
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        over.set()
+        sender.join()
+        signal.signal(signal.SIGUSR1, before)
+
+
+def stop() -> None:
+    raise Stop("reason")
 
 
 def long_run(n_steps: int = 10**9) -> cv.Trajectory:
@@ -101,70 +126,68 @@ def long_run(n_steps: int = 10**9) -> cv.Trajectory:
 
 
 def test_exceptions_of_a_handler_are_not_changed() -> None:
-    def stop(*_: object) -> None:
-        raise Stop("reason")
-
-    with pytest.raises(Stop, match="reason"), alarms(0.05, stop):
+    with pytest.raises(Stop, match="reason"), signals(stop):
         long_run()
 
 
 def test_a_handler_that_raises_nothing_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels("reduced"), "PAUSE", 1000)
+    reference = states(long_run(10**5))
     calls: list[int] = []
-    with alarms(0.001, lambda number, _: calls.append(number)):
-        found = long_run(10**6)
-    assert len(calls) > 2
-    assert states(found) == states(long_run(10**6))
+    with signals(lambda: calls.append(1), 0.0, times=5):
+        while len(calls) < 5:
+            assert states(long_run(10**5)) == reference
 
 
 def repeat(run: Run) -> None:
-    """Make enough runs for an alarm during one of them."""
-    for _ in range(1000):
+    """Make runs without end."""
+    while True:
         run()
 
 
 def test_samples_without_end_are_interrupted_too() -> None:
     """With one step per sample, most of the time is spent on the conversion of samples to body axes."""
-
-    def stop(*_: object) -> None:
-        raise Stop
-
     run = cv.MoserVeselov().prepare(cv.scenes.brick_flip(), Grid(1e-6, 3 * 10**5))
     reference = states(run())
-    with pytest.raises(Stop), alarms(0.002, stop):
+    with pytest.raises(Stop), signals(stop):
         repeat(run)
     assert states(run()) == reference
 
 
 def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
     """Signals come before, during and after the Python functions; an unfinished evaluation does not affect later runs."""
-
-    def stop(*_: object) -> None:
-        raise Stop
-
     scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic(1))
-    short, long = (cv.Reduced().prepare(scene, Grid(1e-6, n, n)) for n in (5, 10**6))
+    short, long = (cv.Reduced().prepare(scene, Grid(1e-6, n, n)) for n in (5, 10**9))
     reference = states(short())
     for k in range(20):
-        with pytest.raises(Stop), alarms(0.01 + 1e-4 * k, stop):
+        with pytest.raises(Stop), signals(stop, 0.01 + 1e-4 * k):
             long()
         assert states(short()) == reference
 
 
+LIMITED = """
+import threading
+import conservative as cv
+from conservative.grid import Grid
+
+def run(n_steps, begun=lambda: None):
+    made = cv.Reduced().prepare(cv.scenes.brick_flip(), Grid(1e-6, n_steps, n_steps))
+    begun()
+    made()
+
+run(10)
+begun = threading.Event()
+thread = threading.Thread(target=run, args=(10**10, begun.set), daemon=True)  # it takes a quarter of an hour
+thread.start()
+begun.wait()
+thread.join(0.1)
+print(thread.is_alive())
+"""
+
+
 def test_another_thread_can_enforce_a_time_limit() -> None:
     """The run continues in a daemon thread, which ends with its process."""
-    started = threading.Event()
-
-    def work() -> None:
-        started.set()
-        long_run(10**7)
-
-    long_run(10)
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    started.wait()
-    thread.join(0.1)
-    assert thread.is_alive()
+    assert run_python(LIMITED) == (0, "True\n", "")
 
 
 def states(trajectory: cv.Trajectory) -> tuple[bytes, bytes, object, str]:

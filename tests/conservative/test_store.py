@@ -17,6 +17,8 @@ from conservative.integration import blocks, store
 from conservative.integration.inputs import read_bodies
 from conservative.version import VERSION
 
+from ..environments import PATIENCE
+
 zarr = pytest.importorskip("zarr")
 
 N = 22
@@ -159,7 +161,7 @@ run(sys.argv[2])
 def test_a_killed_run_continues_to_the_same_bytes(whole, tmp_path):
     place = tmp_path / "a.zarr"
     command = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(place)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
     assert (place / "R_WB/c/1/0/0/0").exists()  # of a block that is not done
     seen = []

@@ -143,7 +143,7 @@ PAIRS = [(method, kind) for method in ours() for kind in KINDS if supported(meth
 
 
 @pytest.mark.parametrize(("method", "kind"), PAIRS, ids=lambda value: getattr(value, "name", value))
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_symmetries_hold(method, kind, data):
     case = data.draw(cases(kind))

@@ -20,10 +20,7 @@ from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, close_workers
 from conservative.references.worker.program import MAGIC, PREFIX
 
-from ..environments import run_python
-
-LONG = 60.0
-"""Time, s, that no test here needs, on however busy a machine."""
+from ..environments import PATIENCE, run_python
 
 
 def hang():
@@ -60,10 +57,10 @@ def test_work_beyond_its_limit_is_ended_and_no_process_remains(work):
 )
 def test_the_end_of_its_process_is_described(work, description):
     with pytest.raises(EngineCrashed) as caught:
-        run_within(LONG, work)
+        run_within(PATIENCE, work)
     assert caught.value.reason == description
     assert children() == []
-    assert run_within(LONG, lambda: 3) == 3
+    assert run_within(PATIENCE, lambda: 3) == 3
 
 
 def close_all():
@@ -83,7 +80,7 @@ def answer_by_half():
 def test_a_process_with_an_incomplete_answer_is_ended(work, description, monkeypatch):
     monkeypatch.setattr(client, "_PATIENCE", 0.5)
     with pytest.raises(EngineCrashed, match=description):
-        run_within(LONG, work)
+        run_within(PATIENCE, work)
     assert children() == []
 
 
@@ -93,37 +90,38 @@ def test_a_limit_may_be_any_number():
 
 def test_results_and_exceptions_are_returned():
     local = {"factor": 7}
-    assert run_within(LONG, lambda: 6 * local["factor"]) == 42
+    assert run_within(PATIENCE, lambda: 6 * local["factor"]) == 42
     with pytest.raises(ZeroDivisionError):
-        run_within(LONG, lambda: 1 // 0)
+        run_within(PATIENCE, lambda: 1 // 0)
 
     def refuse():
         raise cv.BadInput("dt", 0, "above 0")
 
     with pytest.raises(cv.BadInput) as caught:
-        run_within(LONG, refuse)
+        run_within(PATIENCE, refuse)
     assert (caught.value.argument, caught.value.got, caught.value.allowed) == ("dt", 0, "above 0")
 
 
 def test_one_process_does_one_piece_of_work_after_the_other():
-    assert run_within(LONG, os.getpid) == run_within(LONG, os.getpid) != os.getpid()
+    assert run_within(PATIENCE, os.getpid) == run_within(PATIENCE, os.getpid) != os.getpid()
     (process,) = children()
     close_workers()
     assert not process.is_running()
 
 
 def test_it_runs_in_the_current_working_directory(tmp_path, monkeypatch):
-    run_within(LONG, int)
+    run_within(PATIENCE, int)
     monkeypatch.chdir(tmp_path)
-    assert run_within(LONG, os.getcwd) == str(tmp_path)
+    assert run_within(PATIENCE, os.getcwd) == str(tmp_path)
     tmp_path.rmdir()
-    assert run_within(LONG, int) == 0
+    assert run_within(PATIENCE, int) == 0
 
 
 def test_threads_have_processes_of_their_own():
     results = []
     threads = [
-        threading.Thread(target=lambda k=k: results.append(run_within(LONG, lambda: (time.sleep(0.2), k)[1]))) for k in range(3)
+        threading.Thread(target=lambda k=k: results.append(run_within(PATIENCE, lambda: (time.sleep(0.2), k)[1])))
+        for k in range(3)
     ]
     for thread in threads:
         thread.start()
@@ -132,28 +130,34 @@ def test_threads_have_processes_of_their_own():
     assert sorted(results) == [0, 1, 2]
 
 
-def test_an_interrupt_ends_the_work():
-    timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
-    run_within(LONG, int)
-    timer.start()
+def test_an_interrupt_ends_the_work(tmp_path):
+    begun = tmp_path / "begun"
+
+    def interrupt():
+        while not begun.exists():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    sender = threading.Thread(target=interrupt)
+    sender.start()
     with pytest.raises(KeyboardInterrupt):
-        run_within(LONG, hang)
-    timer.join()
+        run_within(PATIENCE, lambda: (begun.touch(), hang()))
+    sender.join()
     assert children() == []
 
 
 def test_objects_that_cannot_be_sent_are_refused():
     lock = threading.Lock()
     with pytest.raises(NotTransferable, match="lock"):
-        run_within(LONG, lambda: lock)
+        run_within(PATIENCE, lambda: lock)
     with pytest.raises(NotTransferable, match="lock"):
-        run_within(LONG, lambda: __import__("threading").Lock())
-    assert run_within(LONG, lambda: 3) == 3
+        run_within(PATIENCE, lambda: __import__("threading").Lock())
+    assert run_within(PATIENCE, lambda: 3) == 3
 
 
 def test_shared_objects_keep_their_identity():
     scene = cv.scenes.brick_flip()
-    again, renamed = run_within(LONG, lambda: (scene, scene.rename("other")), (scene,))
+    again, renamed = run_within(PATIENCE, lambda: (scene, scene.rename("other")), (scene,))
     assert again is scene
     assert renamed.body is not scene.body
     assert np.array_equal(renamed.body.inertia, scene.body.inertia)
@@ -179,7 +183,7 @@ def test_a_module_that_the_process_cannot_import_is_sent(tmp_path, monkeypatch):
 
     double = beside_the_script.double
     monkeypatch.undo()
-    assert run_within(LONG, lambda: double(21)) == 42
+    assert run_within(PATIENCE, lambda: double(21)) == 42
     del sys.modules["beside_the_script"]
 
 
@@ -194,7 +198,7 @@ class Local:
     def answer(self):
         return 42
 
-print(run_within(60, lambda: Local().answer()))
+print(run_within(1800, lambda: Local().answer()))
 try:
     run_within(0.2, lambda: [None for _ in iter(int, 1)])
 except EngineTimeout as late:
@@ -214,7 +218,7 @@ def test_a_script_needs_no_guard_of_its_main_module(tmp_path):
 ORPHAN = """
 import sys, threading, time
 from conservative.references.worker.calls import _idle, run_within
-run_within(60, int)
+run_within(1800, int)
 print(_idle[0].pid, flush=True)
 if sys.argv[1] == "busy":
     run_within(600, lambda: [None for _ in iter(int, 1)])
@@ -228,5 +232,5 @@ def test_the_process_does_not_outlive_a_parent_that_is_killed(how, start):
     process = psutil.Process(int(parent.stdout.readline()))
     time.sleep(0.5)
     parent.kill()
-    gone, _ = psutil.wait_procs([process], timeout=LONG)
+    gone, _ = psutil.wait_procs([process], timeout=PATIENCE)
     assert gone == [process]

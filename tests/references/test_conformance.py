@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from conservative.references.environments import conformance
 from conservative.references.environments.conformance import check
-from conservative.references.environments.programs import read_program
+from conservative.references.environments.programs import program_class, read_program
 from conservative.references.worker import client
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
@@ -27,7 +27,9 @@ def home(tmp_path, monkeypatch):
 
 
 def results(*arguments):
-    return list(check(read_program(shlex.join([sys.executable, "-I", str(PLANTED), *arguments]), "planted")))
+    program = read_program(shlex.join([sys.executable, "-I", str(PLANTED), *arguments]), "planted")
+    program_class(program)  # starts it, which may take longer than a limit that a test sets
+    return list(check(program))
 
 
 def failures(*arguments):

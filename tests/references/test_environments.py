@@ -20,7 +20,7 @@ from conservative.references.environments.install import install_build, install_
 from conservative.references.environments.lock import Source
 from conservative.references.worker.client import close_workers
 
-from ..environments import ROOT, variables
+from ..environments import PATIENCE, ROOT, variables
 from .local_wheels import write_numpy, write_sdist, write_wheel
 
 pytestmark = pytest.mark.slow
@@ -224,14 +224,14 @@ def start_install(start, wheels):
 def test_a_kill_leaves_no_incomplete_environment(cache, wheels, start):
     began = time.monotonic()
     process = start_install(start, wheels)
-    assert process.communicate(timeout=120)[0] == "start\nwhole\n"
+    assert process.communicate(timeout=PATIENCE)[0] == "start\nwhole\n"
     duration, whole = time.monotonic() - began, 0
     for part in (0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
         install.remove("trial")
         process = start_install(start, wheels)
         time.sleep(part * duration)
         os.killpg(process.pid, signal.SIGKILL)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
         whole += len(environment.list_environments())
         assert installed(wheels).trouble == ""
         assert [path.name for path in (cache / "trial").iterdir()] == ["1.10"]

@@ -25,7 +25,7 @@ R0 = rotation_about((0.3, -1, 0.4), 2.1)
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_bodies(seed, separatrix):
     attitude, rates = draw_free(np.random.default_rng(seed), separatrix).errors()
@@ -170,7 +170,7 @@ def test_bad_input(argument, changes):
     assert caught.value.argument == argument
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_tops(seed, pole):
     case = draw_top(np.random.default_rng(seed), pole)

@@ -17,6 +17,8 @@ from conservative.attitude import angle_between, from_quaternion
 from conservative.programs import Program
 from conservative.references.environments.programs import program_class
 
+from ..environments import PATIENCE
+
 FOLDER = Path(cv.__file__).parents[1] / "references" / "for_engine_authors"
 GOLDEN = FOLDER / "golden.csv"
 WARNINGS = ("-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", f"-I{FOLDER}")
@@ -80,7 +82,7 @@ def step(build):
 
     def take(rows, precision="f64"):
         text = "\n".join(" ".join(map(repr, map(float, row[:14]))) + f" {int(row[14])}" for row in rows)
-        done = subprocess.run([drivers[precision]], input=text, text=True, check=True, capture_output=True, timeout=60)
+        done = subprocess.run([drivers[precision]], input=text, text=True, check=True, capture_output=True, timeout=PATIENCE)
         return np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
 
     return take

@@ -30,6 +30,8 @@ from conservative.references.importers.readers import read_here
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
+from ..environments import PATIENCE
+
 GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
 TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
 
@@ -194,13 +196,14 @@ def test_a_file_that_is_read_right_passes():
 
 
 def test_a_loader_that_crashes_or_hangs_is_that_engines_answer(monkeypatch, tmp_path):
-    monkeypatch.setattr(compare, "LIMIT", 3.0)
     bad = tmp_path / "bad.py"
-    bad.write_text("import os, time\ndef probe(engine, path, **_):\n    os.abort() if 'turned' in path else time.sleep(60)\n")
+    bad.write_text("import os, time\ndef probe(engine, path, **_):\n    os.abort() if 'turned' in path else time.sleep(1800)\n")
     monkeypatch.setattr(loaders, "__file__", str(bad))
     program = compare.Program("mujoco")
     program._adapter = str(bad)
-    for path, words in ((CATALOGUE / "turned_inertial_frame.urdf", "SIGABRT"), (GENERIC, "timeout")):
+    aborts = CATALOGUE / "turned_inertial_frame.urdf", "SIGABRT", PATIENCE
+    for path, words, limit in (aborts, (GENERIC, "timeout", 1.0)):
+        monkeypatch.setattr(compare, "LIMIT", limit)
         finding = program.check(model_of(path))
         assert finding.outcome == "crashed"
         assert words in finding.words

@@ -1,9 +1,7 @@
 """An engine in another process: its results, and its failures, which become outcomes."""
 
 import multiprocessing
-import os
 import pickle
-import signal
 import sys
 import threading
 import time
@@ -29,7 +27,7 @@ from conservative.references.worker import client
 from conservative.references.worker.client import EngineCrashed, Worker, time_limit
 
 from ..declared import ENGINES
-from ..environments import run_python
+from ..environments import PATIENCE, run_python
 from . import trial
 from .trial_engine import Trial
 
@@ -43,7 +41,7 @@ def folder(trial_cache):
     return trial_cache
 
 
-def run(do, at="run", limit=60.0):
+def run(do, at="run", limit=PATIENCE):
     with time_limit(limit):
         return cv.integrate(SCENE, DT, method=Trial(do, at), on_failure="return")
 
@@ -90,9 +88,7 @@ def test_a_crash_is_an_outcome_and_the_next_run_succeeds(do, at):
 
 @pytest.mark.parametrize("do", ["hang", "spin", "lock"])
 def test_an_engine_that_hangs_is_ended_after_its_limit(do):
-    start = time.monotonic()
     trajectory = run(do, limit=0.5)
-    assert time.monotonic() - start < 60
     assert str(trajectory.outcome) == "timeout (after 0.5 s)"
     assert run("integrate").ok
 
@@ -141,23 +137,21 @@ def test_a_refusal_is_unsupported():
 
 def test_a_process_that_is_killed_while_it_runs_is_a_crash():
     run("integrate")
-    process = worker_of(Trial().environment).pid
-    threading.Timer(0.3, os.kill, (process, signal.SIGKILL)).start()
-    assert str(run("hang").outcome) == "crashed (signal 9 (SIGKILL))"
+    assert str(run("kill").outcome) == "crashed (signal 9 (SIGKILL))"
     assert run("integrate").ok
 
 
 def test_wall_time_grows_with_the_number_of_calls():
-    timed = Trial().prepare(SCENE, grid_for(SCENE, DT))
-    assert timed.wall_time(1) > 0
-    assert timed.wall_time(20) > 3 * timed.wall_time(1)
+    timed = Trial("rest").prepare(SCENE, grid_for(SCENE, DT))  # for 0.05 s in each call
+    assert timed.wall_time(1) >= 0.05
+    assert timed.wall_time(20) >= 1.0
 
 
 def test_renewing_a_run_is_not_measured():
     renewed = Trial("renew").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
     start = time.perf_counter()
-    assert renewed.wall_time(4) < 2
-    assert time.perf_counter() - start > 2
+    measured = renewed.wall_time(4)
+    assert time.perf_counter() - start - measured >= 2.0  # four times 0.5 s
 
 
 def test_the_loop_is_measured_instead_of_the_run():
@@ -189,8 +183,8 @@ def test_a_forked_process_has_a_worker_of_its_own():
     queue = context.Queue()
     child = context.Process(target=_in_child, args=(queue,))
     child.start()
-    assert queue.get(timeout=60) == (None, 51)
-    child.join(60)
+    assert queue.get(timeout=PATIENCE) == (None, 51)
+    child.join(PATIENCE)
     assert run("integrate").ok
     assert mine.starts == starts
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import signal
 import sys
 import time
 
@@ -73,6 +74,8 @@ def misbehave(do):
         "segfault": lambda: ctypes.string_at(0),
         "abort": os.abort,
         "exit": lambda: os._exit(3),
+        "kill": lambda: os.kill(os.getpid(), signal.SIGKILL),
+        "rest": lambda: time.sleep(0.05),
         "sys_exit": sys.exit,
         "raise": lambda: {}["no such key"],
         "refuse": refuse,

@@ -29,18 +29,21 @@ def test_kernels_are_compiled_once_before_the_studies(tmp_path):
 ELSEWHERE = """
 import os, signal, time
 from dataclasses import replace
-from threading import Timer
+from pathlib import Path
+from threading import Thread
 from conservative.methods.gauss import Gauss
 from conservative.methods.moser_veselov import MoserVeselov
 from conservative.reports.run.measure import compile_kernels
 from conservative.reports.run.plan import plan_report
-here = os.getpid()
+here, BEGUN = os.getpid(), Path(os.environ["NUMBA_CACHE_DIR"], "begun")
 class Ends(MoserVeselov):
     def prepare(self, scene, grid):
         return os._exit(3) if os.getpid() != here else super().prepare(scene, grid)
 class Sleeps(Gauss):
     def prepare(self, scene, grid):
-        return time.sleep(1e6) if os.getpid() != here else super().prepare(scene, grid)
+        if os.getpid() == here: return super().prepare(scene, grid)
+        BEGUN.touch()
+        time.sleep(1e6)
 def plan(*methods):
     made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     return replace(made, studies=tuple(replace(study, methods=methods) for study in made.studies))
@@ -53,8 +56,10 @@ def test_a_process_that_ends_leaves_the_compilation_to_the_studies(tmp_path):
 
 
 DURING_A_COMPILATION = """
-Timer(3, os.kill, (here, signal.SIGINT)).start()
-try: compile_kernels(plan(Sleeps()), print)
+def interrupt():
+    while not BEGUN.exists(): time.sleep(0.01)
+    os.kill(here, signal.SIGINT)
+try: Thread(target=interrupt).start(), compile_kernels(plan(Sleeps()), print)
 except KeyboardInterrupt: print("interrupted")
 """
 BETWEEN_TWO = """

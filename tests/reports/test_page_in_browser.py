@@ -22,6 +22,7 @@ from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.sections.report import build
 
+from ..environments import PATIENCE
 from .made_up import at_step, over_steps
 
 pytestmark = pytest.mark.browser
@@ -36,7 +37,6 @@ ARGUMENTS = (
     "--window-size=1280,1000",
 )
 METHODS = ["reduced", "reduced:order=4", "gauss:stages=2", "mujoco:RK4", "heyoka:tol=1e-9"]
-PATIENCE = 60  # s, for a loaded machine; nothing is timed by it
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from conservative.reports.run.measure import measure
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 
-from ..environments import programs
+from ..environments import PATIENCE, programs
 from .rows import row
 
 OUTCOME = NotConverged(3, 0.02, 0.5, "why").outcome
@@ -184,8 +184,6 @@ def test_unfinished_work_is_stored_next_to_the_folder(out, tmp_path, monkeypatch
 # Interruptions of a real process.
 
 TIMES = ("s", "s/s")
-HANG = 600
-"""Time, s, after which a process hangs for sure."""
 
 
 def started(start, arguments, folder):
@@ -197,11 +195,11 @@ def stopped(arguments, folder, number, ready):
     """Start a command, send it a signal once `ready`, and return its exit code, stdout and stderr."""
     with programs() as start:
         process = started(start, arguments, folder)
-        end = time.monotonic() + HANG
+        end = time.monotonic() + PATIENCE
         while not ready() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.005)
         process.send_signal(number)
-        out, err = process.communicate(timeout=HANG)
+        out, err = process.communicate(timeout=PATIENCE)
     return process.returncode, out, err
 
 
@@ -229,7 +227,7 @@ def resumed(tmp_path_factory):
     again = shlex.split(err.partition("continue with: ")[2])
     with programs() as start:
         done = started(start, again[1:], folder)
-        said = done.communicate(timeout=HANG)
+        said = done.communicate(timeout=PATIENCE)
     return folder, (code, out, err), left, earlier, content, again, (done.returncode, *said)
 
 

@@ -13,6 +13,7 @@ import conservative
 from conservative.reports.cli.main import main
 from conservative.reports.documentation import site
 
+from ..environments import PATIENCE
 from .test_animation_in_browser import WEBGL
 from .test_page_in_browser import start, wait
 
@@ -53,7 +54,7 @@ def test_the_site_is_built_without_warnings_complete_and_searchable(tmp_path):
     (report / "index.html").write_text("<p>a report</p>")
     (report / "engine_a.html").write_text("<p>an engine</p>")
     command = [sys.executable, "-m", "conservative.reports.documentation.site", str(folder), "--report", str(report)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == str(folder / "index.html")
     pages = {path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8") for path in folder.rglob("*.html")}

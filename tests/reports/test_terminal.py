@@ -23,11 +23,11 @@ with progress() as step:
 SLOW = """
 from time import sleep
 from conservative.reports.terminal import progress
-progress.DELAY = 1.0
+progress.DELAY = 0.1
 with progress.show_waiting("a scene: a method"):
-    sleep(1.5)
+    sleep(3.0)
 """
-FAST = SLOW.replace("DELAY = 1.0", "DELAY = 60.0")
+FAST = SLOW.replace("DELAY = 0.1", "DELAY = 1800.0").replace("sleep(3.0)", "sleep(0.3)")
 
 
 def on_a_terminal(code, columns=80):

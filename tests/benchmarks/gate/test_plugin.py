@@ -15,6 +15,8 @@ from conservative.benchmarks.gate.results import Results, Status
 from conservative.errors import NotWritten
 from conservative.reports.cli.main import main
 
+from ...environments import PATIENCE
+
 SUITE = Path(suite.__file__).parent
 INI = "[pytest]\naddopts = -p no:cacheprovider --benchmark-max-time=0.001\n"
 OTHER = """
@@ -38,7 +40,7 @@ def other(tmp_path):
 
 def run(folder, *options):
     command = [sys.executable, "-m", "pytest", *map(str, options)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -53,7 +55,7 @@ print(*(name for name in set(sys.modules) - before if name.partition(".")[0] in 
 
 
 def test_the_plugin_imports_no_other_module_of_the_package():
-    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=PATIENCE, check=True)
     plugin = "conservative.benchmarks.gate.pytest_plugin"
     above = {".".join(plugin.split(".")[:length]) for length in range(1, 5)}
     assert set(done.stdout.split()) == above | {"conservative.version"}
@@ -294,7 +296,9 @@ ID = "file.py::test_x[1]"
 @pytest.fixture
 def gate(tmp_path, monkeypatch):
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-    return pytest_gate.Gate(SimpleNamespace(rootpath=tmp_path, getoption={"conservative_gate_baseline": "kept.json"}.get))
+    return pytest_gate.Gate(
+        SimpleNamespace(rootpath=tmp_path, getoption={"conservative_gate_baseline": "kept.json"}.get), SUITE
+    )
 
 
 def benchmark(info=INFO, **changes):

@@ -5,6 +5,7 @@ import pytest
 
 import conservative as cv
 from conservative import registry
+from conservative.benchmarks.judge import diagnose
 from conservative.benchmarks.judge.table import Recording
 from conservative.benchmarks.judge.verdict import judge
 
@@ -99,6 +100,15 @@ def test_random_rows_have_no_diagnosis(name):
     scene = registry.scene(name)
     random = np.random.default_rng(1)
     assert diagnosed(scene, None, np.linalg.norm(scene.w_WB_B0) * random.normal(size=(len(T), 3)), scene.t_end / 6 * T) is None
+
+
+def test_the_search_ends_after_a_number_of_trial_motions(monkeypatch):
+    """It is counted: a limit of the clock gave other answers on a busy machine."""
+    monkeypatch.setattr(diagnose, "EFFORT", 100)
+    random = np.random.default_rng(1)
+    R, w = exact(HEAVY)
+    found = judge(HEAVY, Recording(T, (R, w + 0.1 * random.normal(size=w.shape)), rows=len(T)))[0]
+    assert any("before everything was tried" in note for note in found["notes"])
 
 
 def test_a_method_is_named_up_to_where_it_diverges():

@@ -9,6 +9,8 @@ import subprocess
 from itertools import chain
 from pathlib import Path
 
+from ...environments import PATIENCE
+
 PROGRAM = Path(__file__).parents[2] / "references" / "programs" / "heavy.c"
 PRECISIONS, METHODS = ("float", "double"), ("", "-DEULER")
 LOOP = "for (i = 0; i < 7; i++) "
@@ -86,7 +88,7 @@ def build(folder: Path, name: str, *flags: str, changes: dict[str, str] | None =
         assert old in source, old
         source = source.replace(old, new)
     (folder / f"{name}.c").write_text(source)
-    subprocess.run(["cc", "-O2", *flags, f"{name}.c", "-o", name, "-lm"], cwd=folder, check=True, timeout=60)
+    subprocess.run(["cc", "-O2", *flags, f"{name}.c", "-o", name, "-lm"], cwd=folder, check=True, timeout=PATIENCE)
     return folder / name
 
 

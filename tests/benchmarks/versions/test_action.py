@@ -6,7 +6,7 @@ import subprocess
 import pytest
 import yaml
 
-from ...environments import ROOT
+from ...environments import PATIENCE, ROOT
 from .test_versions import commit
 
 ACTION = yaml.safe_load((ROOT / ".github" / "actions" / "gate" / "action.yml").read_text())
@@ -25,7 +25,7 @@ def act(tmp_path):
         for number in range(count):
             (origin / "file").write_text(str(number))
             commits.append(commit(origin))
-        subprocess.run(["git", "clone", "--quiet", "--depth=1", origin.as_uri(), clone], check=True, timeout=60)
+        subprocess.run(["git", "clone", "--quiet", "--depth=1", origin.as_uri(), clone], check=True, timeout=PATIENCE)
         command = runner / "gate" / "bin" / "conservative"
         command.parent.mkdir(parents=True)
         command.write_text(f'#!/bin/sh\necho "$@" > "{runner}/arguments"\necho table > "{runner}/gate.md"\nexit {ends}\n')
@@ -35,12 +35,12 @@ def act(tmp_path):
         given["TRACK"] = track
         environment = {**os.environ, **files, **given, "RUNNER_TEMP": str(runner)}
         shell = ["bash", "-e", "-o", "pipefail", "-c", COMPARE]
-        done = subprocess.run(shell, cwd=clone, env=environment, timeout=60, check=False)
+        done = subprocess.run(shell, cwd=clone, env=environment, timeout=PATIENCE, check=False)
         called = (runner / "arguments").read_text().split() if (runner / "arguments").exists() else []
         summary = (runner / "GITHUB_STEP_SUMMARY").read_text() if (runner / "GITHUB_STEP_SUMMARY").exists() else ""
         base = called[2 + bool(track)] if called else ""
         if called:  # then the base is in the clone
-            subprocess.run(["git", "cat-file", "-e", f"{base}^{{commit}}"], cwd=clone, check=True, timeout=60)
+            subprocess.run(["git", "cat-file", "-e", f"{base}^{{commit}}"], cwd=clone, check=True, timeout=PATIENCE)
         return done.returncode, commits.index(base) - count if called else None, summary, called
 
     return run

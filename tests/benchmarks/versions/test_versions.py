@@ -15,7 +15,7 @@ from conservative.references.environments.environment import Environment, folder
 from conservative.references.environments.lock import Source
 from conservative.reports.cli.main import main
 
-from ...environments import ROOT
+from ...environments import PATIENCE, ROOT
 from ...environments import Environment as WheelEnvironment
 from ...pages import shell_lines
 from ...references.local_wheels import write_numpy, write_wheel
@@ -74,7 +74,7 @@ def git(folder, *arguments):
     who = {f"GIT_{role}_{what}": "somebody@example.org" for role in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
     kept = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "-C", str(folder), *arguments]
-    return subprocess.run(command, env=kept | who, check=True, capture_output=True, text=True, timeout=60).stdout.strip()
+    return subprocess.run(command, env=kept | who, check=True, capture_output=True, text=True, timeout=PATIENCE).stdout.strip()
 
 
 NAME, MODULE = "made-up-integrator", "conservative"
