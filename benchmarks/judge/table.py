@@ -328,7 +328,7 @@ def _each_line(stream: IO[str]) -> Iterator[str]:
         yield line
 
 
-def _chunks(lines: Iterable[str], count: int = CHUNK, size: int = AT_ONCE) -> Iterator[list[str]]:
+def _chunks(lines: Iterable[str], count: int, size: int) -> Iterator[list[str]]:
     """Yield lists of lines: of a number of lines at most, and up to the line that exceeds a number of characters."""
     chunk, length = list[str](), 0
     for line in lines:
@@ -449,14 +449,14 @@ def _values(path: Path, layout: Layout, origin: int) -> Iterator[Array]:
             return
         with _open(path) as stream:
             if _ending(path) in (".jsonl", ".ndjson", ".json"):
-                for lines in _chunks(_each_line(stream)):
+                for lines in _chunks(_each_line(stream), CHUNK, AT_ONCE):
                     records = [_record(line) for line in lines if line.strip()]
                     yield np.array([[_number(record.get(name)) for name in names] for record in records]).reshape(
                         -1, len(names)
                     )
                 return
             done = 0
-            for lines in _chunks(_lines(islice(_each_line(stream), layout.skip, None), layout)):
+            for lines in _chunks(_lines(islice(_each_line(stream), layout.skip, None), layout), CHUNK, AT_ONCE):
                 yield _parse(path, lines, layout, places, done)
                 done += len(lines)
     except _UNREADABLE as error:

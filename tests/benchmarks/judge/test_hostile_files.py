@@ -44,7 +44,7 @@ def judged(folder, names, attitudes, rates=W, t=T):
         try:
             recording = table.read(path, table.Options(units="rad"))
         except cv.BadInput as refused:
-            assert str(path) in str(refused)
+            assert str(path) in str(refused)  # noqa: PT017
             return None
         return verdict.judge(FREE, recording, True, None, lambda *_: None)[0]["right"]
 
