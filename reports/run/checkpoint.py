@@ -20,7 +20,7 @@ from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.benchmarks.suite.points import define_scene
 from conservative.errors import BadInput
-from conservative.files import remove_leftovers, write_text
+from conservative.files import open_file, read_text, remove_leftovers, write_text
 
 from .plan import Plan
 from .provenance import Provenance
@@ -118,7 +118,7 @@ def find_unfinished(out: Path) -> Path | None:
     if not path.exists():
         return None
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             if stream.read(len(_BEGINNING)) != _BEGINNING.encode():
                 raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file next to it")
     except OSError as error:
@@ -202,7 +202,7 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
         It cannot be read, or is another kind of file.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']}")
         results = {
