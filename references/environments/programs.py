@@ -21,7 +21,7 @@ from conservative.deferred_imports import list_entries
 from conservative.errors import BadInput, MissingEngine
 from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
-from conservative.scene_files.toml_reader import read
+from conservative.toml_reader import read
 
 from ..worker.client import START_LIMIT, is_number, is_text
 from .engine_method import EngineMethod, engine_class

@@ -97,7 +97,7 @@ def _is_array(value: object) -> bool:
     """Return whether a value is an array of numbers, as NumPy's or as lists, which may have None for nan."""
     if hasattr(value, "dtype"):
         return value.dtype.kind in "iuf"
-    rows = [value]
+    rows: list[Any] = [value]
     while rows and set(map(type, rows)) == {list}:
         rows = list(chain.from_iterable(rows))
     return isinstance(value, list) and set(map(type, rows)) <= {int, float, type(None)} and not any(

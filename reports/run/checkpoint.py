@@ -213,6 +213,6 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
             for name, record in content["studies"].items()
         }
         return str(content["command"]), dict(content["terms"]), results
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         got = f"{str(path)!r}, which is damaged ({type(error).__name__}: {error})"
         raise BadInput("resume", got, "a file that an interrupted report of this version left, or no --resume") from None

@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative import registry, shapes
-from conservative.scene_files import scene_file, toml_reader
-from conservative.scene_files.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
+from conservative import registry, shapes, toml_reader
+from conservative.scene_files import scene_file
+from conservative.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
 
 AXIS, ANGLE = np.array([0.3, -1.2, 0.7]), 0.83
 R = Rotation.from_rotvec(ANGLE * AXIS / np.linalg.norm(AXIS)).as_matrix()

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import BadInput, nearest
-from ..files import read_bytes
+from .errors import BadInput, nearest
+from .files import read_bytes
 
 Key = tuple[str, ...]
 Built = TypeVar("Built")
