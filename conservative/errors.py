@@ -35,6 +35,16 @@ def restore(kind: type[T], args: tuple[object, ...], values: Mapping[str, object
     return value
 
 
+LONGEST = 2000
+"""Most characters of a part of a message. Names and values of files can have millions."""
+
+
+def shorten(text: object) -> str:
+    """Return a text, without its middle if it has more than `LONGEST` characters."""
+    text = str(text)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 4 :]}"
+
+
 class BadInput(_Error, ValueError):
     """An invalid argument, such as `dt: got -1; expected a finite number of seconds above 0`.
 
@@ -43,7 +53,7 @@ class BadInput(_Error, ValueError):
 
     def __init__(self, argument: str, got: object, allowed: str) -> None:
         self.argument, self.got, self.allowed = argument, got, allowed
-        super().__init__(f"{argument}: got {got}; expected {allowed}")
+        super().__init__(f"{shorten(argument)}: got {shorten(got)}; expected {shorten(allowed)}")
 
 
 class Unsupported(BadInput):

@@ -84,6 +84,11 @@ def read_bytes(path: Path, largest: int) -> bytes:
     return content
 
 
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8. Raise `OSError` as `read_bytes`, for more than 1 GiB."""
+    return read_bytes(path, 1 << 30).decode()
+
+
 def safe_name(text: str) -> str:
     """Return a name for a file without a suffix: letters, digits, and some signs instead of any other, in at most 100 bytes."""
     name = re.sub(r"[^\w+=,-]", "_", text)  # no point either: a suffix starts at the last one

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from .errors import BadInput
 from .posix import is_own
-from .scene_files.toml_reader import read
+from .toml_reader import read
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from conservative.errors import BadInput
-from conservative.files import make_folder, write_text
+from conservative.files import make_folder, read_text, write_text
 from conservative.trajectory import Counters
 
 from ..measures.measure import Measure
@@ -141,10 +141,10 @@ def read(path: Path, also_with_times: bool = False) -> Baseline:
     """
     allowed = 'a baseline, which `conservative gate --update "REASON"` writes'
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
     except OSError as error:
         raise NoBaseline("baseline", f"no baseline: {path} ({error.strerror})", allowed) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise NoBaseline("baseline", f"truncated or damaged: {path} ({error})", allowed) from None
     version = content.get("format") if isinstance(content, dict) else None
     if version == WITH_TIMES and not also_with_times:

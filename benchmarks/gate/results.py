@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from conservative.errors import BadInput
-from conservative.files import make_folder, write_text
+from conservative.files import make_folder, read_text, write_text
 
 from ..measures.measure import Measure, Value
 
@@ -115,10 +115,10 @@ def read(path: Path) -> Results:
     """
     allowed = "a file of results, which `pytest --benchmark --gate` leaves"
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
         return Results(content["machine"], {row.id: row for row in rows}, content["commit"], tuple(content["left_out"]))
     except OSError as error:
         raise BadInput("results", f"{path} ({error.strerror})", allowed) from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise BadInput("results", f"{path} ({type(error).__name__}: {error})", allowed) from None

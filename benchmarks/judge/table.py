@@ -7,8 +7,10 @@ import json
 import math
 import re
 import warnings
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from io import TextIOWrapper
 from itertools import chain, islice, product
 from pathlib import Path
 from typing import IO, Any
@@ -17,12 +19,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
+from conservative.check import LARGEST, SMALLEST
 from conservative.errors import BadInput, MissingEngine
+from conservative.files import open_file
 
 from .motion import States
 
 ROWS, CHUNK = 2000, 50_000  # rows that are kept for fits, evenly chosen: this to twice as many; rows that are read at a time
 LOOKED = 200  # lines among which the header and the first row of numbers are
+LONGEST, MOST_COLUMNS, LONGEST_NAME = 1_000_000, 10_000, 200
+"""Most characters of a line, and of the lines that are looked at; most columns; most letters of a name with a meaning."""
+AT_ONCE = 64 * LONGEST
+"""Most characters that are read at a time."""
+OUTLIER = 1e4
+"""Largest value relative to the median that digits are relative to: round-off of a value in error is not that of the others."""
 UNITS = {
     **dict.fromkeys(
         ("deg/s", "deg_s", "deg_sec", "deg", "dps", "degrees", "degree", "°", "°/s", "deg s^-1", "deg s-1"), math.pi / 180
@@ -84,6 +94,8 @@ _STK = {
 """Column names of the tables of an STK attitude file (.a), whose rows follow the keyword. Its matrices map to body axes."""
 _AEM = {"FIRST": "time q_w q_x q_y q_z", "LAST": "time q_x q_y q_z q_w"}
 """Column names of quaternions in a CCSDS Attitude Ephemeris Message (504.0-B), by QUATERNION_TYPE."""
+_UNREADABLE = OSError, ValueError, TypeError, EOFError, RecursionError, zlib.error
+"""Errors of files that are damaged, and of values such as JSON in a thousand brackets."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +137,7 @@ class Layout:
     def numbered(self) -> bool:
         """Whether the quaternion's columns are numbered, so that their order is open. MuJoCo's qpos are scalar first."""
         keys = [_split(name)[0] for name in self.used.get("quaternion", ())]
-        return bool(keys) and keys[0][-1] not in "wxyz" and not re.match(f"qpos|.*{_ORDER}.$", keys[0])
+        return bool(keys) and keys[0][-1:] not in [*"wxyz"] and not re.match(f"qpos|.*{_ORDER}.$", keys[0])
 
     @property
     def places(self) -> list[int]:
@@ -182,16 +194,18 @@ def read(path: Path, options: Options) -> Recording:
     for values in _values(path, layout, origin):
         rest = values[:, 1 + len(layout.used["rates"]) :]
         square = layout.attitude == "matrix"
-        wrong = {
-            "a value that is not a finite number": ~np.isfinite(values).all(axis=1),
-            "a time that is not later than that of the row before": np.diff(values[:, 0], prepend=last) <= 0,
-            "a quaternion of norm 0": np.linalg.norm(rest, axis=1) < (1e-3 if layout.attitude == "quaternion" else -1),
-            "a matrix that is not a rotation": square and np.linalg.det(rest.reshape(-1, 3, 3)) < 1e-3,
-        }
+        with np.errstate(all="ignore"):
+            wrong = {
+                "a value that is not a finite number": ~np.isfinite(values).all(axis=1),
+                f"a value beyond {LARGEST:g}": (np.abs(values) > LARGEST).any(axis=1),
+                "a time that is not later than that of the row before": np.diff(values[:, 0], prepend=last) <= 0,
+                "a quaternion of norm 0": np.linalg.norm(rest, axis=1) < (1e-3 if layout.attitude == "quaternion" else -1),
+                "a matrix that is not a rotation": square and np.linalg.det(rest.reshape(-1, 3, 3)) < 1e-3,
+            }
         for what, bad in wrong.items():
             if np.any(bad):
                 at = int(np.argmax(bad))
-                column = np.array([*chain(*layout.used.values())])[~np.isfinite(values[at])].tolist()
+                column = np.array([*chain(*layout.used.values())])[~(np.abs(values[at]) <= LARGEST)].tolist()
                 where = f", column {column[0]}" if column else ""
                 raise BadInput(
                     "run", f"{path}, row {rows + 1 + at}{where}: {what}", "a file in which that row is repaired or removed"
@@ -206,6 +220,8 @@ def read(path: Path, options: Options) -> Recording:
     if rows < 2:
         raise BadInput("run", f"{path} with {rows} rows", "a header and two rows or more")
     raw = np.concatenate(kept)
+    if (duration := float(last - raw[0, 0]) * float(layout.sizes[0])) < SMALLEST:
+        raise BadInput("run", f"{path} with rows within {duration:g} s", f"times that differ by {SMALLEST:g} s or more")
     t, data, shape = _read_values(raw * layout.sizes, layout, options)
     known = options.quaternion is not None or not layout.numbered
     degrees = any(abs(size - math.pi / 180) < 1e-6 for size in layout.used["rates"].values())
@@ -230,6 +246,8 @@ def _read_values(values: Array, layout: Layout, options: Options) -> tuple[Array
     """Return times, motion and shape of rows in SI units."""
     count, kind = 1 + len(layout.used["rates"]), layout.attitude
     w, rest, R, shape = values[:, 1:4] if count > 1 else None, values[:, count:], None, None
+    if w is not None:
+        w = np.where(np.abs(w) < SMALLEST, 0.0, w)  # no scene has such rates
     if kind == "quaternion":
         shape = np.linalg.norm(rest, axis=1) - 1
         R = Rotation.from_quat(rest, scalar_first=options.quaternion != "xyzw").as_matrix()
@@ -271,10 +289,11 @@ def _digits(raw: Array, layout: Layout) -> tuple[float, float, float]:
 
 
 def _quantum(values: Array) -> float:
-    """Return half of the last digit, or of the last bit, that all values of a kind have."""
-    largest = float(np.abs(values).max()) or 1.0
+    """Return half of the last digit, or of the last bit, that all values of a kind have, of the largest that is no outlier."""
+    sizes = np.abs(values[values != 0])
+    largest = min(float(sizes.max()), OUTLIER * float(np.median(sizes))) if sizes.size else 1.0
     x = np.unique(values[:: max(1, len(values) // 500)])
-    x = x[x != 0]
+    x = x[np.abs(x) >= SMALLEST]
     if len(x) < 5:  # of a constant nothing can be learned
         return largest * 2.0**-53
     near, half, unit = 4 * np.spacing(np.abs(x)), 0.0, np.zeros_like(x)
@@ -294,10 +313,32 @@ def _quantum(values: Array) -> float:
 
 
 def _open(path: Path) -> IO[str]:
-    with path.open("rb") as stream:
-        packed = stream.read(2) == b"\x1f\x8b"
-    reading: dict[str, Any] = {"encoding": "utf-8-sig", "errors": "replace"}
-    return gzip.open(path, "rt", **reading) if packed else path.open(**reading)
+    stream: Any = open_file(path)
+    packed = stream.read(2) == b"\x1f\x8b"
+    stream.seek(0)
+    return TextIOWrapper(gzip.GzipFile(fileobj=stream) if packed else stream, encoding="utf-8-sig", errors="replace")
+
+
+def _each_line(stream: IO[str]) -> Iterator[str]:
+    number = 0
+    while line := stream.readline(LONGEST + 1):
+        number += 1
+        if len(line) > LONGEST:
+            raise ValueError(f"line {number} has more than {LONGEST} characters")
+        yield line
+
+
+def _chunks(lines: Iterable[str], count: int, size: int) -> Iterator[list[str]]:
+    """Yield lists of lines: of a number of lines at most, and up to the line that exceeds a number of characters."""
+    chunk, length = list[str](), 0
+    for line in lines:
+        chunk.append(line)
+        length += len(line)
+        if len(chunk) == count or length > size:
+            yield chunk
+            chunk, length = [], 0
+    if chunk:
+        yield chunk
 
 
 def _ending(path: Path) -> str:
@@ -315,15 +356,15 @@ def _look(path: Path) -> Layout:
         if _ending(path) == ".parquet":
             return Layout([str(name) for name in _parquet(path).schema_arrow.names])
         with _open(path) as stream:
-            lines = list(islice(stream, LOOKED))
+            lines = next(_chunks(_each_line(stream), LOOKED, LONGEST), [])
     except ImportError:
         raise MissingEngine("pyarrow", "pyarrow") from None
-    except (OSError, ValueError, EOFError) as error:
+    except _UNREADABLE as error:
         raise _fail(path, error) from None
     if _ending(path) in (".jsonl", ".ndjson", ".json"):
         try:
             return Layout(list(_flat(json.loads(lines[0]))))
-        except (ValueError, IndexError, AttributeError, TypeError):
+        except (ValueError, IndexError, AttributeError, TypeError, RecursionError):
             raise _fail(path, "its first line is not a JSON object") from None
     keys = {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)}
     if "CCSDS_AEM_VERS" in keys:
@@ -386,7 +427,7 @@ def _separate(line: str) -> tuple[str | None, list[str]] | None:
 def _parquet(path: Path) -> Any:
     from pyarrow.parquet import ParquetFile
 
-    return ParquetFile(path)
+    return ParquetFile(open_file(path))
 
 
 def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:
@@ -408,20 +449,27 @@ def _values(path: Path, layout: Layout, origin: int) -> Iterator[Array]:
             return
         with _open(path) as stream:
             if _ending(path) in (".jsonl", ".ndjson", ".json"):
-                while lines := list(islice(stream, CHUNK)):
-                    records = [_flat(json.loads(line)) for line in lines if line.strip()]
+                for lines in _chunks(_each_line(stream), CHUNK, AT_ONCE):
+                    records = [_record(line) for line in lines if line.strip()]
                     yield np.array([[_number(record.get(name)) for name in names] for record in records]).reshape(
                         -1, len(names)
                     )
                 return
-            rest, done = _lines(islice(stream, layout.skip, None), layout), 0
-            while lines := list(islice(rest, CHUNK)):
+            done = 0
+            for lines in _chunks(_lines(islice(_each_line(stream), layout.skip, None), layout), CHUNK, AT_ONCE):
                 yield _parse(path, lines, layout, places, done)
                 done += len(lines)
-    except (OSError, ValueError, EOFError) as error:
+    except _UNREADABLE as error:
         if isinstance(error, BadInput):
             raise
         raise _fail(path, error) from None
+
+
+def _record(line: str) -> dict[str, Any]:
+    try:
+        return _flat(json.loads(line))
+    except AttributeError:
+        raise ValueError(f"not a JSON object: {line[:40].strip()!r}") from None
 
 
 def _lines(lines: Iterable[str], layout: Layout) -> Iterator[str]:
@@ -434,8 +482,8 @@ def _lines(lines: Iterable[str], layout: Layout) -> Iterator[str]:
 
 def _number(value: Any) -> float:
     try:
-        return float(value)
-    except (TypeError, ValueError):
+        return math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
         return math.nan
 
 
@@ -476,6 +524,8 @@ def _guess_time(values: Array, layout: Layout) -> None:
 def _choose(path: Path, layout: Layout, options: Options) -> Layout:
     """Find the columns of each quantity that the file has, and the sizes of their units; give a reason for every other one."""
     names = layout.names
+    if len(names) > MOST_COLUMNS:
+        raise BadInput("run", f"{path} with {len(names)} columns", f"a table of at most {MOST_COLUMNS} columns")
     chosen = _given(path, names, options.columns) if options.columns else _by_name(path, names, options)
     _leave_moving(layout, chosen, options)
     kinds = [kind for kind in ATTITUDES if kind in chosen]
@@ -600,8 +650,8 @@ def _sort_angles(layout: Layout, chosen: dict[str, list[str]], kind: str, option
         layout.unused |= dict.fromkeys(
             chosen.pop(kind), "their sequence is not known; add --euler with it, such as --euler zyx"
         )
-    elif {_split(name)[0][-1] for name in chosen[kind]} == set("xyz") == set(sequence):
-        by_axis = {_split(name)[0][-1]: name for name in chosen[kind]}
+    elif {_split(name)[0][-1:] for name in chosen[kind]} == set("xyz") == set(sequence):
+        by_axis = {_split(name)[0][-1:]: name for name in chosen[kind]}
         chosen[kind] = [by_axis[axis] for axis in sequence]
 
 
@@ -660,7 +710,9 @@ def _given(path: Path, names: list[str], text: str) -> dict[str, list[str]]:
         short, _, members = part.partition("=")
         kind, found = kinds.get(short.strip()), [each.strip() for each in members.split(":")]
         found = [
-            names[int(each) - 1] if each not in names and each.isdigit() and 0 < int(each) <= len(names) else each
+            names[int(each) - 1]
+            if each not in names and re.fullmatch("[0-9]{1,9}", each) and 0 < int(each) <= len(names)
+            else each
             for each in found
         ]
         if kind is None or any(each not in names for each in found) or len(found) != counts[kind]:
@@ -704,7 +756,7 @@ def _hint(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layout: Lay
 
 def _split(name: str) -> tuple[str, str | None]:
     """Return the letters and digits of a column's name without its unit, and the unit."""
-    text = name.strip().lower()
+    text = name.strip().lower() if len(name) <= LONGEST_NAME else ""  # the time of some patterns grows with the square
     match = re.search(r"[(\[]([^)\]]*[a-z°^/][^)\]]*)[)\]]$", text) or re.search(_SUFFIX, text)
     match = match or re.search(r"(?<=^time)([mun]s)$", text)  # TimeUS of ArduPilot
     if match is None and (comma := re.search(r",\s*([^,]+)$", text)) and comma[1].strip() in UNITS:

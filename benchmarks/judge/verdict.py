@@ -390,7 +390,7 @@ def _instability(found: _Comparison) -> list[str]:
     if w is None or not scene.free or scene.body.rotor_momentum is not None or found.errors.max() <= FAR:
         return []
     J, L = np.sort(scene.body.moments), np.linalg.norm(scene.body.momentum(w), axis=1)
-    gap = np.abs(kinetic_energy(scene.body, w) * 2 * J[1] / L**2 - 1)
+    gap = np.abs(kinetic_energy(scene.body, w) * 2 * J[1] / np.where(L == 0, math.inf, L) ** 2 - 1)
     near = gap[-len(gap) // 10 :].max() < 0.1 * gap[0]
     return ["The energy approaches L^2/(2 I2): intermediate axis instability is created by the integrator."] * bool(near)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
-from conservative.scene_files.toml_reader import read
+from conservative.toml_reader import read
 
 TABLE = "accept-slower"
 

@@ -8,6 +8,7 @@
     failure          the exceptions of bodies that failed (n,), as JSON; otherwise empty
     start/NAME       R_WB0, w_WB_B0, inertia, if they differ from body to body, as in `Batch`
     parameters/NAME  numbers of the potential that differ from body to body
+    checksums        digests of the blocks, which contain the checksums of their chunks
 
 Numbers are not compressed, because random digits do not compress. Every chunk ends in a CRC-32C checksum, which all readers of
 Zarr verify. Chunks that contain only fill values are written too. A block is therefore done if all its chunks are there and
@@ -16,7 +17,8 @@ Zarr writes a chunk under another name and renames it, so a kill or a full disk 
 to the disk one by one; a power failure can lose some, which a resumed run then computes again.
 
 The attributes of the group describe the run, including the scene (`scene_record`) and digests of the numbers that differ from
-body to body.
+body to body. The attribute `checksum` is a digest of all metadata and of the times. Zarr gives a chunk that is edited a new
+checksum; the digest of its block then differs. Folders of version 0.3 and earlier have neither.
 
 Source: Zarr's specification, version 3.
 """
@@ -67,6 +69,8 @@ _ROOM = "a disk with enough space; finished blocks stay there, and resume=True c
 _WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest"
 _RESULTS = ("R_WB", "w_WB_B", "drifts", "outcome", "failure")
 _CHECKSUM_BYTES = 4
+_CHECKSUM, _CHECKSUMS = "checksum", "checksums"
+"""Names of the attribute with the digest of the metadata, and of the array with the digests of the blocks."""
 _KINDS = tuple(str(kind) for kind in OutcomeKind)
 _FAILURES = {kind.__name__: kind for kind in (NotConverged, WrongBranch, Diverged, NotConserved, InvalidResult, NotRun)}
 
@@ -81,11 +85,14 @@ class Store:
         The folder, and the attributes of its group (`describe_run`).
     arrays
         The arrays of Zarr with a row for each body, by name.
+    checksums
+        The array of Zarr with a digest for each block, None in folders of earlier versions.
     """
 
     place: Path
     record: Mapping[str, Any]
     arrays: Mapping[str, Any]
+    checksums: Any = None
 
     @property
     def blocks(self) -> range:
@@ -93,18 +100,34 @@ class Store:
         return range(0, self.record["bodies"], self.record["block"])
 
     def is_there(self, first: int) -> bool:
-        """Return whether no chunk of the block that begins with body number `first` is missing or truncated."""
+        """Return whether no chunk of the block that begins with body number `first` is missing, truncated or edited."""
         for array in self.arrays.values():
             whole = 0 if array.dtype.kind not in "fu" else math.prod(array.chunks) * array.dtype.itemsize + _CHECKSUM_BYTES
-            for others in product(*map(range, array.cdata_shape[1:])):
-                file = self.place / array.path / array.metadata.encode_chunk_key((first // self.record["block"], *others))
+            for file in self._chunks_of(array, first):
                 try:
                     size = file.stat().st_size
                 except OSError:
                     return False
                 if size < _CHECKSUM_BYTES or size != (whole or size):
                     return False
-        return True
+        try:
+            return self.checksums is None or int(self.checksums[first // self.record["block"]]) == self._find_checksum(first)
+        except Exception:  # of Zarr, for a chunk that it cannot decode
+            return False
+
+    def _chunks_of(self, array: Any, first: int) -> Iterator[Path]:
+        for others in product(*map(range, array.cdata_shape[1:])):
+            yield self.place / array.path / array.metadata.encode_chunk_key((first // self.record["block"], *others))
+
+    def _find_checksum(self, first: int) -> int:
+        """Return the digest of the checksums at the ends of the chunks of a block."""
+        found = hashlib.sha256()
+        for name, array in sorted(self.arrays.items()):
+            for file in self._chunks_of(array, first):
+                with file.open("rb") as stream:
+                    stream.seek(-_CHECKSUM_BYTES, 2)
+                    found.update(name.encode() + stream.read())
+        return int.from_bytes(found.digest()[:8], "little")
 
     def is_whole(self, first: int) -> bool:
         """Return whether all chunks of the block are there and have the right checksums."""
@@ -134,6 +157,8 @@ class Store:
         try:
             for name, column in (columns | list_inputs(bodies)).items():
                 self.arrays[name][first : first + len(result)] = column
+            if self.checksums is not None:
+                self.checksums[first // self.record["block"]] = self._find_checksum(first)
         except OSError as error:
             raise NotWritten("path", self.place, error, _ROOM) from None
 
@@ -276,6 +301,22 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
     add("failure", (n,), ("body",), "string", "")
     for name, values in list_inputs(bodies).items():
         add(name, values.shape, ("body", *(f"{name} {k}" for k in range(1, values.ndim))))
+    count = len(range(0, n, block))
+    group.create_array(_CHECKSUMS, shape=(count,), chunks=(1,), dtype="uint64", dimension_names=("block",), **options)
+    group.update_attributes({_CHECKSUM: _digest_metadata(folder)})
+
+
+def _digest_metadata(folder: Path) -> str:
+    """Return a digest of the attributes and other metadata of the group and its arrays, and of the times."""
+    found = hashlib.sha256()
+    for file in sorted(folder.rglob("zarr.json")):
+        content = json.loads(file.read_text(encoding="utf-8"))
+        if file.parent == folder:
+            content["attributes"].pop(_CHECKSUM, None)
+        found.update(f"{file.relative_to(folder).as_posix()}\n{json.dumps(content, sort_keys=True)}\n".encode())
+    for file in sorted((folder / "t" / "c").rglob("*")):
+        found.update(f"{file.name}\n".encode() + (file.read_bytes() if file.is_file() else b""))
+    return found.hexdigest()
 
 
 def list_inputs(bodies: Batch) -> dict[str, Array]:
@@ -339,8 +380,11 @@ def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
             group = zarr.open_group(place, mode=mode, zarr_format=3)
             names = (*_RESULTS, *(["supplied"] if "supplied" in record else ()), *record["digests"])
             arrays = {name: group[name] for name in names}
+            checksums = group[_CHECKSUMS] if _CHECKSUM in group.attrs else None
         _require_shapes(record, arrays)
-        return Store(place, record, arrays)
+        if checksums is not None and group.attrs[_CHECKSUM] != _digest_metadata(place):
+            raise ValueError("its attributes, other metadata or times were edited")
+        return Store(place, record, arrays, checksums)
     except Exception as error:  # KeyError for a missing array, and anything for damaged metadata
         allowed = "an ensemble that can be read, or a new folder"
         raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", allowed) from None
@@ -369,7 +413,9 @@ def open_store(path: str | Path) -> Store:
     there = {int(file.name) * record["block"] for file in (place / "outcome" / "c").glob("[0-9]*")}  # of any number of blocks
     left = n - sum(min(record["block"], n - first) for first in there if first < n and store.is_there(first))
     if left > 0:
-        got = f"{str(place)!r}, an ensemble of {n} bodies of which {left} were not integrated, or are missing or damaged"
+        got = (
+            f"{str(place)!r}, an ensemble of {n} bodies of which {left} were not integrated, or are missing, damaged or edited"
+        )
         raise BadInput("path", got, _WHOLE)
     return store
 

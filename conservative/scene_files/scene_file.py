@@ -28,7 +28,7 @@ from ..potentials.turning import Orbit, Turning
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
-from .toml_reader import TomlTable, keys_of, read
+from ..toml_reader import TomlTable, keys_of, read
 
 _TOP = ("name", "t_end", "dt", "body", "rotor", "potential", "orbit", "torque", "damping", "start")
 # The keys of a potential or a shape are the parameters of its constructor.

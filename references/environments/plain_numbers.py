@@ -111,7 +111,7 @@ def read_states(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
     try:
         attitudes, rates = (np.asarray(answer[each], float) for each in (name, "w" if "w" in answer else "w_W"))
     except (TypeError, ValueError):
-        raise EngineCrashed("its samples are not arrays of numbers") from None
+        raise EngineCrashed("its samples are not arrays: their rows have different lengths") from None
     if attitudes.shape != (*shape, *each) or rates.shape != (*shape, 3):
         raise EngineCrashed(f"it returned attitudes {attitudes.shape} and rates {rates.shape}, not {shape} samples")
     values = np.concatenate([attitudes.reshape(*shape, -1), rates], axis=-1)
@@ -144,7 +144,10 @@ def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Tra
         work = Counters(answer.get("steps", grid.n_steps), evaluations=answer.get("evaluations"))
         reason, frame = answer.get("reason") or "the state is not finite", None
         if axes.scene.flight:
-            frame = np.asarray(answer.get("p"), float), np.asarray(answer.get("v"), float)
+            try:
+                frame = np.asarray(answer["p"], float), np.asarray(answer["v"], float)
+            except (TypeError, ValueError):
+                raise EngineCrashed("its `p` and `v` are not arrays: their rows have different lengths") from None
             if any(each.shape != (grid.n_samples, 3) for each in frame):
                 raise EngineCrashed(f"it returned positions {frame[0].shape} and velocities {frame[1].shape} in free flight")
         return axes.trajectory(grid, label, read_states(answer, (grid.n_samples,)), work, reason, frame=frame)

@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import tomllib
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -15,13 +16,14 @@ from types import ModuleType
 from typing import Any
 
 from conservative import registry
+from conservative.check import describe
 from conservative.deferred_imports import list_entries
 from conservative.errors import BadInput, MissingEngine
 from conservative.files import make_folder, write_text
 from conservative.programs import Program, list_programs, project_file, user_file
-from conservative.scene_files.toml_reader import read
+from conservative.toml_reader import read
 
-from ..worker.client import START_LIMIT
+from ..worker.client import START_LIMIT, is_number, is_text
 from .engine_method import EngineMethod, engine_class
 from .environment import Environment, worker_of
 from .plain_numbers import FIELDS
@@ -44,6 +46,51 @@ def __getattr__(name: str) -> type[EngineMethod]:
     return program_class(programs[name])
 
 
+def _are_texts(value: object) -> bool:
+    return isinstance(value, list) and all(map(is_text, value))
+
+
+def _is_setting(value: object) -> bool:
+    return isinstance(value, str | bool) or is_number(value) or (isinstance(value, float) and is_number(-value))
+
+
+def _is_order(value: object) -> bool:
+    return value is None or (is_number(value) and value == int(value))  # type: ignore[call-overload]  # a number
+
+
+def _each(is_right: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, dict) and all(map(is_right, value.values()))
+
+
+_TEXTS, _FORMATS = (_are_texts, "a list of texts"), ("urdf", "mjcf", "sdf", "usd")
+_NAMES = tuple(kind.__name__ for kind in FIELDS)
+DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "settings": (_each(_is_setting), "an object of texts, numbers, true or false"),
+    "order": (_is_order, "an integer or null"),
+    "orders": (_each(_is_order), "an object of integers or null"),
+    "choices": (_each(_are_texts), "an object of lists of texts"),
+    "tolerance": (is_text, "a text"),
+    "precision": (lambda value: value in ("f64", "f32"), "'f64' or 'f32'"),
+    "fields": (lambda value: _are_texts(value) and {*value} <= {*_NAMES}, f"a list of {', '.join(_NAMES)}"),
+    "formats": (lambda value: _are_texts(value) and {*value} <= {*_FORMATS}, f"a list of {', '.join(_FORMATS)}"),
+    "ways": _TEXTS,
+    "card": (lambda value: isinstance(value, dict), "an object"),
+    "variants": _TEXTS,
+    "flight": (lambda value: isinstance(value, bool), "true or false"),
+    "rotors": (lambda value: isinstance(value, bool), "true or false"),
+}
+"""Fields of `engine` in the answer to `hello`, and of its `card`, and what they have to be."""
+
+
+def _check_description(engine: dict[str, Any]) -> None:
+    """Raise `ValueError` for a field of another kind. Unknown fields are found where they are used."""
+    card = engine.get("card")
+    for name, value in [*engine.items(), *(card.items() if isinstance(card, dict) else ())]:
+        is_right, words = DESCRIPTION.get(name, (lambda value: True, ""))
+        if not is_right(value):
+            raise ValueError(f"`{name}` is {describe(value)}; expected {words}")
+
+
 @cache
 def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMethod]:
     """Return the class of a program, started for its description within a limit in s. Raise `UnusableProgram` if that fails."""
@@ -52,6 +99,7 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)
+        _check_description(greeting.get("engine", {}))
         module.ENGINE = {**every, **greeting.get("engine", {})}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]

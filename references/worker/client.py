@@ -14,15 +14,16 @@ import signal
 import subprocess
 import tempfile
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import chain
 from pathlib import Path
 from threading import Lock, Timer
 from time import monotonic
 from typing import IO, Any, NoReturn
 
-from conservative.errors import IntegrationFailed
+from conservative.errors import IntegrationFailed, shorten
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.posix import end_group, life_line, limit_resources, session_options
 
@@ -40,6 +41,7 @@ _LAST_WORDS = 300
 _ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")  # above a stack, of Python and of Node
 _PATIENCE = 2.0  # s, for a program to end when its input closes
 _LONGEST_WAIT = 1e6  # s
+_LARGEST = 1.7976931348623157e308
 _CAN_WAIT = hasattr(select, "poll")  # not on Windows, where a thread ends a late process and so the waiting for it
 _READ, _WRITE, _PART = (select.POLLIN, select.POLLOUT, select.PIPE_BUF) if _CAN_WAIT else (0, 0, 1 << 16)
 
@@ -79,6 +81,51 @@ class EngineTimeout(IntegrationFailed):
 class _Answer(dict[str, Any]):
     def __missing__(self, name: str) -> NoReturn:
         raise EngineCrashed(f"its answer has no `{name}`")
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number of 0 or more."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= _LARGEST
+
+
+def is_text(value: object) -> bool:
+    """Return whether a value is a text."""
+    return isinstance(value, str)
+
+
+def _is_array(value: object) -> bool:
+    """Return whether a value is an array of numbers, as NumPy's or as lists, which may have None for nan."""
+    if hasattr(value, "dtype"):
+        return value.dtype.kind in "iuf"
+    rows: list[Any] = [value]
+    while rows and set(map(type, rows)) == {list}:
+        rows = list(chain.from_iterable(rows))
+    return isinstance(value, list) and set(map(type, rows)) <= {int, float, type(None)} and not any(
+        type(each) is int and abs(each) > _LARGEST for each in rows
+    )  # fmt: skip
+
+
+_TEXT, _NUMBER, _ARRAY = (is_text, "a text"), (is_number, "a finite number of 0 or more"), (_is_array, "an array of numbers")
+ANSWERS: Mapping[str, Mapping[str, tuple[Callable[[Any], bool], str]]] = {
+    "hello": {
+        "protocol": _NUMBER,
+        "program": _TEXT,
+        "version": _TEXT,
+        "framing": (lambda value: value in ("lines", "binary"), "'lines' or 'binary'"),
+        "engine": (lambda value: isinstance(value, dict), "an object"),
+    },
+    "prepare": {"run": _NUMBER},
+    "run": {
+        **dict.fromkeys(("q", "R", "w", "w_W", "p", "v"), _ARRAY),
+        **dict.fromkeys(("evaluations", "steps"), (lambda value: is_number(value) or _is_array(value), _NUMBER[1])),
+        "reason": _TEXT,
+    },
+    "time": {"seconds": _NUMBER},
+    "load": {"accelerations": _ARRAY, "output": _TEXT},
+}
+"""Fields of the answers to each request, and what they have to be."""
+_OF_ANY = {"error": _TEXT, "message": _TEXT}
+_OPTIONAL = {"framing", "engine", "reason", "evaluations", "steps", "output", "message"}
 
 
 @contextmanager
@@ -151,11 +198,20 @@ class Worker:
             forget = [run for start, run in unwanted if start == self.starts]
             with self._ended_by_failure(_limit.get()) as deadline:
                 answer = self._exchange({"do": do, "forget": forget, **values}, deadline)
-        if answer.get("error") == "unsupported":
-            raise NotImplementedError(answer["message"])
-        if "error" in answer:
-            raise EngineError(f"{answer['error']}: {answer['message']}")
-        return _Answer(answer)
+        self._check(do, answer)
+        if "error" not in answer:
+            return _Answer(answer)
+        message = shorten(answer.get("message") or "it gives no reason: no `message` beside its `error`")
+        raise NotImplementedError(message) if answer["error"] == "unsupported" else EngineError(f"{answer['error']}: {message}")
+
+    def _check(self, do: str, answer: dict[str, Any]) -> None:
+        """Raise `EngineCrashed` if a field of an answer is not as in `ANSWERS`. Drop optional ones that are None."""
+        for name, (is_right, words) in (_OF_ANY | dict(ANSWERS.get(do, {}))).items():
+            if name in answer and answer[name] is None and name in _OPTIONAL:
+                del answer[name]
+            if name in answer and not is_right(answer[name]):
+                value = shorten(repr(answer[name])[:100])
+                raise EngineCrashed(f"{self._command[0]} answers `{do}` with `{name}`: {value}; expected {words}")
 
     def greet(self, limit: float = START_LIMIT) -> dict[str, Any]:
         """Return the answer of the program to `hello`, within a limit in s if it has to start. Raise as `ask`."""
@@ -218,6 +274,7 @@ class Worker:
         with self._ended_by_failure(limit) as deadline:
             greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"]}
             self._greeting = self._exchange(greeting | ({"life": life} if life >= 0 else {}), deadline)
+            self._check("hello", self._greeting)
             if self._greeting.get("protocol") != program.PROTOCOL:
                 raise program.Unreadable(self._greeting)
             self._binary = self._greeting.get("framing") == "binary"
@@ -249,7 +306,10 @@ class Worker:
                 self._end(at_once=True)
                 raise EngineTimeout(limit) from None
             raise EngineCrashed(self._autopsy()) from None
-        except (program.Unreadable, ValueError, KeyError, TypeError, MemoryError) as error:
+        except EngineCrashed:  # a field of another kind
+            self._end(at_once=True)
+            raise
+        except (program.Unreadable, ValueError, KeyError, TypeError, OverflowError, MemoryError, RecursionError) as error:
             self._end(at_once=True)
             reason = "an answer that cannot be read"
             if not self._binary:

@@ -70,7 +70,8 @@ def draw(
         form = f"-f rawvideo -pix_fmt rgb24 -s {image.shape[1]}x{image.shape[0]} -r {RATES[kind]} -i -".split()
         output = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-metadata", f"comment={mark}"]  # the comment comes first
         command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", *form, *output, str(file)]
-        with subprocess.Popen(command, stdin=subprocess.PIPE) as ffmpeg:
+        # Ctrl-C is for this process: ffmpeg would print an error and break the pipe. It ends when the pipe is closed.
+        with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as ffmpeg:
             assert ffmpeg.stdin is not None
             for each in (image, *images):
                 ffmpeg.stdin.write(each.tobytes())

@@ -24,7 +24,7 @@ from .options import Command, epilog
 def new(as_json: bool) -> None:
     """Print a scene file with every key explained. Commands accept such a file instead of a scene's name."""
     from conservative.scene_files.scene_file import choices, template
-    from conservative.scene_files.toml_reader import key_lines
+    from conservative.toml_reader import key_lines
 
     from ..document import json
 

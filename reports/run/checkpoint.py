@@ -19,7 +19,7 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
-from conservative.files import remove_leftovers, write_text
+from conservative.files import open_file, read_text, remove_leftovers, write_text
 
 from .plan import Plan
 from .provenance import Provenance
@@ -117,7 +117,7 @@ def find_unfinished(out: Path) -> Path | None:
     if not path.exists():
         return None
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             if stream.read(len(_BEGINNING)) != _BEGINNING.encode():
                 raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file next to it")
     except OSError as error:
@@ -207,7 +207,7 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
         It cannot be read, or is another kind of file.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']}")
         results = {
@@ -218,6 +218,6 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
             for name, record in content["studies"].items()
         }
         return str(content["command"]), dict(content["terms"]), results
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         got = f"{str(path)!r}, which is damaged ({type(error).__name__}: {error})"
         raise BadInput("resume", got, "a file that an interrupted report of this version left, or no --resume") from None

@@ -19,10 +19,10 @@ from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.selection import methods as select_methods
 from conservative.benchmarks.studies.twins import select_pairs
 from conservative.benchmarks.twins import compare
-from conservative.benchmarks.twins.compare import BODIES, BODY, NEEDLE, Engine, difference, twins_of
+from conservative.benchmarks.twins.compare import BODIES, BODY, NEEDLE, Engine, Twins, difference, twins_of
 from conservative.benchmarks.twins.machine import EngineMachine, Machine, machine_of
 from conservative.benchmarks.twins.pairs import PAIRS
-from conservative.benchmarks.twins.script import FOLDER, MARK, script_name
+from conservative.benchmarks.twins.script import FOLDER, MARK, script_name, script_of
 from conservative.errors import BadInput
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.catalogue import __getattr__ as adapter
@@ -214,6 +214,19 @@ def test_command_says_what_differs_and_fails():
     fine = conservative("twins", "mujoco:RK4", "--pairs", pairs)
     assert fine.exit_code == 0
     assert "0 of 6 pairs differ" in fine.stdout
+
+
+@pytest.mark.parametrize("name", [pair.name for pair in PAIRS if pair.sizes])
+def test_a_script_has_the_size_that_differs(name):
+    method, pair, texts = registry.method("mujoco:RK4"), next(each for each in PAIRS if each.name == name), set()
+    for size in (2.0**-20, 2.0**-7, 2.0**9):
+        text = script_of(method, Twins(method.name, "brick", name, "differs", first=BODY, size=size))
+        twin = pair.twin(BODY, size)
+        assert f'timestep="{twin.dt!r}"' in text
+        assert f'mass="{twin.mass!r}"' in text
+        assert all(repr(each) in text for each in [*twin.numbers["com"].tolist(), *twin.numbers["w0"].tolist()])
+        texts.add(text)
+    assert len(texts) == 3
 
 
 def test_script_repeats_the_difference_without_this_package(tmp_path):

@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative import registry, shapes
-from conservative.scene_files import scene_file, toml_reader
-from conservative.scene_files.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
+from conservative import registry, shapes, toml_reader
+from conservative.scene_files import scene_file
+from conservative.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
 
 AXIS, ANGLE = np.array([0.3, -1.2, 0.7]), 0.83
 R = Rotation.from_rotvec(ANGLE * AXIS / np.linalg.norm(AXIS)).as_matrix()
@@ -192,6 +192,22 @@ BAD = {
     "number for an orbit": ("orbit = 3\n" + GOOD, 1, "orbit", "a table"),
     "unknown at the top": (replaced("t_end =", "t_ende ="), 2, "t_ende", "unknown key 't_ende'"),
     "unknown after a long array": (replaced("weight =", "wheight ="), 14, "potential.wheight", "unknown key 'wheight'"),
+    "a rotor in free flight": (
+        body_of('shape = "box"\nsize = [1, 2, 3]\nmass = 1\n[rotor]\nmomentum = [0, 0, 1]').replace(
+            "[start]", "[start]\nv_WB = [1, 0, 0]"
+        ),
+        9,
+        "rotor",
+        "a rotor in free flight",
+    ),
+    "a motor in free flight": (
+        body_of('shape = "box"\nsize = [1, 2, 3]\nmass = 1\n[rotor]\ntimes = [0, 9]\nvalues = [[0, 0, 1], [0, 0, 2]]').replace(
+            "[start]", "[start]\np_WB = [1, 0, 0]"
+        ),
+        9,
+        "rotor",
+        "a rotor in free flight",
+    ),
     "unknown kind": (replaced('"uniform_gravity"', '"unifrom_gravity"'), 13, "potential.kind", "'unifrom_gravity'"),
     "no t_end": (replaced("t_end = 3", ""), 1, "t_end", "the key is missing"),
     "no body": (GOOD.replace("[body]", "[start.x]"), 1, "body", "table [body] is missing"),

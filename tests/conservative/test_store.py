@@ -176,7 +176,7 @@ def test_a_full_disk_leaves_the_finished_blocks(whole, tmp_path, monkeypatch):
     def fill_up(path, value, exclusive=False):
         if path.is_relative_to(place):
             files.append(path)
-            if len(files) > 8:
+            if len(files) > 9:
                 raise OSError(28, os.strerror(28))
         return put(path, value, exclusive)
 
@@ -308,6 +308,74 @@ def test_a_store_with_values_that_no_run_has_is_refused(wrong, whole, tmp_path):
     if "outcome" not in wrong and wrong not in ("failure", "argument", "kind", "number", "names"):
         with pytest.raises(cv.BadInput, match=r"^path: got '.*a\.zarr"):
             run(place, resume=True)
+
+
+def list_stored(folder):
+    """Return the attributes and the arrays of a folder as pairs of a path and the name of an attribute, None for values."""
+    for file in sorted(folder.rglob("zarr.json")):
+        content, path = json.loads(file.read_text()), str(file.parent.relative_to(folder))
+        yield from ((path, name) for name in content["attributes"] if name != "checksum")
+        yield from ((path, name) for name in ("dimension_names", "fill_value") if content["node_type"] == "array")
+        yield from [(path, None)] if content["node_type"] == "array" else []
+
+
+def other(value):
+    """Return another value of the same kind."""
+    if isinstance(value, dict):
+        name = next(iter(value))
+        return {**value, name: other(value[name])}
+    if isinstance(value, list):
+        return [other(value[0]), *value[1:]]
+    return value + "x" if isinstance(value, str) else not value if isinstance(value, bool) else value + 1
+
+
+def edit_value(place, path):
+    array = zarr.open_group(place, mode="r+")[path]
+    at = (0,) * array.ndim
+    array[at] = array[at] + "x" if path == "failure" else array[at] + 1
+
+
+def test_each_attribute_and_each_value_that_is_edited_is_found(whole, tmp_path):
+    """Earlier versions opened all of these: Zarr gives an edited chunk a new checksum."""
+    stored, opened = list(list_stored(whole)), []
+    assert {("R_WB", None), ("t", None), ("start/w_WB_B0", None), (".", "version"), ("drifts", "names")} <= {*stored}
+    for number, (path, name) in enumerate(stored):
+        place = tmp_path / str(number)
+        shutil.copytree(whole, place)
+        if name is None:
+            edit_value(place, path)
+        else:
+            content = json.loads((place / path / "zarr.json").read_text())
+            change(place, path, **{name: other(content["attributes"].get(name, content.get(name)))})
+        try:
+            cv.open_ensemble(place)
+            opened.append((path, name))
+        except cv.BadInput as refused:
+            assert refused.argument == "path"  # noqa: PT017
+    assert not opened
+
+
+def test_an_edited_block_is_computed_again(whole, tmp_path):
+    place, seen = tmp_path / "a.zarr", []
+    shutil.copytree(whole, place)
+    edit_value(place, "R_WB")
+    run(place, resume=True, progress=seen.append)
+    assert len(seen) == 1
+    assert digest(place) == digest(whole)
+
+
+def test_a_folder_of_an_earlier_version_has_no_checksums_and_opens(whole, in_memory, tmp_path):
+    place, seen = tmp_path / "a.zarr", []
+    shutil.copytree(whole, place)
+    shutil.rmtree(place / "checksums")
+    content = json.loads((place / "zarr.json").read_text())
+    del content["attributes"]["checksum"]
+    (place / "zarr.json").write_text(json.dumps(content))
+    assert_same(cv.open_ensemble(place), in_memory)
+    (place / "drifts/c/0/0").unlink()
+    run(place, resume=True, progress=seen.append)
+    assert len(seen) == 1
+    assert_same(cv.open_ensemble(place), in_memory)
 
 
 def test_every_row_of_the_inputs_is_compared():

@@ -70,7 +70,7 @@ NAMED = {
     "random": "free body: a second run has other samples: start from `q0` and `w0`",
     "goes on": "free body: a second run has other samples: start from `q0` and `w0`",
     "few samples": "free body: it returned attitudes (4, 4) and rates (5, 3), not (5,) samples",
-    "texts": "free body: its samples are not arrays of numbers",
+    "texts": "expected an array of numbers",
     "no rates": "free body: its answer has no `w_W`",
     "no number": "free body: its answer has no `run`",
     "debugged": "It starts with 'one step done': stdout is for answers only",

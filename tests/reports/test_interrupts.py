@@ -27,6 +27,8 @@ SWEEP = ["sweep", "brick_flip", "--spread", "rate=1%", "--starts", "1e5", "--t-e
 COMMANDS = {
     "run": ["run", "brick_flip", "--t-end", "1e6", "--dt", "1e-4", "-m", "reduced", "--csv", "r.csv"],
     "sweep": SWEEP,
+    "watch": ["watch", "brick_flip", "--t-end", "2e5", "--dt", "1e-3", "-m", "reduced,taylor", "--out", "w.html"],
+    "watch.gif": ["watch", "brick_flip", "--t-end", "100", "--dt", "1e-3", "-m", "reduced", "--out", "w.gif"],
     "report": ["report", "--quick", "--scenes", "brick_flip", "--methods", "moser_veselov:order=2", "--out", "r"],
 }
 
@@ -58,6 +60,8 @@ def temporaries(folder):
         ("run", signal.SIGINT),
         ("run", signal.SIGTERM),
         ("run", signal.SIGHUP),
+        ("watch", signal.SIGINT),
+        pytest.param("watch.gif", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("sweep", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("report", signal.SIGTERM, marks=pytest.mark.slow),
     ],
@@ -73,7 +77,7 @@ def test_a_signal_ends_a_command_and_leaves_nothing(command, number, tmp_path):
     assert err.splitlines()[-1].startswith("Interrupted")
     assert "Traceback" not in err
     assert temporaries(tmp_path) == []
-    assert not any((tmp_path / name).exists() for name in ("r", "r.csv", "s.svg"))
+    assert not any((tmp_path / name).exists() for name in ("r", "r.csv", "s.svg", "w.html", "w.gif"))
 
 
 def test_a_second_ctrl_c_ends_at_once(tmp_path):

@@ -187,6 +187,30 @@ def test_samples_that_do_not_fit_in_memory(monkeypatch):
     )
 
 
+def test_a_turning_field_and_an_inertia_that_varies(tmp_path):
+    """A gravity gradient has the inertia of the scene's body; other turning fields act on every body."""
+    done = conservative("tumbling_satellite", "--starts", "2", "--spread", "inertia=2%")
+    assert done.exit_code == 2
+    assert "inertia: got a spread in a turning field with the inertia of the scene's body" in done.stderr
+    scene = tmp_path / "turning.toml"
+    scene.write_text(
+        "t_end = 0.5\ndt = 0.01\n[body]\ninertia = [3.0, 2.0, 4.0]\n[start]\nw_WB_B = [0.6, -0.4, 1.2]\n"
+        '[potential]\nkind = "uniform_gravity"\nweight = 9\ncom_B = [0.1, -0.3, 0.6]\n[orbit]\nrate = 3\nnormal_W = [1, 2, 0]\n'
+    )
+    run = ("--starts", "3", "--spread", "inertia=5%", "--out", tmp_path / "a.zarr", "--dt", "0.01", "--t-end", "0.5")
+    done = conservative(scene, *run, "--samples", "51", "--json")
+    assert done.exit_code == 0, done.output
+    given = cv.registry.scene(str(scene))
+    J = cv.spread(given, 3, inertia="5%")["inertia"]
+    assert np.ptp(J, axis=0).min() > 0.01
+    for i, found in enumerate(cv.open_ensemble(tmp_path / "a.zarr")):
+        alone = cv.Scene("alone", cv.RigidBody(J[i]), given.R_WB0, given.w_WB_B0, 0.5, given.potential)
+        expected = cv.integrate(
+            alone, 0.001, cv.Gauss(stages=4) if cv.Gauss(4).unsupported(alone) is None else cv.Taylor(), sample_every=10
+        )
+        np.testing.assert_allclose(found.R_WB, expected.R_WB, rtol=0, atol=1e-8)
+
+
 LOADED = """
 name = "pushed"
 t_end = 0.6

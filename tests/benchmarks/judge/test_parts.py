@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
+from conservative.benchmarks.judge import table as table_of_file
 from conservative.benchmarks.judge.table import Recording
 from conservative.benchmarks.judge.verdict import judge
 from conservative.errors import BadInput
@@ -133,6 +134,16 @@ PARTS = {
         {"torque": lambda t, R, w: -np.interp(t, [0, 2, 3.5, 6], [0, 0, 2, 2]) * D @ w} | BREAKS,
         "without the damping",
     ),
+    "damping, jumps": (
+        lambda: scene(damping=cv.Damping(D, ([0, 2, 2, 3.5, 3.5, 6], [0.3, 0.3, 2, 2, 0, 0]))),
+        {"torque": lambda t, R, w: -(0.3 if t < 2 else 2 if t < 3.5 else 0) * D @ w} | BREAKS,
+        "without the damping",
+    ),
+    "damping, function with jumps": (
+        lambda: scene(damping=cv.Damping(D, lambda t: 0.3 + 2.0 * (2 <= t < 3.5), breaks=(2.0, 3.5))),
+        {"torque": lambda t, R, w: -(0.3 + 2.0 * (2 <= t < 3.5)) * D @ w} | BREAKS,
+        "without the damping",
+    ),
     "damping of attitude": (
         lambda: scene(damping=cv.Damping(attitude_damping)),
         {"torque": lambda t, R, w: -attitude_damping(t, R) @ w},
@@ -147,6 +158,32 @@ def judged(scene, t, R, w, from_row=True, allowed=1e-9):
     summary, rows = judge(scene, Recording(t, (R, w), rows=len(t)), from_row, allowed)
     assert sorted({row["quantity"] for row in rows}) == sorted(each["quantity"] for each in summary["quantities"])
     return summary
+
+
+@pytest.mark.parametrize(("name", "first"), [("rotor", 0.0), ("rotor", 3.7), ("rotor", 1e5), ("damping, jumps", 1.0)])
+def test_a_file_in_several_chunks_whose_first_time_is_not_0(name, first, tmp_path, monkeypatch):
+    """Rows between those that are kept for fits are compared in a second pass, at the times of the file."""
+    monkeypatch.setattr(table_of_file, "ROWS", 10)
+    monkeypatch.setattr(table_of_file, "CHUNK", 17)
+    build, part, _ = PARTS[name]
+    timed = name != "rotor"
+    start = first if timed else 0.0  # of the motion; a scene without loads has any time
+    (R, w), t = integrate(T, **part), T[start <= T]
+    R, w = R[-len(t) :], w[-len(t) :]
+    for at in (None, 50):
+        rates = w.copy()
+        if at is not None:
+            rates[at, 0] += 0.01
+        path = tmp_path / "run.csv"
+        rows = np.column_stack([t if timed else t + first, R.reshape(-1, 9), rates]).tolist()
+        header = ",".join(["t", *(f"R_{i}{j}" for i in "123" for j in "123"), "w_x (rad/s)", "w_y (rad/s)", "w_z (rad/s)"])
+        path.write_text(header + "\n" + "\n".join(",".join(map(repr, row)) for row in rows))
+        recording = table_of_file.read(path, table_of_file.Options())
+        assert len(recording.t) < recording.rows == len(t)
+        found, _ = judge(build(), recording, True, 1e-6 if first < 1e4 else 1e-4)
+        assert found["right"] == (at is None)
+        if at is not None:
+            assert found["error"][1] == pytest.approx(0.01 / np.linalg.norm(rates, axis=1).max(), rel=0.01)
 
 
 @pytest.mark.parametrize("name", PARTS)

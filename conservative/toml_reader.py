@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import BadInput, nearest
-from ..files import read_bytes
+from .errors import BadInput, nearest
+from .files import read_bytes
 
 Key = tuple[str, ...]
 Built = TypeVar("Built")
@@ -20,7 +20,7 @@ Built = TypeVar("Built")
 LARGEST = 1_000_000
 """Largest size of a file, bytes. A scene has less than a hundredth of it."""
 DEEPEST = 32
-"""Most parts of a key, and most tables and arrays in each other. The time and the memory of `tomllib` grow with the cube and the
+"""Most parts of a key, and most tables and arrays in each other. Time and memory of `tomllib` grow with the cube and the
 square of the parts of a key: 31 s and 2.4 GB for 20,000."""
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"?|'[^'\n]*+'?)"""
 _TOKENS = re.compile(
