@@ -16,9 +16,8 @@ from conservative.needs import Need
 from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
-from conservative.reports.document import html
 from conservative.reports.document.attempt import failed_parts
-from conservative.reports.document.model import Motion, Table, walk
+from conservative.reports.document.model import Document, Motion, Paragraph, Table, walk
 from conservative.reports.run import measure
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
@@ -29,7 +28,7 @@ from conservative.reports.sections.report import build
 from ..crossing import ROWS, write_file
 from . import made_up
 
-METHODS = "taylor:order=12,mujoco:RK4,pinocchio:RK4"
+METHODS = "projected,mujoco:RK4,pinocchio:RK4"  # ours takes every part of a scene
 PARTS = [need for need, row in ROWS.items() if row.in_file]
 URDF = """<robot name="r"><link name="palm"><inertial><origin xyz="0.01 -0.02 0.03" rpy="0.3 -0.2 0.5"/><mass value="0.73"/>
 <inertia ixx="0.0025" ixy="0.0002" ixz="-0.0001" iyy="0.0017" iyz="0.00015" izz="0.0010"/></inertial></link></robot>"""
@@ -76,7 +75,7 @@ def test_a_page_of_a_file_without_a_step(seed, tmp_path, without_files):
     path = random_file(tmp_path, seed)
     document, scene = made(str(path), METHODS.split(","), tmp_path)
     check(document, scene, tmp_path)
-    done = CliRunner().invoke(main, ["watch", str(path), "-m", "mujoco:RK4,taylor", "--out", str(tmp_path / "watch.html")])
+    done = CliRunner().invoke(main, ["watch", str(path), "-m", METHODS, "--out", str(tmp_path / "watch.html")])
     assert done.exit_code == 0, done.output
 
 
@@ -87,7 +86,7 @@ def test_report_and_watch_end_with_a_page(name, tmp_path, monkeypatch):
     scene = str(name) if isinstance(name, str) else str(random_file(tmp_path, name))
     for words in (
         ["report", "--quick", "--scenes", scene, "--methods", METHODS, "--time-limit", "0.001"],
-        ["watch", scene, "-m", "taylor,mujoco:RK4,pinocchio:RK4", "--out", "watch.html"],
+        ["watch", scene, "-m", METHODS, "--out", "watch.html"],
     ):
         done = CliRunner().invoke(main, words)
         assert done.exit_code == 0, done.output[-2000:]
@@ -129,13 +128,11 @@ def test_a_centre_of_mass_in_the_fixed_point_is_drawn(tmp_path):
 def rows_of_a_report(monkeypatch, tmp_path):
     """`report` with made-up rows, which are counted as they are measured."""
     monkeypatch.chdir(tmp_path)
-    found, count = made_up.convergence("reduced", 2), []
+    found, count = [*made_up.convergence("reduced", 2), *made_up.curves(registry.scene("brick_flip"), cv.Reduced())], []
 
     def findings(study, tell):
         count.append(study.name)
-        yield from (each for each in found if each.study == study.name)
-        if study.name == "motion":
-            yield from made_up.curves(registry.scene("brick_flip"), cv.Reduced())
+        return (each for each in found if each.study == study.name)
 
     monkeypatch.setattr(measure.studies, "findings", findings)
     monkeypatch.setattr(measure, "compile_kernels", lambda *_: None)
@@ -150,7 +147,6 @@ PLANTED = {  # what fails, and a word of its sentence
     "section": (advice, "section", "'advice'"),
     "chart": (scenes, "convergence_figure", "chart of convergence of brick_flip"),
     "animation": (tumbling, "animation", "animation of brick_flip"),
-    "drawing": (html.animation, "element", "The animation"),
     "results": (tumbling, "results", "'motion'"),
     "picture": (style, "picture_file", "'brick_flip: attitude error against step'"),
 }
@@ -163,8 +159,9 @@ def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(what, rows
     with monkeypatch.context() as patch:
         patch.setattr(place, name, fault)
         done = CliRunner().invoke(main, command)
-    assert done.exit_code == 1, done.output
+    assert done.exit_code == 1, (done.output, done.exception)
     folder = tmp_path / "report"
+    assert folder.exists(), (done.output, done.exc_info)
     table, content = pd.read_csv(folder / "measurements.csv"), json.loads((folder / "measurements.json").read_text())
     assert len(table) == len(content["rows"]) == len(made_up.convergence("reduced", 2))
     assert set(content["files"]) == {path.name for path in folder.iterdir()}
@@ -180,6 +177,14 @@ def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(what, rows
     assert "planted" not in (folder / "index.html").read_text()
     assert pd.read_csv(folder / "measurements.csv").equals(table)
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_an_animation_that_cannot_be_drawn_is_a_sentence(tmp_path):
+    document = report.render(Document("c", "t", [Motion([], []), Paragraph("after it")]), tmp_path, png=False)
+    (sentence,) = failed_parts(document.blocks)
+    assert "trajectories: got []" in sentence
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("trajectories: got []") < page.index("after it")
 
 
 def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, tmp_path, monkeypatch):
