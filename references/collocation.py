@@ -9,7 +9,7 @@ Source: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -89,7 +89,7 @@ def _slope(scene: Scene) -> Slope:
     fixed: Any = None if potential is None else potential.kernel_field(np.eye(3, dtype=np.longdouble))
     turns_with_body = Need.ATTITUDE in scene.needs
 
-    def loads(t: list[float], R: Sequence[Any]) -> tuple[Any, Any]:
+    def loads(t: list[float], R: Any) -> tuple[Any, Any]:
         """Return damping (n, 3, 3) and torque (3, n), or None."""
         D = None if scene.damping is None else np.array([scene.damping.at(*state) for state in zip(t, R, strict=True)])
         if scene.torque is None:
@@ -110,7 +110,7 @@ def _slope(scene: Scene) -> Slope:
             D, given = acting or loads(times, from_quaternion(np.array([a, b, c, d]).T.astype(float)))
             if D is not None:
                 T = T - np.einsum("nij,jn->in", D, np.array([x, y_, z]))
-            if given is not None:
+            if given is not None and scene.torque is not None:
                 T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
             L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
             spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
