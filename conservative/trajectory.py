@@ -220,7 +220,8 @@ class Trajectory:
         labels
             Titles of the panels; default: the labels of the trajectories.
         truth
-            The reference solution, which has a panel, and is an outline in the others; these show their attitude error.
+            The reference solution, which has a panel, and is an outline in the others; these show their attitude error at
+            their own samples. If the samples of the truth have other times, they are moved there by integration.
         """
         shown = [self, *others]
         if truth is not None and not any(each is truth for each in shown):

@@ -3,7 +3,8 @@
     scene                                           trajectory              checked against
     free body, Lagrange top, compound pendulum      `Exact`                 `Precise`
     any other field that `Precise` knows            `Precise`               `SciPy` (DOP853, the tightest tolerance)
-    torque or damping in a field that kernels know  Gauss collocation       `SciPy` (DOP853, the tightest tolerance)
+    torque or damping of time, field of kernels     Gauss collocation       `SciPy` (DOP853, the tightest tolerance)
+    torque or damping of attitude, field of kernels `SciPy` (DOP853)        Gauss collocation
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
     random bodies (`confirm`)                       `Precise` (96 bits)     Gauss collocation, extended precision (`collocate`)
 
@@ -41,8 +42,11 @@ CONFIRMED = 1e-13
 """Largest difference of two reference solutions of a random body, rad: a tenth of the smallest error that is compared."""
 PARTS = (2, 8, 32, 128)
 """Steps of the collocation between two samples. More are tried while the difference is larger than `CONFIRMED`."""
-MOST_PARTS = 2**12
-"""Most steps of the collocation between two samples of a scene with a torque or damping."""
+KNOTS, MOST_PARTS = 64, 2**8
+"""Samples, evenly chosen, between which the collocation of a scene with a torque or damping divides its steps, and the most
+steps between two of them. The number of other samples hardly changes its cost."""
+LOADED = 1e-8
+"""Largest difference of two reference solutions of a scene with a torque or damping, rad."""
 TIGHTEST = 2.3e-14
 """Smallest relative tolerance of SciPy."""
 
@@ -94,21 +98,24 @@ def reference(scene: Scene, grid: Grid) -> Truth:
         A package that a solution needs is not installed.
     """
     scene = scene.now()
-    if scene.loaded and Need.FUNCTION not in scene.needs:
-        return _confirm_loads(scene, grid)
+    if _is_collocated(scene) and (truth := _confirm_loads(scene, grid)):
+        return truth
     first, second, allowed = _pair(scene)
-    trajectory = first.solve(scene, grid)
+    trajectory, names = first.solve(scene, grid), (first.label, second.label)
     if trajectory.failure is not None:
         raise trajectory.failure
     end, fastest = float(grid.t[-1]), float(np.linalg.norm(trajectory.w_WB_B, axis=-1).max())
     if isinstance(first, Exact):
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end
         agreement = scene.derive(_agreement, first, second, until)  # cached: many grids use one scene
+    elif Need.ATTITUDE in scene.needs and Need.FUNCTION not in scene.needs:
+        knots = _knots(grid)
+        other, _ = _collocate_loads(scene, knots)
+        names, until, agreement = (first.label, other.label), end, difference(first.solve(scene, knots), other)
     else:
         until, agreement = end, difference(trajectory, second.solve(scene, grid))
     # Times are products that only one of the solutions rounds to double.
     allowed += np.finfo(float).eps * fastest * until
-    names = (first.label, second.label)
     if not agreement <= allowed:
         raise Disagreement(scene.name, names, agreement, allowed)
     return Truth(trajectory, agreement, names, until, not isinstance(first, Exact | Precise))
@@ -120,6 +127,10 @@ def solve(scene: Scene, grid: Grid) -> Trajectory:
     Raise `MissingEngine` if a package that it needs is not installed.
     """
     scene = scene.now()
+    if _is_collocated(scene):
+        trajectory, change = _collocate_loads(scene, grid)
+        if change <= LOADED:
+            return trajectory
     first = _pair(scene)[0]
     return (Precise(BITS) if isinstance(first, Precise) else first).solve(scene, grid)
 
@@ -143,20 +154,42 @@ def confirm(scene: Scene, grid: Grid) -> Truth:
     raise Disagreement(scene.name, (method.label, second.label), agreement, CONFIRMED)
 
 
-def _confirm_loads(scene: Scene, grid: Grid) -> Truth:
-    """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, checked by SciPy."""
-    second, allowed = SciPy("DOP853", TIGHTEST), 1e-8
+def _is_collocated(scene: Scene) -> bool:
+    """Return whether a scene has a torque or damping of time only, in a field that kernels know.
+
+    Functions of the attitude are called at each stage of each iteration, which takes a hundred times as long as in SciPy.
+    """
+    return scene.loaded and not {Need.FUNCTION, Need.ATTITUDE} & scene.needs
+
+
+def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
+    """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, and the last change."""
     breaks, step, _ = scene.smoothness(grid.last)
-    gaps = np.diff(np.union1d(grid.t, breaks[breaks < grid.t[-1]]))
+    knots = _knots(grid)
+    gaps = np.diff(np.union1d(knots.t, breaks[breaks < grid.t[-1]]))
     parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / step)))
-    trajectory, change = collocate(scene, grid, parts), np.inf
+    trajectory, change = collocate(scene, knots, parts), np.inf
     while not change <= CONFIRMED and parts < MOST_PARTS:  # of steps that are too long it may be nan
         parts, coarse = 2 * parts, trajectory
-        trajectory = collocate(scene, grid, parts)
+        trajectory = collocate(scene, knots, parts)
         change = difference(coarse, trajectory)
+    return trajectory if knots == grid else collocate(scene, grid, parts, knots.every // grid.every), change
+
+
+def _knots(grid: Grid) -> Grid:
+    """Return the grid with `KNOTS` of its samples, or all."""
+    every = math.ceil(grid.n_samples / KNOTS)
+    return grid if every == 1 else Grid(grid.dt, grid.n_steps, grid.every * every)
+
+
+def _confirm_loads(scene: Scene, grid: Grid) -> Truth | None:
+    """Return the collocation, checked by SciPy; None if it does not converge, as with a damping that stops the body at once."""
+    second, (trajectory, change) = SciPy("DOP853", TIGHTEST), _collocate_loads(scene, grid)
+    if not change <= LOADED:
+        return None
     agreement, names = difference(trajectory, second.solve(scene, grid)), (trajectory.label, second.label)
-    if not max(change, agreement) <= allowed:
-        raise Disagreement(scene.name, names, max(change, agreement), allowed)
+    if not agreement <= LOADED:
+        raise Disagreement(scene.name, names, agreement, LOADED)
     return Truth(trajectory, agreement, names, float(grid.t[-1]))
 
 

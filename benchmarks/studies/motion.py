@@ -114,20 +114,20 @@ def _lines(
     """Yield the lines of a motion, of its first duration `begin` and its errors there, at the times of `exact` or fewer."""
 
     def line(quantity: str, values: Array, some: Array) -> Samples:
-        return case.samples(quantity, trajectory.t[some], values[some])
+        return case.samples(quantity, trajectory.t[some], values[some])  # `begin` has the same times
 
     def spread(n: int, count: int) -> Array:
         return np.unique(np.linspace(0, n - 1, count).round().astype(int))
 
     last = min(len(begin) - 1, int(np.searchsorted(begin.t, exact.t[-1] * (1 - ROUNDING))))
-    shown, drifts = spread(last + 1, len(exact)), {each: trajectory.drift(each) for each in case.scene.invariants}
-    states = np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
+    shown, states = spread(last + 1, len(exact)), np.hstack([to_quaternion(begin.R_WB), begin.w_WB_B])
     yield from (line(quantity, values, shown) for quantity, values in zip(STATES, states.T, strict=True))
-    for invariant, drift in drifts.items():
-        yield line(LARGEST + invariant.name, np.maximum.accumulate(sizes(drift)), shown)
+    for invariant in case.scene.invariants:
+        yield line(LARGEST + invariant.name, np.maximum.accumulate(sizes(begin.drift(invariant))), shown)
     if error is not None:
         yield line(ERROR, np.maximum.accumulate(error), shown)
-    for invariant, drift in drifts.items():
+    for invariant in case.scene.invariants:
+        drift = trajectory.drift(invariant)
         if drift.ndim > 1:  # relative to the initial value, which is the scale of a vector that is not zero
             start = case.scene.initial_value(invariant) / invariant.scale
             drift = sizes(drift + start) - sizes(start)

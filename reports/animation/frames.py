@@ -102,6 +102,9 @@ def make_panels(
     if len(labels) != len(trajectories):
         raise BadInput("labels", list(labels), f"one label for each of {len(trajectories)} trajectories")
     duration = max(float(each.t[-1]) for each in trajectories) or trajectories[0].scene.t_end
+    shared = min((float(each.t[-1]) for each in trajectories if each.ok), default=duration)
+    if all(not each.ok or each.t[-1] - np.diff(each.t).max(initial=0.0) <= shared for each in trajectories):
+        duration = shared or duration  # last steps pass it: all bodies are drawn at one time
     rate = min(float(np.linalg.norm(each.w_WB_B, axis=1).mean()) for each in trajectories)
     frames = max(FRAMES, math.ceil(rate * duration / TURN) + 1)
     if frames > MOST_FRAMES + 1:
@@ -127,6 +130,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     share = np.clip((times - t[before]) / np.where(after > before, t[after] - t[before], 1.0), 0.0, 1.0)
     start, stop = Rotation.from_matrix(trajectory.R_WB[before]), Rotation.from_matrix(trajectory.R_WB[after])
     R_WB = (start * Rotation.from_rotvec(share[:, None] * (start.inv() * stop).as_rotvec())).as_matrix()
+    last = np.append(before[:-1], len(t) - 1)  # the last numbers are those of the whole run
     lengths = np.linalg.norm(trajectory.momentum_W, axis=1)
     squares = np.maximum(body.moments.sum() - 2 * body.moments, 0)  # of the sides: J_1 = m/12 (b^2 + c^2), and so on
     size = np.maximum(np.sqrt(squares), THINNEST * math.sqrt(squares.max()))
@@ -142,7 +146,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
         1.25 * tip / np.linalg.norm(tip),
         R_WB @ body.R_BP,
         np.clip(L_W, -MOST, MOST),
-        {name: value[before] for name, value in values.items() if not np.isnan(value).any()},  # not every method has balances
+        {name: value[last] for name, value in values.items() if not np.isnan(value).any()},  # not every method has balances
     )
 
 

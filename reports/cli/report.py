@@ -28,7 +28,7 @@ from .options import (
 
 @click.command(
     cls=Command,
-    codes={1: FAILED},
+    codes={1: f"{FAILED}, or a part of the page could not be made"},
     short_help="Measure the paper's two scenes and write a report.",
     epilog=epilog(
         "conservative report",
@@ -79,7 +79,8 @@ def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
 
     The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
     error. Open OUT/index.html; OUT/engine_NAME.html is the page of an engine that is named. The folder OUT is replaced when
-    the report is complete. Until then, finished studies are in OUT.partial.json.
+    the report is complete. Until then, finished studies are in OUT.partial.json. A part that cannot be drawn is a sentence in
+    its place, and the exit code is 1; --resume then draws it without measuring.
     """
     require_extra("conservative report", "report")
     from .. import report as work

@@ -106,8 +106,8 @@ def watch(
                 summary = work.summarize_chosen(run)
             data.append(summary | {"error": work.describe_errors(found)})
             if len(run):  # an engine that crashes at its start has no samples
-                error = None if isinstance(found, str) or run is truth else found.at_samples(len(run))
-                drawn.append((run, f"{summary['typed']}, dt = {summary['dt']:.3g} s", largest_values(run, error)))
+                errors = None if isinstance(found, str) or run is truth else found.at_samples(len(run))
+                drawn.append((run, f"{summary['typed']}, dt = {summary['dt']:.3g} s", largest_values(run, errors)))
         if failure := runs[0][0].failure if not drawn else None:
             raise failure
         motions, labels, values = zip(*drawn, strict=True)

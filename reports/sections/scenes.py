@@ -40,7 +40,8 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     )
     order_words = (
         "Fit of log(error) over log(step), with standard error, between the steps that are too large to converge and the "
-        "round-off floor. Errors are relative to the reference solution: the attitude error is the angle of R_ref' R, "
+        f"round-off floor. Errors are the largest at {step_ladder.SAMPLES} times, relative to the reference solution: the "
+        "attitude error is the angle of R_ref' R, "
         "the error of the rates is relative to the largest exact |ω|."
     )
     time_words = (
