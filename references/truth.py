@@ -56,9 +56,9 @@ class Disagreement(ArithmeticError):
 
     def __init__(self, scene: str, names: tuple[str, str], agreement_rad: float, allowed_rad: float) -> None:
         self.scene, self.names, self.agreement_rad, self.allowed_rad = scene, names, agreement_rad, allowed_rad
+        differ = f"differ by {agreement_rad:.3g} rad" if agreement_rad < math.inf else "end at different times"
         super().__init__(
-            f"scene: got {scene!r}, for which {names[0]} and {names[1]} differ by {agreement_rad:.3g} rad; "
-            f"expected at most {allowed_rad:.3g} rad"
+            f"scene: got {scene!r}, for which {names[0]} and {names[1]} {differ}; expected at most {allowed_rad:.3g} rad"
         )
 
 
@@ -93,7 +93,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     Raises
     ------
     Disagreement
-        The two solutions differ by more than round-off and their errors explain.
+        The two solutions differ by more than round-off and their errors explain, or one of them fails.
     MissingEngine
         A package that a solution needs is not installed.
     """
@@ -103,7 +103,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     first, second, allowed = _pair(scene)
     trajectory, names = first.solve(scene, grid), (first.label, second.label)
     if trajectory.failure is not None:
-        raise trajectory.failure
+        raise Disagreement(scene.name, names, math.inf, allowed) from trajectory.failure
     end, fastest = float(grid.t[-1]), float(np.linalg.norm(trajectory.w_WB_B, axis=-1).max())
     if isinstance(first, Exact):
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end

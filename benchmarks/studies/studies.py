@@ -7,9 +7,14 @@ for finding in findings(study): ...
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from conservative.check import choice
+from conservative.grid import grid_for
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.truth import Disagreement
 
+from ..measures import errors
 from ..measures.measurement import Measurement
 from . import (
     convergence,
@@ -29,6 +34,7 @@ from . import (
     twins,
     work_precision,
 )
+from .case import Case
 from .declaration import Declaration
 from .study import Finding, Progress, Study
 
@@ -43,6 +49,8 @@ STUDIES: Mapping[str, Declaration] = {each.STUDY.name: each.STUDY for each in _I
 def findings(study: Study, progress: Progress = lambda share, what: None) -> Iterator[Finding]:
     """Yield rows and samples of a study as they are measured.
 
+    A scene without a reference solution has rows that are skipped with the reason, and the study goes on with the next scene.
+
     Raises
     ------
     BadInput
@@ -51,7 +59,23 @@ def findings(study: Study, progress: Progress = lambda share, what: None) -> Ite
         An engine is not installed, and `skip_missing` is False.
     """
     choice("name", study.name, tuple(STUDIES))
-    return STUDIES[study.name].findings(study, progress)
+    return _go_on(study, progress)
+
+
+def _go_on(study: Study, progress: Progress) -> Iterator[Finding]:
+    left: Study | None = study
+    while left:
+        try:
+            yield from STUDIES[study.name].findings(left, progress)
+            return
+        except Disagreement as failure:
+            i = [scene.name for scene in left.scenes].index(failure.scene)
+            scene, reason = left.scenes[i], Outcome(OutcomeKind.SKIPPED, f"no reference solution: {failure}")
+            for method in left.competitors:
+                case = Case(study.name, scene, method, grid_for(scene, min(scene.dt, scene.t_end)))
+                yield from case.rows(errors.blanks(scene), reason)
+            later = left.scenes[i + 1 :]
+            left = replace(left, scenes=later, drawn=left.drawn[i + 1 :]) if later else None
 
 
 def rows(study: Study) -> Iterator[Measurement]:

@@ -14,7 +14,7 @@ from conservative.benchmarks.studies.study import Study
 from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
-from conservative.references.truth import Truth
+from conservative.references.truth import Disagreement, Truth
 from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
@@ -139,6 +139,23 @@ def test_nothing_is_dropped_silently(name):
 def test_a_missing_engine_is_an_error_unless_skipped(name):
     with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
         list(studies.findings(Study(name, (SCENE,), (ABSENT,), truth=truth)))
+
+
+@pytest.mark.parametrize("name", [*CROSSING, "motion"])
+def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
+    asked = []
+
+    def find(scene, grid):
+        asked.append(scene.name)
+        if scene.name == "unknown":
+            raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
+        return truth(scene, grid)
+
+    scenes = (SCENE.rename("first"), SCENE.rename("unknown"), SCENE)
+    found = [*studies.rows(Study(name, scenes, (cv.Reduced(),), quick=True, truth=find))]
+    kinds = {(row.scene, row.outcome.kind) for row in found}
+    assert {scene for scene, kind in kinds if kind in (OutcomeKind.OK, OutcomeKind.NO_ORDER)} >= {"first", SCENE.name}
+    assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
 
 
 def test_a_bug_of_our_own_is_not_an_outcome():
