@@ -136,7 +136,7 @@ def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Callabl
         if len(tried) > 1 and math.isinf(run.error):
             return tried
         assert method.tolerance is not None
-        factor = min(0.3, max(1e-3, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
+        factor = min(0.3, max(1e-5, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
         if method.tolerance <= LEAST_TOLERANCE:
             return tried
         method = Projected(tolerance=max(LEAST_TOLERANCE, factor * method.tolerance))
