@@ -55,7 +55,8 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
     if all(load.origin for load in loads):  # in other units: a scan takes a second
         (_, unit), *_ = (load.origin for load in loads)
         known = examine(tuple(load.origin[0] for load in loads), t_end * unit)
-        return Smoothness(read_only(known.breaks / unit), known.step / unit, (known.interval[0] / unit, known.interval[1] / unit))
+        first, last = known.interval
+        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit))
     step, interval = math.inf, (0.0, t_end)
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)

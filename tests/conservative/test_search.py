@@ -531,7 +531,9 @@ def test_only_an_order_that_two_halvings_show_is_counted(monkeypatch):
     for n, share in SHARES.items():
         runs = trials.run_twice(Erratic(size=0.1, power=8), SCENE, Grid(8.0 / n, n, n // 64))
         assert runs.error > 0.1 * share * (8.0 / n) ** 2 * 8.0  # 1.1 to 270 times; a share of 0.03 to 9 if it is divided by 30
-        assert (runs.rough is not None) is (n < 2048)  # of the others, the longest step is by chance far worse than the shortest
+        assert (runs.rough is not None) is (
+            n < 2048
+        )  # of the others, the longest step is by chance far worse than the shortest
     regular = trials.run_twice(Known(size=0.1, power=2), SCENE, Grid(8.0 / 512, 512))
     assert regular.rough is None
     assert regular.error == pytest.approx(0.1 * (8.0 / 512) ** 2 * 8.0, rel=1e-3)
@@ -557,6 +559,7 @@ def test_a_corner_at_a_time_is_found_and_costs_nothing():
     assert found.counters.steps < 100
 
 
+@pytest.mark.attack
 def test_functions_that_stay_rough_are_named_with_their_time():
     """Noise from t = 1 on: no step and no tolerance reaches the error, and the warning says near which time."""
 
