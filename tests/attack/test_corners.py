@@ -1,6 +1,6 @@
 """Runs of functions with corners and jumps by `integrate(error=)`: what is called ok is as accurate as was asked.
 
-`pytest` tries a few scenes, `pytest --attack` all kinds, and smooth likes of them, of which few may be warned of without a reason.
+`pytest` tries a few scenes, `pytest --attack` all kinds, and smooth likes of them, of which few may be warned of needlessly.
 """
 
 from __future__ import annotations
