@@ -265,7 +265,7 @@ def coarser(method: Method, grid: Grid) -> tuple[Method, Grid]:
     if getattr(method, "tolerance", None) is None:
         return method, coarse_grid(grid)
     changes: Any = {"tolerance": LOOSER * method.tolerance}  # type: ignore[attr-defined]
-    return replace(method, **changes), grid  # type: ignore[type-var]
+    return replace(method, **changes), grid
 
 
 def _largest_difference(fine: Trajectory, coarse: Trajectory) -> float:
