@@ -559,20 +559,6 @@ def test_a_corner_at_a_time_is_found_and_costs_nothing():
     assert found.counters.steps < 100
 
 
-@pytest.mark.attack
-def test_functions_that_stay_rough_are_named_with_their_time():
-    """Noise from t = 1 on: no step and no tolerance reaches the error, and the warning says near which time."""
-
-    def noise(t, R):
-        return np.array((0.0, 0.0, 0.0 if t < 1 else np.sin(1e9 * (t + R[0, 0]))))
-
-    scene = bent(noise)
-    with pytest.warns(cv.AccuracyNotReached, match="not smooth: near t = 1") as caught:
-        found = cv.integrate(scene, error=1e-8)
-    assert not found.choice.reached
-    assert 0.95 < caught[0].message.rough < 2.0
-
-
 @pytest.mark.parametrize("how", ["error", "samples of an error", "dt", "t_eval", "adaptive", "scipy"])
 @pytest.mark.parametrize("kind", ["torque", "attitude", "motor", "factor", "potential"])
 def test_a_function_is_never_asked_beyond_the_end(kind, how):
