@@ -31,6 +31,7 @@ from .identity import NOT_OF_MOTION, Identity, equal_to_nothing, identify
 from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
 from .needs import LOADS, Need, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
+from .potentials.pointwise import EARLIER
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.smoothness import SMOOTH, Smoothness, examine
 from .potentials.turning import Turning
@@ -255,7 +256,8 @@ class Scene(PickledByFields):
 
     def smoothness(self, t_end: float = 0.0) -> Smoothness:
         """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
-        return examine(self.loads, max(t_end, self.t_end)) if self.loads else SMOOTH
+        end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # not beyond it by rounding
+        return examine(self.loads, end) if self.loads else SMOOTH
 
     @property
     def integrable(self) -> bool:

@@ -73,7 +73,9 @@ class Walk:
         return StepControl(self.local, self.ends[i] if self.h and self.h[i] < ROUGH * float(np.median(self.h)) else None)
 
 
-def walk(scene: Scene, model: Any, find: Callable[[float], Any], tolerance: float, t: Array, most: int = MOST_TRIES) -> Walk:
+def walk(  # noqa: PLR0915  # one loop
+    scene: Scene, model: Any, find: Callable[[float], Any], tolerance: float, t: Array, most: int = MOST_TRIES
+) -> Walk:
     """Return the states at increasing times t (n,), s, the first 0, of steps with a tolerance; `find` returns coefficients."""
     kernel, size, rate = kernels("projected"), model.scales[1], bound_rate(scene)
     if depends_on_time(scene.potential) and not scene.loaded:  # the clock of steps belongs to loads

@@ -56,8 +56,7 @@ def integrate_to_error(
     _, trajectory = trials.estimate(method, grid, sensitivity=True)
     attempts = tuple((each.grid.dt, each.estimate.total) for each in tried)
     total, rough = estimated.total, find_rough(tried)
-    adaptive = isinstance(method, Projected) and method.tolerance is not None
-    if adaptive and samples.at is not None:
+    if isinstance(method, Projected) and method.tolerance is not None and samples.at is not None:
         trajectory = method.solve_at(scene, grid, samples.at)
         total = max(total, trajectory.control.local) if trajectory.control else total
     else:
@@ -109,7 +108,7 @@ def reach(
         if presumed_smooth(scene) or method.order is None or best_of(tried).estimate.total <= error:
             return tried
     adaptive = adaptive_method(error)
-    return [*tried, *cut_tolerance(adaptive, sampling_grid(t_end, samples), error, lambda *each: estimate(*each))]
+    return [*tried, *cut_tolerance(adaptive, sampling_grid(t_end, samples), error, estimate)]
 
 
 def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
@@ -136,7 +135,7 @@ def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Callabl
         if len(tried) > 1 and math.isinf(run.error):
             return tried
         assert method.tolerance is not None
-        factor = min(0.3, max(1e-3, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
+        factor = min(0.3, max(1e-5, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
         if method.tolerance <= LEAST_TOLERANCE:
             return tried
         method = Projected(tolerance=max(LEAST_TOLERANCE, factor * method.tolerance))

@@ -113,7 +113,7 @@ class Projected(Method):
         found = found if units is SI else units.restore(found, scene, Grid(grid.dt, len(times)))
         kept = slice(0 if first else 1, len(found))
         supplied = None if found.supplied is None else found.supplied[kept]
-        samples = {"t": t[: len(found.t[kept])].copy(), "R_WB": found.R_WB[kept], "w_WB_B": found.w_WB_B[kept]}
+        samples: dict[str, Any] = {"t": t[: len(found.t[kept])].copy(), "R_WB": found.R_WB[kept], "w_WB_B": found.w_WB_B[kept]}
         found = replace(found, scene=scene, supplied=supplied, **samples)
         return cut_at_failure(found, self.conserves, self.bounds(scene, grid))
 

@@ -181,7 +181,7 @@ def find_cheapest(
             return cheapest.method, cheapest.dt
 
 
-def adaptive_method(error: float) -> Method:
+def adaptive_method(error: float) -> Projected:
     """Return the adaptive method to try first for an attitude error, rad."""
     return Projected(tolerance=error / FIRST_TOLERANCE)
 

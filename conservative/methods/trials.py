@@ -46,7 +46,7 @@ SHOWN, ALIKE = 0.5, 2.0**0.75
 """Differences fall in order if each is smaller by this share of what the order says, and the factors of both halvings are as
 alike as this."""
 LOW, RESOLVED = 0.25, 0.05
-"""A function is not smooth if differences below so many rad fall, in two halvings, by less than this share of the order each."""
+"""A function is not smooth if differences below so many rad fall, in two halvings, by less than this share of the order."""
 MAGNIFIED = 2.0**20
 """Factor on the change of a scene that represents rounding, for adaptive methods; the effect is divided by it."""
 LOOSER = 30.0
@@ -269,7 +269,7 @@ def coarser(method: Method, grid: Grid) -> tuple[Method, Grid]:
     if getattr(method, "tolerance", None) is None:
         return method, coarse_grid(grid)
     changes: Any = {"tolerance": LOOSER * method.tolerance}  # type: ignore[attr-defined]
-    return replace(method, **changes), grid  # type: ignore[type-var]
+    return replace(method, **changes), grid
 
 
 def _largest_difference(fine: Trajectory, coarse: Trajectory) -> float:

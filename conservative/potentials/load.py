@@ -137,6 +137,8 @@ class OfTime(PickledByFields):
     shape: ClassVar[tuple[int, ...]]
     one: ClassVar[str]
     may_jump: ClassVar[bool] = True
+    origin: ClassVar[tuple[OfTime, float] | None] = None
+    """The load in SI units, and the unit of time, s, of one in other units."""
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
@@ -255,7 +257,7 @@ class OfTime(PickledByFields):
             value = lambda t, R_WB: self.at(t * time, R_WB) / unit  # noqa: E731  # its arguments count
         else:
             value = lambda t: self.at(t * time) / unit  # noqa: E731
-        return replace_unchecked(self, value=value, breaks=self.breaks / time)
+        return replace_unchecked(self, value=value, breaks=self.breaks / time, origin=(self, time))
 
 
 def find_corners(times: Array, values: Array) -> Array:

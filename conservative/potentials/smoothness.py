@@ -52,6 +52,11 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
     Functions of time and attitude are evaluated at `ATTITUDE`. So the result is the same for all scenes with these loads,
     such as the bodies of an ensemble, and found once.
     """
+    if all(load.origin for load in loads):  # in other units: a scan takes a second
+        (_, unit), *_ = (load.origin for load in loads)
+        known = examine(tuple(load.origin[0] for load in loads), t_end * unit)
+        first, last = known.interval
+        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit))
     step, interval = math.inf, (0.0, t_end)
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)

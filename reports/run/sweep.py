@@ -25,7 +25,7 @@ from conservative.integration.one import read_method
 from conservative.integration.spread import spread
 from conservative.integration.store import find_ensemble
 from conservative.method import Method
-from conservative.methods.trials import trials_of
+from conservative.methods.trials import parts_for, trials_of
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
@@ -239,8 +239,9 @@ def _own_error(scene: Scene, method: Method, grid: Grid) -> dict[str, Any]:
     It is estimated from a run with twice the step, or measured if both differ completely or the second one fails.
     """
     grid, estimate = replace(grid, every=math.ceil(grid.n_steps / COMPARED)), math.inf
-    with suppress(BadInput):  # fewer than four steps, or twice the step is too long for the method
-        estimate = trials_of(scene).estimate(method, replace(grid, n_steps=grid.n_steps // 4 * 4))[0].error
+    with suppress(BadInput):  # fewer than eight steps, or twice the step is too long for the method
+        parts = parts_for(scene)
+        estimate = trials_of(scene).estimate(method, replace(grid, n_steps=grid.n_steps // parts * parts))[0].error
     if math.isfinite(estimate):
         return {"estimate": estimate, "reached": estimate <= LARGE}
     found = find_errors(run_on(scene, method, grid), grid, None, None, None)

@@ -1,7 +1,7 @@
 """Random scenes whose loads or fields have corners and jumps in time or in attitude, and their smooth likes.
 
-A `Law` is a torque in body axes as a function of time, attitude and rates, that shares nothing with the package. The truth is an
-integration by SciPy that is restarted wherever the law is not smooth, as events find it.
+Each has its law: the torque in body axes as a function of time, attitude and rates, that shares nothing with the package. The
+truth is an integration by SciPy that is restarted wherever the law is not smooth, as events find it.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ KINDS = (
 class Corners:
     """A scene and its law.
 
-    `torque` is a function of t, R_WB and w_WB_B, N m, and `rotor` of t, kg m^2/s, body axes. `bends` are functions of t and R_WB
-    that are 0 where the law is not smooth; `times` are such times, s.
+    `torque` is a function of t, R_WB and w_WB_B, N m, and `rotor` of t, kg m^2/s, body axes. `bends` are functions of t and
+    R_WB that are 0 where the law is not smooth; `times` are such times, s.
     """
 
     what: str
@@ -78,7 +78,7 @@ class Corners:
     times: tuple[float, ...] = ()
 
 
-def draw(seed: int, smooth: bool = False) -> Corners:
+def draw(seed: int, smooth: bool = False) -> Corners:  # noqa: PLR0912, PLR0915  # a case for each kind
     """Return a random scene of the kind of its seed."""
     g, kind = np.random.default_rng((50, seed)), KINDS[seed % len(KINDS)]
     shapes = SMOOTH if smooth else SHAPES
@@ -159,7 +159,7 @@ def draw(seed: int, smooth: bool = False) -> Corners:
         if not smooth:
             half = np.arange(-2, 2 * rate * t_end + 2) / 2
             times = tuple(x for x in ((half - phase) / rate).tolist() if 0 < x < t_end)
-        force = lambda t, R, w: size * wave(rate * t + phase) @ R if False else size * wave(rate * t + phase)  # noqa: E731
+        force = lambda t, R, w: size * wave(rate * t + phase)  # noqa: E731
         options["torque"] = cv.Torque(lambda t: size * wave(rate * t + phase))
     else:  # a motor
         bends = tuple(lambda t, R, v=v: of_time(t) - v for v in values)

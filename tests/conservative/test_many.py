@@ -236,6 +236,15 @@ def test_an_error_below_round_off_is_a_warning():
     assert not found.choice.reached
 
 
+def test_a_shared_choice_says_that_and_where_its_error_is_not_reached(monkeypatch):
+    bodies = read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), *starts(20), None, None)
+    monkeypatch.setattr(shared_choice, "find_worst", lambda *_: (Estimate(1e-3, 0.0, rough=1.5), 0))
+    with pytest.warns(cv.AccuracyNotReached, match=r"not smooth: near t = 1\.5 s") as caught:
+        choice = shared_choice.choose_for_all(bodies, 1e-6, 2.0, SampleTimes(None, 1))
+    assert not choice.reached
+    assert (caught[0].message.estimate, caught[0].message.rough) == (1e-3, 1.5)
+
+
 FIVE, TIMES = 5, 4
 GRID = cv.Grid(0.5, TIMES - 1)
 T = GRID.t

@@ -478,3 +478,117 @@ def test_trial_runs_of_a_python_function_warn_of_nothing():
     )
     scene = cv.Scene("function", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.3, 1.0, 20.0), 3.0, field)
     assert cv.integrate(scene, error=1e-9).choice.reached
+
+
+@pytest.mark.parametrize("arm", [(0.3, 0, 0), (0.3, 0.1, 0)])
+def test_rounding_does_not_split_the_equal_moments_of_a_rod(arm):
+    scene = cv.Scene("rod", cv.RigidBody((1e-9, 1.0, 1.0)), np.eye(3), (1.0, 1.0, 0.5), 5.0, cv.UniformGravity(1.0, arm))
+    near = trials.nearby_scene(scene).body.moments
+    assert near[1] == near[2]
+    assert 0 < abs(near[0] / 1e-9 - 1) < 5e-16
+    assert cv.integrate(scene, error=1e-6).choice.reached  # before, a warning of 6e-4 rad; a body that is split is that far off
+
+
+def corner(t):
+    """Return 0 before a third of pi, then a slope: a function with a corner at a time that no step hits."""
+    return np.array((0.0, 0.0, max(0.0, t - np.pi / 3)))
+
+
+def bent(value, t_end=2.0, **options):
+    """Return a scene that turns about its third axis, with a torque."""
+    torque = None if value is None else cv.Torque(value)
+    return cv.Scene("bent", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0, 0, 1.0), t_end, torque=torque, **options)
+
+
+def test_laws_are_presumed_smooth_and_what_a_user_gives_is_not():
+    function = cv.FunctionPotential(lambda R: abs(R[2, 0]), lambda R: np.outer((0, 0, 1), (np.sign(R[2, 0]), 0, 0)))
+    spring, own = cv.LinearSpring(2.0, (1, 0, 0), (0, 2, 0), 0.5), bent(None)
+    for field in (None, spring, cv.UniformGravity(1.0, (0, 0, 1)), cv.LinearSpring(2.0, (1, 0, 0), (0, 1, 0))):
+        assert trials.presumed_smooth(own.rename("own", potential=field))
+    meets = cv.LinearSpring(2.0, (1, 0, 0), (0, 1.01, 0), 0.5)  # its force has no direction where its points meet
+    for field in (function, meets, cv.Turning(function, cv.Orbit(1.0, (0, 0, 1)))):
+        assert not trials.presumed_smooth(own.rename("own", potential=field))
+    assert not trials.presumed_smooth(bent(corner))
+    assert not trials.presumed_smooth(bent((0, 0, 1.0)))
+
+
+SHARES = {512: 1.8, 1024: 0.3, 2048: 0.1, 4096: 1.9}
+
+
+@dataclass(frozen=True)
+class Erratic(Known):
+    """Its errors fall with the square of the step times a number between 0.1 and 1.9 that is different for each step."""
+
+    def prepare(self, scene, grid):
+        share = {number % 4: share for number, share in zip((9, 10, 11, 12), SHARES.values(), strict=True)}
+        angles = 2.0 * grid.t + self.size * share[round(math.log2(grid.n_steps)) % 4] * grid.dt**2 * grid.t
+        R = Rotation.from_rotvec(np.outer(angles, (0, 0, 1))).as_matrix()
+        return lambda: cv.Trajectory(scene, grid.t, R, np.tile((0, 0, 2.0), (len(R), 1)), self.label, Counters(grid.n_steps))
+
+
+def test_only_an_order_that_two_halvings_show_is_counted(monkeypatch):
+    monkeypatch.setattr(trials, "presumed_smooth", lambda scene: False)
+    for n, share in SHARES.items():
+        runs = trials.run_twice(Erratic(size=0.1, power=8), SCENE, Grid(8.0 / n, n, n // 64))
+        assert runs.error > 0.1 * share * (8.0 / n) ** 2 * 8.0  # 1.1 to 270 times; a share of 0.03 to 9 if it is divided by 30
+        assert (runs.rough is not None) is (
+            n < 2048
+        )  # of the others, the longest step is by chance far worse than the shortest
+    regular = trials.run_twice(Known(size=0.1, power=2), SCENE, Grid(8.0 / 512, 512))
+    assert regular.rough is None
+    assert regular.error == pytest.approx(0.1 * (8.0 / 512) ** 2 * 8.0, rel=1e-3)
+
+
+def test_a_diverging_run_at_a_longer_step_is_no_reason_to_give_up():
+    """Damping of 60/s: explicit steps above 0.1 s diverge, and steps of 0.02 s are accurate to 1e-8 rad."""
+    scene = cv.Scene(
+        "stiff", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.3, 1.0, 0.2), 4.0,
+        torque=cv.Torque(lambda t: np.array((40.0, 9.0, 20.0))), damping=cv.Damping(60 * np.eye(3)),
+    )  # fmt: skip
+    choice = cv.integrate(scene, error=1e-6).choice
+    assert choice.reached
+
+
+def test_a_corner_at_a_time_is_found_and_costs_nothing():
+    found = cv.integrate(bent(corner), error=1e-10, t_eval=5)
+    late = np.maximum(0.0, found.t - np.pi / 3)
+    angle = found.t + late**3 / 6 / 2.5
+    truth = Rotation.from_rotvec(np.outer(angle, (0, 0, 1))).as_matrix()
+    assert angle_between(truth, found.R_WB).max() < 1e-13  # measured 1e-15; 1e-6 without the break point at pi / 3
+    np.testing.assert_allclose(found.scene.breaks, [np.pi / 3], atol=1e-10)
+    assert found.counters.steps < 100
+
+
+@pytest.mark.parametrize("how", ["error", "samples of an error", "dt", "t_eval", "adaptive", "scipy"])
+@pytest.mark.parametrize("kind", ["torque", "attitude", "motor", "factor", "potential"])
+def test_a_function_is_never_asked_beyond_the_end(kind, how):
+    end, asked, arm = 0.3, [], np.array((0.1, 0.2, 0.3))  # 3 steps of 0.1 s end at 0.30000000000000004
+
+    def wave(t):
+        asked.append(t)
+        return 0.3 * math.sin(4 * t) * np.array((1.0, 0.5, -0.4))
+
+    options = {
+        "torque": {"torque": cv.Torque(wave)},
+        "attitude": {"torque": cv.Torque(lambda t, R: wave(t) @ R)},
+        "motor": {"body": cv.RigidBody((1.0, 2.0, 2.5), rotor_momentum=wave)},
+        "factor": {"damping": cv.Damping(0.1 * np.eye(3), lambda t: 1 + wave(t)[0])},
+        "potential": {
+            "potential": cv.FunctionPotential(
+                lambda R, t: (1 + wave(t)[0]) * (R[2] @ arm), lambda R, t: (1 + wave(t)[0]) * np.outer((0, 0, 1), arm), 1.0,
+                time_dependent=True,
+            )
+        },
+    }[kind]  # fmt: skip
+    scene = bent(None, end).rename("wave", **options)
+    asked.clear()  # potentials are tried at 0.7 s
+    method = "scipy:rtol=1e-9" if how == "scipy" else cv.Projected(1e-6 if how == "adaptive" else None)
+    arguments = {
+        "error": {"error": 1e-6},
+        "samples of an error": {"error": 1e-6, "t_eval": 4},
+        "t_eval": {"dt": 0.1, "t_eval": 4, "method": method},
+    }.get(how, {"dt": 0.1, "method": method})
+    found = cv.integrate(scene, **arguments)
+    _ = found.energy, found.momentum_W, [found.drift(each.name) for each in scene.invariants]
+    assert max(asked) <= end
+    assert max(asked) > end * (1 - 1e-12) or how == "scipy"

@@ -144,6 +144,14 @@ def test_an_error_instead_of_a_step():
     assert content["samples"] == 6  # by default
 
 
+def test_an_error_that_is_not_reached_is_said():
+    arguments = ("brick_flip", "--starts", "2", "--spread", "rate=1%", "--error", "1e-18", "--t-end", "0.2")
+    content = json.loads(conservative(*arguments, "--json").stdout)
+    assert content["error"]["reached"] is False
+    assert content["error"]["estimate"] > content["error"]["asked"] == 1e-18
+    assert "target: 1e-18 rad, so the target is not reached" in " ".join(conservative(*arguments).stdout.split())
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
