@@ -138,7 +138,7 @@ class OfTime(PickledByFields):
     one: ClassVar[str]
     may_jump: ClassVar[bool] = True
     origin: ClassVar[tuple[OfTime, float] | None] = None
-    """The load in SI units, and the unit of time, s, of one in other units."""
+    """The load whose function this one calls, and the unit of time of this one in units of it; None for a function of a user."""
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
@@ -194,7 +194,7 @@ class OfTime(PickledByFields):
         """Return the value at a time, s, and an attitude (3, 3), between two break points. Raise `TorqueFailed` without one."""
         if isinstance(self.value, np.ndarray):
             return self.value
-        inside = t if isinstance(self.value, tuple) else t * EARLIER
+        inside = t if isinstance(self.value, tuple) or self.origin else t * EARLIER
         if not window[0] < inside < window[1]:  # or at a jump, where the side matters
             inside = min(max(inside, math.nextafter(window[0], math.inf)), math.nextafter(window[1], -math.inf))
         if isinstance(self.value, tuple):

@@ -107,7 +107,7 @@ def _turn(load: AnyLoad, F: Array, convert: Callable[[Array], Array]) -> AnyLoad
         value = lambda t, R_WB: convert(load.at(t, R_WB @ F))  # noqa: E731  # its arguments count
     else:
         value = lambda t: convert(load.at(t))  # noqa: E731
-    return replace_unchecked(load, value=value)
+    return replace_unchecked(load, value=value, origin=(load, 1.0))
 
 
 def _turn_damping(damping: Damping, F: Array) -> Damping:

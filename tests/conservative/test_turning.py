@@ -194,7 +194,7 @@ def test_a_field_that_depends_on_the_time_has_a_default_method():
     found = cv.integrate(scene, dt=20)
     assert found.ok
     assert "reduced" not in found.label
-    assert cv.integrate(cv.scenes.brick_flip(), t_end=0.1).label.endswith("/reduced")
+    assert cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1).label.endswith("/reduced")
 
 
 MOMENT = np.array((0.3, -0.5, 1.2))
