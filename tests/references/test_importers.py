@@ -295,7 +295,7 @@ def test_a_program_is_right_or_its_mistake_is_named(register, tmp_path):
         (("urdf",), [[1, 2, 3]] * 24, "its `accelerations` are not numbers (24, 6)"),
         (("urdf",), [[1], [1, 2]], "its `accelerations` are not numbers (24, 6)"),
         (("urdf",), [["nan"] * 6] * 24, "accelerations that are not finite"),
-        (("urdf",), "none", "its `accelerations` are not numbers (24, 6)"),
+        (("urdf",), "none", "answers `load` with `accelerations`: 'none'; expected an array of numbers"),
     ],
 )
 def test_a_program_without_usable_accelerations_is_described(formats, accelerations, words, register, tmp_path):
