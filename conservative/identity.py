@@ -35,7 +35,7 @@ def _names(text: str) -> frozenset[str]:
 
 
 PURE = _names(f"""
-    {_PACKAGE} abc bisect builtins cmath collections contextlib copy copyreg dataclasses datetime decimal enum fractions
+    {_PACKAGE} abc bisect builtins cmath collections contextlib copy copyreg dataclasses datetime enum fractions
     functools heapq itertools math numba numbers numpy operator scipy statistics types typing
     _bisect _collections _collections_abc _functools _heapq _operator
 """)

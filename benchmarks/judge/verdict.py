@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, from_quaternion, hat, to_quaternion
-from conservative.errors import BadInput
+from conservative.errors import BadInput, shorten
 from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
 from conservative.needs import IN_TIME
@@ -97,7 +97,7 @@ def judge(
         "units": units,
         "rows": {"compared": found.compared, "in file": recording.rows},
         "compared": {kind: list(part) for kind, part in recording.layout.used.items() if part},
-        "not used": recording.layout.unused,
+        "not used": {shorten(name): reason for name, reason in recording.layout.unused.items()},
         "quantities": [{"quantity": name, "largest": float(x.max()), "final": float(x[-1])} for name, x in series.items()],
         "limits": {name: size * x for name, (_, size), x in zip(names, units, case.allowed.tolist(), strict=True) if size},
         "shape": "" if shaped else _misshapen(found, recording),

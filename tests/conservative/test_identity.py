@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import decimal
 import functools
 import io
 import itertools
@@ -354,6 +355,7 @@ UNKNOWN = {
     "global random numbers": lambda: lambda t: random.random() * t,
     "random numbers of numpy": lambda: lambda t: np.random.rand() * t,  # noqa: NPY002  # on purpose
     "a clock": lambda: lambda t: time.time() * t,
+    "numbers of a precision that the process sets": lambda: lambda t: float(decimal.Decimal(1) / 3) * t,
     "the environment": lambda: lambda t: float(os.environ.get("K", "1")) * t,
     "a file": lambda: lambda t: float(open("k").read()) * t,  # noqa: PTH123, SIM115  # on purpose
     "a file of numbers": lambda: lambda t: np.loadtxt("k") * t,

@@ -150,6 +150,15 @@ print("done")
     assert (made.stdout, made.returncode) == ("done\n", 0), made.stdout + made.stderr[-2000:]
 
 
+def test_a_name_that_is_not_used_is_shown_in_part(tmp_path):
+    path, rows = tmp_path / "run.csv", np.column_stack([T, W])
+    names = "t,w_x,w_y,w_z," + "k" * 150_000
+    path.write_text(names + "\n" + "\n".join(",".join(map(repr, [*row, 0.0])) for row in rows.tolist()))
+    found = verdict.judge(FREE, table.read(path, table.Options(units="rad")), True, None, lambda *_: None)[0]
+    (name,) = found["not used"]
+    assert len(name) < 2000  # 150,000
+
+
 def test_lines_are_read_in_parts_of_bounded_size():
     lines = ["x" * 1000] * 100
     assert [len(part) for part in table._chunks(lines, 40, 10**9)] == [40, 40, 20]
