@@ -132,7 +132,7 @@ API = [
     (lambda: cv.scenes.lagrange_top(height=1e-30), "inertia", "e-", "1e-60"),
     (lambda: Heyoka(tol=1e-99), "tol", "1e-99", "from 1e-20"),
     # resources
-    (lambda: cv.integrate(BRICK, 1e-15), "sample_every", "5999999994000000 steps", "samples fit in memory"),
+    (lambda: cv.integrate(BRICK, 1e-15), "sample_every", "5999999999999995 steps", "samples fit in memory"),
     (lambda: cv.integrate(BRICK, 1e-18), "dt", "6e+18 steps", "6.66e-16 s or more"),
     (lambda: cv.Grid(0.01, 10**12), "every", "1000000000001 samples", "samples fit in memory"),
     (lambda: cv.Grid(0.01, 2**60, 2**60), "n_steps", "1152921504606846976", "2^53"),

@@ -8,8 +8,7 @@ from conservative.benchmarks.gate import baseline
 from conservative.benchmarks.suite import points
 from conservative.integration import store
 from conservative.references.worker import program
-from conservative.reports.run import checkpoint
-from conservative.reports.sections import report
+from conservative.reports.run import checkpoint, measure
 from conservative.scenes.random_body import random_body
 
 from .pages import ROOT
@@ -23,7 +22,7 @@ def test_every_program_has_the_protocol_of_the_page():
 
 
 def test_formats_of_files():
-    assert (store.FORMAT_VERSION, report.SCHEMA, baseline.FORMAT, checkpoint.FORMAT) == (1, 2, 2, 4)
+    assert (store.FORMAT_VERSION, measure.SCHEMA, baseline.FORMAT, checkpoint.FORMAT) == (1, 2, 2, 4)
 
 
 def test_the_baseline_has_the_definitions_of_the_suite():
