@@ -138,7 +138,7 @@ class OfTime(PickledByFields):
     one: ClassVar[str]
     may_jump: ClassVar[bool] = True
     origin: ClassVar[tuple[OfTime, float] | None] = None
-    """The load whose function this one calls, and the unit of time of this one in units of it; None for a function of a user."""
+    """The load whose function this one calls, and the time in it, s, that is 1 here; None for a function of a user."""
 
     def __init__(self, name: str, value: Given, breaks: ArrayLike) -> None:
         columns = "".join(f", {size}" for size in self.shape)
