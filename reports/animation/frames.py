@@ -95,6 +95,16 @@ def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Arr
     return {name: np.maximum.accumulate(value) for name, value in values.items()}
 
 
+def longest(trajectories: Sequence[Trajectory]) -> float:
+    """Return the time, s, up to which the motions can be watched; infinity if all of it."""
+    ends = []
+    for each in [each for each in trajectories if each.ok] or trajectories:
+        turned = np.cumsum(np.diff(each.t) * np.linalg.norm(each.w_WB_B[1:], axis=1))
+        within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # of the angle that `make_panels` takes from a mean rate
+        ends.append(math.inf if within == len(turned) else float(each.t[within]))
+    return max(ends, default=math.inf)
+
+
 def make_panels(
     trajectories: Sequence[Trajectory], labels: Sequence[str], truth: int | None, values: Sequence[Values | None] | None = None
 ) -> tuple[Array, list[Panel]]:

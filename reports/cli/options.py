@@ -267,7 +267,7 @@ class _NotMade(Exception):
 
 
 @contextmanager
-def output_files(out: Path | None, names: Iterable[str], **options: Path | None) -> Iterator[Callable[..., Document]]:
+def output_files(out: Path | None, names: Iterable[str], /, **options: Path | None) -> Iterator[Callable[..., Document]]:
     """Open the output files of a command, so that a place that cannot be written is an error before any work.
 
     Parameters

@@ -15,6 +15,7 @@ from PIL import Image, ImageSequence
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.benchmarks.studies.motion import MOST_FRAMES
 from conservative.errors import BadInput, Diverged
 from conservative.references.exact.method import Exact
 from conservative.reports.animation import MARK, Animation, element, script, video
@@ -162,11 +163,35 @@ def test_watch_writes_a_page_at_the_steps_of_users_and_replaces_its_own_files_on
     assert foreign.read_text() == "<p>of a user</p>"
 
 
-@pytest.mark.parametrize("words", [("--out", "a.avi"), ("--dt", "0"), ("--t-end", "1e4"), ("-m", "lame"), ("--dt", "nan")])
+@pytest.mark.parametrize("words", [("--out", "a.avi"), ("--dt", "0"), ("-m", "lame"), ("--dt", "nan")])
 def test_watch_refuses_before_a_file_exists(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = watch("brick_flip", *words)
     assert done.exit_code == 2, done.output
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["-m", "taylor,exact,lame"], []])
+def test_watch_shows_the_beginning_of_a_motion_that_turns_too_often(words, tmp_path):
+    done = watch("brick_flip", *words, "--t-end", "200", "--out", tmp_path / "a.html", "--json")  # 2,000 rad
+    assert done.exit_code == 0, done.output
+    data, runs = read((tmp_path / "a.html").read_text()), [run for run in json.loads(done.stdout)["runs"] if "dt" in run]
+    assert 0.95 * MOST_FRAMES < data["frames"] <= MOST_FRAMES + 1  # measured 0.99
+    assert all(data["duration"] <= run["t_end"] < data["duration"] + run["dt"] for run in runs)
+    assert runs[0]["error"]["attitude"] < 1e-6
+    done = watch("brick_flip", *words, "--t-end", "200", "--out", tmp_path / "a.html")
+    assert f"Only the first {data['duration']:.3g} s are drawn" in done.stdout
+
+
+def test_watch_prints_its_numbers_if_it_cannot_draw(tmp_path, monkeypatch):
+    def fault(*_):
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(Animation, "render", fault)
+    done = watch("brick_flip", "-m", "reduced,exact", "--t-end", "1", "--out", tmp_path / "a.html", "--json")
+    assert done.exit_code == 1
+    assert "ZeroDivisionError: planted" in done.stderr
+    assert json.loads(done.stdout)["runs"][0]["error"]["attitude"] > 1e-6
     assert list(tmp_path.iterdir()) == []
 
 
