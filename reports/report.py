@@ -14,13 +14,15 @@ from conservative.errors import BadInput, NotWritten
 
 from .document import json
 from .document.attempt import attempt, failed_parts, render_all
-from .document.model import Block, Document, Figure, Motion, Paragraph, Section
+from .document.model import Block, Document, Emphasis, Figure, Motion, Paragraph, Section
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
 from .run.provenance import provenance
 from .terminal.progress import Step, announce
 from .terminal.report_folder import MANIFEST, report_folder
+
+AGAIN = "All measurements are written. After an update of the package, the same command with --resume makes it from them."
 
 
 def render_pages(document: Document, folder: Path) -> None:
@@ -75,7 +77,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
         if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
         raise
-    if not (failed := failed_parts(document.blocks)):
+    if not (failed := list(dict.fromkeys(failed_parts([*document.blocks, *(document.brief or [])])))):
         progress.remove()
     return replace(document, failures=[*document.failures, *failed])
 
@@ -87,31 +89,43 @@ def render(document: Document, folder: Path, png: bool, latex: bool = False) -> 
     """
     from .document import html, markdown, text
 
-    pictures, draw = dict[str, str](), draw_into(folder, png)
+    document, pictures = with_pictures(document, draw_into(folder, png), AGAIN)
+    document, page = render_all(document, html.render, AGAIN)
+    document, words = render_all(document, lambda part: markdown.render(part, lambda figure: pictures[figure.name]), AGAIN)
+    files.write_text(folder / "report.md", words, "out")
+    files.write_text(folder / "index.html", page, "out")
+    if latex:
+        files.write_text(folder / "report.tex", text(document, "latex"), "out")
+    return document
+
+
+def with_pictures(document: Document, draw: Callable[[Figure], str], then: str = "") -> tuple[Document, dict[str, str]]:
+    """Return a document with a sentence in place of what cannot be drawn, and the names of the files of its pictures.
+
+    `then` is a sentence after each of these sentences.
+    """
+    from .document import html
+
+    pictures = dict[str, str]()
 
     def tried(block: Block) -> list[Block]:
         match block:
             case Section():
                 return [replace(block, blocks=[each for part in block.blocks for each in tried(part)])]
             case Motion():
-                made: object = attempt("The animation", lambda: html.motion(block))
+                made: object = attempt("The animation", lambda: html.motion(block), then)
                 return [made if isinstance(made, Paragraph) else block]
             case Figure() if block.picture is not None:
-                file = attempt(f"The picture {block.title!r}", lambda: draw(block))
+                file = attempt(f"The picture {block.title!r}", lambda: draw(block), then)
                 if isinstance(file, str):
                     pictures[block.name] = file
                     return [block]
                 return [file, *([replace(block, picture=None)] if block.panels else [])]
+            case Paragraph(role=Emphasis.FAILED) if then:
+                return [replace(block, text=f"{block.text} {then}")]
         return [block]
 
-    document = replace(document, blocks=[each for part in document.blocks for each in tried(part)])
-    document, page = render_all(document, html.render)
-    document, words = render_all(document, lambda part: markdown.render(part, lambda figure: pictures[figure.name]))
-    files.write_text(folder / "report.md", words, "out")
-    files.write_text(folder / "index.html", page, "out")
-    if latex:
-        files.write_text(folder / "report.tex", text(document, "latex"), "out")
-    return document
+    return replace(document, blocks=[each for part in document.blocks for each in tried(part)]), pictures
 
 
 def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:

@@ -10,10 +10,10 @@ from functools import lru_cache
 
 from conservative.check import positive_integer, positive_number
 from conservative.errors import BadInput
-from conservative.grid import Grid
+from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.truth import Truth, reference
+from conservative.references.truth import Disagreement, Truth, reference
 from conservative.scene import Scene
 
 from ..measures.measurement import Measurement, Samples
@@ -38,8 +38,23 @@ Finding = Measurement | Samples
 
 
 def remember_truths(find: FindTruth = reference) -> FindTruth:
-    """Return `find` with a cache of its last `MOST_TRUTHS` reference solutions, for studies of the same scenes to share."""
-    return lru_cache(maxsize=MOST_TRUTHS)(find)
+    """Return `find` with a cache of its last `MOST_TRUTHS` reference solutions, for studies of the same scenes to share.
+
+    A scene whose solutions disagree, which can take a minute, is not tried again up to that time or a later one.
+    """
+    cached, failed = lru_cache(maxsize=MOST_TRUTHS)(find), dict[Scene, tuple[float, Disagreement]]()
+
+    def remembered(scene: Scene, grid: Grid) -> Truth:
+        end = grid.n_steps * grid.dt
+        if scene in failed and end >= failed[scene][0] * (1 - ROUNDING):
+            raise failed[scene][1].with_traceback(None)
+        try:
+            return cached(scene, grid)
+        except Disagreement as failure:
+            failed[scene] = end, failure
+            raise
+
+    return remembered
 
 
 @dataclass(frozen=True)

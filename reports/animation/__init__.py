@@ -22,6 +22,7 @@ from conservative.trajectory import Trajectory
 
 from .frames import COLOURS, Values, make_panels, speeds
 from .frames import largest_values as largest_values
+from .frames import longest as longest
 
 KINDS = (".html", ".gif", ".mp4", ".png")
 """Endings of files that contain an animation, or its last frame."""

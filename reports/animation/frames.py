@@ -17,6 +17,8 @@ from conservative.invariants import Invariant, sizes
 from conservative.methods.between import attitudes_at
 from conservative.trajectory import Trajectory
 
+from ..numbers import angle, bound
+
 THINNEST = 0.04
 """Shortest side of a box relative to its longest: of a planar body, or of moments that no mass distribution has."""
 MOST = 1e6
@@ -66,12 +68,12 @@ class Panel:
         return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {"sizes": shown}
 
     def text(self, name: str, frame: int) -> tuple[str, str]:
-        """Return the number of a frame in `sizes` with one digit, and its grade."""
+        """Return the number of a frame in `sizes` as tables show it, rounded up, and its grade."""
         value = float(self.sizes[name][frame])
         good, fair = LIMITS.get(name, (1e-10, 1e-3))
         symbol, grade = ("✓", "good") if value <= good else ("≈", "fair") if value <= fair else ("✗", "bad")
-        short = f"{value:.1g}" if 0.01 <= value < 10 else f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
-        return f"{symbol} {short if value >= 1e-15 else '< 1e-15'}", grade
+        shown = angle(value) if name == ERROR else bound(value)
+        return f"{symbol} {shown if value >= 1e-15 else '< 1e-15'}", grade
 
 
 def speeds(duration: float) -> list[float]:
@@ -91,6 +93,16 @@ def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Arr
     if error is not None:
         values[ERROR] = error
     return {name: np.maximum.accumulate(value) for name, value in values.items()}
+
+
+def longest(trajectories: Sequence[Trajectory]) -> float:
+    """Return the time, s, up to which the motions can be watched; infinity if all of it."""
+    ends = []
+    for each in [each for each in trajectories if each.ok] or trajectories:
+        turned = np.cumsum(np.diff(each.t) * np.linalg.norm(each.w_WB_B[1:], axis=1))
+        within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # of the angle that `make_panels` takes from a mean rate
+        ends.append(math.inf if within == len(turned) else float(each.t[within]))
+    return max(ends, default=math.inf)
 
 
 def make_panels(

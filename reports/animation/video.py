@@ -56,7 +56,7 @@ def draw(
         from PIL import Image, ImageColor
 
         inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
-        shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2, (inks + inks[-1]) // 2])  # they blend at their edges
+        shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2])  # edges blend into the background
         palette = Image.new("P", (1, 1))
         palette.putpalette(shades.ravel().tolist())
         first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)

@@ -120,7 +120,7 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
             require_extra("conservative gate --html", "report", "jinja2", "itables")
         with output_files(None, (), **{name: options[name] for name in FILES}) as write:
             answer = _compare(options)
-            write(answer)
+            answer = write(answer)
     show(answer, as_json, silent=True)
 
 

@@ -49,5 +49,5 @@ def importers(
     with output_files(None, (), **outputs) as write:
         with progress() as step:
             document = build(compare_files(files, split_names("engines", engines), step, search))
-        write(document)
+        document = write(document)
     show(document, as_json, silent=True)

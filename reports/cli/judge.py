@@ -94,7 +94,7 @@ def judge(
         def draw(path: Path | None = None) -> bytes:
             return drawing(summary, rows, run.name, path)
 
-        write(document, csv=lambda: table_text(rows), svg=draw, picture=lambda: draw(picture))
+        document = write(document, csv=lambda: table_text(rows), svg=draw, picture=lambda: draw(picture))
     show(document, as_json, silent=True)
     if summary["verdict"] == "undecided":
         raise click.exceptions.Exit(3)

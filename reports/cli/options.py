@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -260,8 +262,12 @@ allow_build_option = click.option(
 )
 
 
+class _NotMade(Exception):
+    """A file has no content."""
+
+
 @contextmanager
-def output_files(out: Path | None, names: Iterable[str], **options: Path | None) -> Iterator[Callable[..., None]]:
+def output_files(out: Path | None, names: Iterable[str], /, **options: Path | None) -> Iterator[Callable[..., Document]]:
     """Open the output files of a command, so that a place that cannot be written is an error before any work.
 
     Parameters
@@ -275,24 +281,39 @@ def output_files(out: Path | None, names: Iterable[str], **options: Path | None)
     ------
     Callable
         Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
-        given to it as functions without arguments, such as `csv=...`, which return a text or bytes.
+        given to it as functions without arguments, such as `csv=...`, which return a text or bytes. They are called last, and
+        a file that cannot be made leaves the others: it keeps its content, and the returned document has the failure.
     """
     from conservative.files import make_folder, text_file
 
     from ..document import text
+    from ..document.attempt import attempt
+    from ..document.model import Paragraph
 
     places = {option: (path, option) for option, path in options.items() if path is not None}
     if out is not None:
         make_folder(out, "out")
         places |= {name: (out / name, "out") for name in names}
     with ExitStack() as stack:
-        streams = {name: stack.enter_context(text_file(*place)) for name, place in places.items()}
+        opened = {}
+        for name, place in places.items():
+            context = stack.enter_context(ExitStack())
+            opened[name] = context, context.enter_context(text_file(*place))
 
-        def write(document: Document, **others: Callable[[], str | bytes]) -> None:
-            for name, stream in streams.items():
-                kind = name.rpartition(".")[2]
-                made = others[kind]() if kind in others else text(document, kind)
-                stream.buffer.write(made.encode() if isinstance(made, str) else made)
+        def write(document: Document, **others: Callable[[], str | bytes]) -> Document:
+            failures = list(document.failures)
+            for name in sorted(opened, key=lambda name: name.rpartition(".")[2] in others):
+                (context, stream), kind = opened[name], name.rpartition(".")[2]
+                make = others.get(kind) or partial(text, document, kind)
+                made = attempt(f"The file {str(places[name][0])!r}", make)
+                if isinstance(made, Paragraph):
+                    failures.append(made.text)
+                    with suppress(_NotMade), context:
+                        raise _NotMade  # closes the file, which keeps its content
+                else:
+                    with context:  # on the disk before the next one is drawn
+                        stream.buffer.write(made.encode() if isinstance(made, str) else made)
+            return replace(document, failures=failures)
 
         yield write
 

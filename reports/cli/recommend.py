@@ -89,5 +89,5 @@ def recommend(
         with output_files(out, FILES, picture=picture) as write:
             recommendation = answer(question, step)
             document = build(recommendation, scene, verbose)
-            write(document, svg=draw, picture=lambda: draw(picture))
+            document = write(document, svg=draw, picture=lambda: draw(picture))
     show(document, as_json)

@@ -97,7 +97,7 @@ def run(
     with output_files(out, FILES, **files) as write, waiting as step:
         summaries, trajectory = work.run_methods(scene, names, dt, t_end, truth, step, error)
         document = build(summaries)
-        write(
+        document = write(
             document,
             csv=lambda: work.csv_text(trajectory),
             parquet=lambda: work.parquet_bytes(trajectory),

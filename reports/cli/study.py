@@ -100,9 +100,10 @@ def study(
     A report consists of the same studies.
     """
     require_extra("conservative study", "report")
+    from ..document.attempt import failed_parts
     from ..document.markdown import render
     from ..document.model import without_figures
-    from ..report import draw_into
+    from ..report import draw_into, with_pictures
     from ..run.provenance import provenance
     from ..run.single_study import measure_study, plan_study
     from ..sections.study import build
@@ -122,11 +123,17 @@ def study(
         with progress() as step:
             measured = measure_study(planned, step, scheduler)
         document = build(name, measured, made)
-        folder = out or Path()  # not used without --out
-        write(
+        failed = failed_parts(document.blocks)
+
+        def page() -> str:
+            drawn, pictures = with_pictures(document, draw_into(out or Path(), png=True))
+            failed[:] = failed_parts(drawn.blocks)
+            return render(drawn, lambda figure: pictures[figure.name])
+
+        written = write(
             document,
             csv=lambda: measured.table.to_csv(index=False, lineterminator="\n"),
-            md=lambda: render(document, draw_into(folder, png=True)),
             markdown=lambda: render(replace(document, blocks=without_figures(document.blocks))),
+            md=page,
         )
-    show(document, as_json)
+    show(replace(written, failures=[*written.failures, *failed]), as_json)

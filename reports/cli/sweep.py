@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from .options import (
     json_option,
     methods_option,
     option,
+    output_files,
     picture_file,
     picture_option,
     scene_argument,
@@ -97,7 +98,6 @@ def sweep(
     percentage is relative to the scene's value, or to the length of a vector. The same seed gives the same bodies.
     """
     require_extra("conservative sweep", "report")
-    from conservative.files import text_file
     from conservative.integration.cluster import open_client
 
     from ..run import sweep as work
@@ -109,18 +109,17 @@ def sweep(
     if len(names := split_names("methods", methods)) > 1:
         raise BadInput("methods", ", ".join(names), "one method")
     varied = work.read_spread(split_list("spread", spread))
-    with ExitStack() as stack:
-        # first, as a place that cannot be written is an error before any work
-        drawing = stack.enter_context(text_file(picture, "picture")) if picture else None
-        client = stack.enter_context(open_client(scheduler)) if scheduler is not None else None
+    with (
+        output_files(None, (), picture=picture) as write,
+        open_client(scheduler) if scheduler is not None else nullcontext() as client,
+    ):
         planned = work.plan(scene, starts, varied, method=names, path=out, client=client, **options)
         if out is not None:
             click.echo(f"Writing {planned.size} to {out}: {starts:,} bodies, {planned.samples} samples each", err=True)
         with progress() as step:
             ensemble, times = work.run_sweep(planned, step)
             step(1.0, "summary and picture")
-            if drawing is not None:
-                drawing.buffer.write(picture_file(ensemble.plot(), picture))
             summary = work.summarize(planned, ensemble, times)
-    summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
-    show(build(summary), as_json)
+            summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
+            document = write(build(summary), picture=lambda: picture_file(ensemble.plot(), picture))
+    show(document, as_json)

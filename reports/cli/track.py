@@ -111,5 +111,5 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         with progress() as step:
             found = twin_changes([(side.version.name, side.methods) for side in sides], step) if options["twins"] else None
         answer = build(compared, against is not None, made, found)
-        write(answer)
+        answer = write(answer)
     show(answer, as_json, silent=True)

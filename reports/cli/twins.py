@@ -69,7 +69,7 @@ def twins(
         with progress() as step:
             results = list(compare_methods(methods, step, chosen))
         document = build(results, made)
-        write(document)
+        document = write(document)
         for method, found in results:
             if scripts and (text := script_of(method, found)):
                 make_folder(scripts, "scripts")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,12 +19,17 @@ from .options import (
     json_option,
     methods_option,
     option,
+    output_files,
     scene_argument,
     show,
     split_names,
     t_end_option,
     target_option,
 )
+
+if TYPE_CHECKING:
+    from conservative.grid import Grid
+    from conservative.trajectory import Trajectory
 
 
 @click.command(
@@ -72,10 +80,9 @@ def watch(
     --methods and --dt, the motion is accurate to 1e-6 rad.
     """
     from conservative import registry
-    from conservative.files import text_file
     from conservative.method import Role
 
-    from ..animation import KINDS, Animation, largest_values
+    from ..animation import KINDS, Animation, largest_values, longest
     from ..document.model import Block, Document, Items, Paragraph
     from ..run import single_run as work
     from ..terminal.progress import progress
@@ -84,17 +91,25 @@ def watch(
         raise BadInput("out", repr(str(out)), f"a file that ends in {', '.join(KINDS)}")
     body, names = registry.scene(scene), split_names("methods", methods)
     target = work.read_error(error, dt, names)
-    planned = work.plan_runs(body, names, dt, t_end, usual=True) if target is None else []
+
+    def integrate(planned: list[work.Planned], t_end: float | None) -> list[tuple[Trajectory, Grid]]:
+        made = [] if target is None else [work.run_chosen(body, target, dt, t_end)]
+        for each in planned:
+            tell(0.4 * len(made) / len(planned), each.typed)
+            made.append((work.run_on(body, each.method, each.grid), each.grid))
+        return made
+
+    plan = partial(work.plan_runs, body, names, dt, usual=True)
+    planned, drawn, part = [] if target else plan(t_end), [], ""
     shown = [each for each in planned if not each.refusal]
     data = [each.refused(body) for each in planned if each.refusal]
-    runs, drawn = [], []
-    with text_file(out, "out") as stream, progress() as tell:
+    with output_files(None, (), out=out) as write, progress() as tell:
         tell(0.0, "choosing a method" if target else shown[0].typed)
-        if target is not None:
-            runs = [work.run_chosen(body, target, dt, t_end)]
-        for each in shown:
-            tell(0.4 * len(runs) / len(shown), each.typed)
-            runs.append((work.run_on(body, each.method, each.grid), each.grid))
+        runs = integrate(shown, t_end)
+        if (end := longest([run for run, _ in runs if len(run)])) < math.inf:
+            part = f" Only the first {end:.3g} s are drawn, because the body turns too often."
+            shown = [each for each in plan(end) if not each.refusal] if shown else []
+            runs = integrate(shown, end)
         truth = next((run for each, (run, _) in zip(shown, runs, strict=False) if each.method.role == Role.TRUTH), None)
         for number, (run, grid) in enumerate(runs):
             tell(0.4 + 0.2 * number / len(runs), "errors")
@@ -112,10 +127,13 @@ def watch(
             raise failure
         motions, labels, values = zip(*drawn, strict=True)
         outline = next((number for number, run in enumerate(motions) if run is truth), None)
-        drawing = Animation(motions, labels, outline, values)
-        stream.buffer.write(drawing.render(out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing")))
+        draw = partial(
+            Animation(motions, labels, outline, values).render, out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing")
+        )
+        lost = write(Document("conservative watch", body.name, []), out=draw).failures
     notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != "ok"]
     failures = [] if any(run.ok for run, _ in runs) else [f"{run.label} on {body.name}: {run.outcome}" for run, _ in runs]
-    text = Paragraph(f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html"))
-    blocks: list[Block] = [text, *([Items.of(notes)] if notes else [])]
-    show(Document("conservative watch", body.name, blocks, data={"out": str(out), "runs": data}, failures=failures), as_json)
+    where = "" if lost else f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html")
+    blocks: list[Block] = [Paragraph(f"{where}{part}".strip()), *([Items.of(notes)] if notes else [])]
+    content = {"out": str(out), "runs": data}
+    show(Document("conservative watch", body.name, blocks, data=content, failures=[*lost, *failures]), as_json)

@@ -11,18 +11,20 @@ from conservative.errors import BadInput, NotWritten
 from .model import Block, Document, Emphasis, Paragraph, Section, walk
 
 T = TypeVar("T")
-AGAIN = "All measurements are written. After an update of the package, the same command with --resume makes it from them"
 
 
-def attempt(what: str, make: Callable[[], T]) -> T | Paragraph:
-    """Return what a function makes, or the sentence that it failed. Files that cannot be written raise `NotWritten`."""
+def attempt(what: str, make: Callable[[], T], then: str = "") -> T | Paragraph:
+    """Return what a function makes, or the sentence that it failed, followed by the sentence `then`.
+
+    Files that cannot be written raise `NotWritten`.
+    """
     try:
         return make()
     except NotWritten:
         raise
     except Exception as error:  # a mistake in one drawing must not cost an hour of measurements
         reason = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
-        return Paragraph(f"{what} could not be made ({reason}). {AGAIN}.", Emphasis.FAILED)
+        return Paragraph(f"{what} could not be made ({reason}). {then}".strip(), Emphasis.FAILED)
 
 
 def failed_parts(blocks: Iterable[Block]) -> list[str]:
@@ -30,7 +32,7 @@ def failed_parts(blocks: Iterable[Block]) -> list[str]:
     return [block.text for block in walk(blocks) if isinstance(block, Paragraph) and block.role is Emphasis.FAILED]
 
 
-def render_all(document: Document, render: Callable[[Document], str]) -> tuple[Document, str]:
+def render_all(document: Document, render: Callable[[Document], str], then: str = "") -> tuple[Document, str]:
     """Return a document as a text, with a sentence in place of each block that cannot be rendered, and that document."""
     text = attempt("The page", lambda: render(document))
     if isinstance(text, str):
@@ -38,7 +40,7 @@ def render_all(document: Document, render: Callable[[Document], str]) -> tuple[D
 
     def mend(block: Block) -> Block:
         name = f"The section {block.title!r}" if isinstance(block, Section) else f"A part of the page, {type(block).__name__},"
-        alone = attempt(name, lambda: render(replace(document, blocks=[block], pages={})))
+        alone = attempt(name, lambda: render(replace(document, blocks=[block], pages={})), then)
         if isinstance(alone, str):
             return block
         return replace(block, blocks=list(map(mend, block.blocks))) if isinstance(block, Section) and block.blocks else alone

@@ -7,34 +7,18 @@ from collections.abc import Sequence
 
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.presentation import rounded_up
 
+from ..numbers import DASH as DASH
+from ..numbers import angle as angle
+from ..numbers import bound as bound
+from ..numbers import number as number
+from ..numbers import short_power
 from .model import Cell, Grade
 
-DASH = "–"
 SPREAD = 0.05
 """Relative uncertainty of a ratio of times from one process."""
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
 _DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED, OutcomeKind.NOT_CONSERVED)
-
-
-def number(value: float, digits: int = 2) -> str:
-    """Return a number to `digits` significant digits, a dash for NaN."""
-    if math.isnan(value):
-        return DASH
-    plain = value == 0 or 0.01 <= abs(value) < 1e6
-    return f"{float(f'{value:.{digits}g}'):,g}" if plain else _power(f"{value:.{digits - 1}e}")
-
-
-def bound(value: float, digits: int = 2) -> str:
-    """Return a size that a motion stays within, such as an error or a drift: rounded up to `digits` digits, never down."""
-    return number(rounded_up(value, digits), digits)
-
-
-def angle(value: float, digits: int = 2) -> str:
-    """Return an attitude error, rad, rounded up, with more digits if it would be above π, the largest possible one."""
-    texts = (bound(value, more) for more in range(digits, digits + 3))
-    return next((text for text in texts if not math.isfinite(value) or value > math.pi or float(text) <= math.pi), "π")
 
 
 def listed(names: Sequence[str]) -> str:
@@ -45,13 +29,7 @@ def listed(names: Sequence[str]) -> str:
 
 def tolerance(value: float) -> str:
     """Return a power of ten, such as `1e-3`."""
-    return _power(f"{value:.0e}")
-
-
-def _power(text: str) -> str:
-    """Return a number with a short exponent: `1e-3` for `1e-03`."""
-    mantissa, _, exponent = text.partition("e")
-    return f"{mantissa}e{int(exponent)}" if exponent else text
+    return short_power(f"{value:.0e}")
 
 
 def factor(ratio: float, digits: int = 2) -> str:

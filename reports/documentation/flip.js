@@ -54,10 +54,18 @@ for (const page of document.querySelectorAll(".flip")) {
     values.map((each, k) => [k, text(each), grade(each)]).filter((each, k, all) => !k || each[1] !== all[k - 1][1]);
   const share = (each) => `${Math.round(100 * each)} %`;
   const shares = (values) => sizes(values.map((each) => each / values[0]), share, (each) => (abs(each - 1) < 0.005 ? "good" : "bad"));
+  const rounded = (value, digits) => { // up, of the 15 digits that a number has for certain: as rounded_up in presentation.py
+    const [all, power] = value.toExponential(14).replace(".", "").split("e");
+    return Number(`${Number(all.slice(0, digits)) + /[1-9]/.test(all.slice(digits))}e${power - digits + 1}`);
+  };
+  const angle = (error) => { // as in reports/numbers.py
+    const digits = [2, 3, 4].find((each) => rounded(error, each) <= Math.PI), up = rounded(error, digits ?? 4);
+    return !digits ? "π" : up && up < 0.01 ? up.toExponential(digits - 1) : `${up}`;
+  };
   const grade = (error) => (error < 1e-3 ? "good" : error < 0.1 ? "fair" : "bad"); // as LIMITS in reports/animation/frames.py
   const largest = (values) => {
     let top = 0;
-    return sizes(values.map((each) => (top = Math.max(top, each))), (each) => `${Number(each.toPrecision(1))}`, grade);
+    return sizes(values.map((each) => (top = Math.max(top, each))), angle, grade);
   };
 
   function compute(length, rate, disturbance) {

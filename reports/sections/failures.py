@@ -17,7 +17,7 @@ from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outco
 def section(table: pd.DataFrame) -> Section:
     """Return the section of the rows of a report that are not apart (see `Measured.scene_rows`)."""
     words = (
-        "Runs that did not reach their end, and runs that were skipped because they would have exceeded `--time-limit`. "
+        "Runs that did not reach their end, and runs that were skipped, such as those that would have exceeded `--time-limit`. "
         "Errors are relative to a reference solution that a second, independent one confirms."
     )
     absent = Section("Unsupported or not installed", filled(unsupported(table)), folded=True)
@@ -26,14 +26,16 @@ def section(table: pd.DataFrame) -> Section:
 
 
 def failures(table: pd.DataFrame) -> Table:
-    """Return the runs that failed or were skipped."""
+    """Return the runs that failed or were skipped, with the first reason of each study."""
     rows = without_outcome(table, OutcomeKind.OK, OutcomeKind.NO_ORDER, *ABSENT)
     rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
     body = []
     for key, members in rows.groupby(["scene", "name", "text"], sort=False):
         steps = sorted(members["dt"].dropna().unique(), reverse=True)
-        body.append([*map(str, key), ", ".join(members["study"].unique()), ", ".join(f"{step:.3g}" for step in steps) or DASH])
-    header = ["scene", "method", "outcome", "studies", "at steps, s"]
+        skipped = members[members["outcome"] == OutcomeKind.SKIPPED].drop_duplicates("study")
+        reasons, studies = "; ".join(skipped["reason"].unique()), ", ".join(members["study"].unique())
+        body.append([*map(str, key), reasons, studies, ", ".join(f"{step:.3g}" for step in steps) or DASH])
+    header = ["scene", "method", "outcome", "reason", "studies", "at steps, s"]
     return Table(header, body, "Runs that failed or were skipped", Style.FILTERED)
 
 

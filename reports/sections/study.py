@@ -12,6 +12,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, random, work_precision
 from conservative.outcome import OutcomeKind
 
+from ..document.attempt import attempt
 from ..document.cells import DASH, number
 from ..document.model import Block, Document, Facts, Figure, Paragraph, Row, Section, Table, filled
 from ..rows import lines
@@ -24,22 +25,33 @@ from .report import SECTIONS
 
 
 def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:
-    """Return the document of a study, measured as `made` says: ratios of random bodies, costs of many bodies, or its rows."""
+    """Return the document of a study, measured as `made` says: ratios of random bodies, costs of many bodies, or its rows.
+
+    If what is special to the study cannot be made, its rows are shown.
+    """
     data: dict[str, Any] = {"study": name, **made}
     named = with_names(measured.table)
-    shown: list[Block]
-    if name == random.STUDY.name:
+
+    def of_random_bodies() -> list[Block]:
         ratios = random_bodies.ratios(named)
         sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
         picture = random_bodies.figure(ratios, named["body"].nunique(), int(named["seed"].max()))
-        shown = filled(picture, random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence)
-        terms = random_bodies.TERMS
         data["ratios"] = random_bodies.records(ratios)
-    elif name in SECTIONS:
+        return filled(picture, random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence)
+
+    def of_section() -> list[Block]:
         part = SECTIONS[name].section(named, with_names(measured.samples))
-        shown, terms = [block for block in part.blocks if isinstance(block, Table | Section | Figure)], SECTIONS[name].TERMS
+        return [block for block in part.blocks if isinstance(block, Table | Section | Figure)]
+
+    own: list[Block] | Paragraph
+    if name == random.STUDY.name:
+        own, terms = attempt("The ratios", of_random_bodies), random_bodies.TERMS
+    elif name in SECTIONS:
+        own, terms = attempt("The section", of_section), SECTIONS[name].TERMS
     else:
-        shown, terms = [*pictures(name, named), rows_table(name, named)], ""
+        drawn = attempt("The charts", lambda: pictures(name, named))
+        own, terms = [*([drawn] if isinstance(drawn, Paragraph) else drawn), rows_table(name, named)], ""
+    shown: list[Block] = [own, rows_table(name, named)] if isinstance(own, Paragraph) else own
     data |= {"rows": records(measured.table), "samples": records(measured.samples)}
     origin = Section("How this was made", [Facts(list(made.items()))])
     blocks = filled(Paragraph(terms) if terms else None, *shown, origin)

@@ -1,4 +1,5 @@
 import math
+from contextlib import nullcontext
 from functools import cache
 
 import pytest
@@ -10,7 +11,7 @@ from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
-from conservative.benchmarks.studies.study import Study
+from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
@@ -156,6 +157,22 @@ def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
     kinds = {(row.scene, row.outcome.kind) for row in found}
     assert {scene for scene, kind in kinds if kind in (OutcomeKind.OK, OutcomeKind.NO_ORDER)} >= {"first", SCENE.name}
     assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
+
+
+def test_a_disagreement_is_found_once():
+    asked = []
+
+    def find(scene, grid):
+        asked.append(grid.t[-1])
+        if scene is SCENE and grid.t[-1] > 1:
+            raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
+        return truth(scene, grid)
+
+    remembered, other = remember_truths(find), SCENE.rename("other")
+    for scene, end in ((SCENE, 2.0), (SCENE, 2.0), (SCENE, 3.0), (SCENE, 0.5), (other, 2.0)):
+        with pytest.raises(Disagreement) if scene is SCENE and end > 1 else nullcontext():
+            assert remembered(scene, cv.Grid(end / 10, 10)).trajectory.ok
+    assert asked == [2.0, 0.5, 2.0]
 
 
 def test_a_bug_of_our_own_is_not_an_outcome():

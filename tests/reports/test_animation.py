@@ -15,12 +15,14 @@ from PIL import Image, ImageSequence
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.benchmarks.studies.motion import MOST_FRAMES
 from conservative.errors import BadInput, Diverged
 from conservative.references.exact.method import Exact
 from conservative.reports.animation import MARK, Animation, element, script, video
 from conservative.reports.animation.frames import COLOURS, ERROR, FACES, THINNEST, make_panels
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import HEAD
+from conservative.reports.numbers import angle, bound
 
 from ..pages import ROOT
 
@@ -46,8 +48,8 @@ def exact(times):
 
 def test_frames_of_different_steps_are_the_motion_at_the_times_of_one_clock(motions):
     times, panels = make_panels(motions, ["a", "b", "c"], None)
-    for panel, bound in zip(panels, (7e-4, 1e-6, 2e-5), strict=True):  # measured 6.5e-4 (the method's error), 8e-7, 1.3e-5 rad
-        assert angle_between(exact(times) @ BODY.R_BP, panel.R_WP).max() < bound
+    for panel, most in zip(panels, (7e-4, 1e-6, 2e-5), strict=True):  # measured 6.5e-4 (the method's error), 8e-7, 1.3e-5 rad
+        assert angle_between(exact(times) @ BODY.R_BP, panel.R_WP).max() < most
         np.testing.assert_allclose(np.linalg.norm(panel.L_W, axis=1), 1, atol=1e-14)  # measured 7e-16
     sides = panels[0].size
     moments = (sides**2).sum() - sides**2  # of a box: m/12 (b^2 + c^2)
@@ -62,6 +64,17 @@ def test_attitude_errors_do_not_depend_on_the_steps_of_the_truth(motions, truth)
     assert ERROR not in panels[truth].sizes
     for values in panels[0].sizes.values():  # the largest so far
         assert (np.diff(values) >= 0).all()
+
+
+def test_a_number_of_a_panel_is_never_below_its_value(motions):
+    _, (panel, *_) = make_panels(motions, ["a", "b", "c"], 1)
+    turned = replace(panel, sizes={ERROR: np.append(panel.sizes[ERROR], [3.12, 3.1415])})  # at most π, in the digits it takes
+    for each in (panel, turned):
+        for name, values in each.sizes.items():
+            for frame, value in enumerate(values[values >= 1e-15]):
+                shown = float(each.text(name, frame + np.sum(values < 1e-15))[0].split()[1].replace("π", str(np.pi)))
+                assert value * (1 - 1e-14) <= shown <= min(value * 1.1, np.pi if name == ERROR else np.inf)
+    assert len(panel.sizes) == 3
 
 
 def test_the_data_of_a_page_is_the_motion(motions):
@@ -141,8 +154,8 @@ def test_watch_writes_a_page_at_the_steps_of_users_and_replaces_its_own_files_on
     run = cv.integrate(registry.scene("brick_flip"), 0.002, registry.method("mujoco:Euler"), 2.0)
     wanted = [abs(run.drift("energy")).max(), run.error(cv.integrate(run.scene, 0.002, Exact(), 2.0)).max()]  # 0.019, 0.06 rad
     energy, _, error = (values[-1] for values in data["panels"][0]["sizes"])
-    assert energy[1:] == [f"✗ {wanted[0]:.1g}", "bad"]
-    assert error[1:] == [f"≈ {wanted[1]:.1g}", "fair"]
+    assert energy[1:] == [f"✗ {bound(wanted[0])}", "bad"]
+    assert error[1:] == [f"≈ {angle(wanted[1])}", "fair"]
     assert watch("brick_flip", "--t-end", "1", "--out", out).exit_code == 0  # its own file
     foreign = tmp_path / "foreign.html"
     foreign.write_text("<p>of a user</p>")
@@ -150,11 +163,35 @@ def test_watch_writes_a_page_at_the_steps_of_users_and_replaces_its_own_files_on
     assert foreign.read_text() == "<p>of a user</p>"
 
 
-@pytest.mark.parametrize("words", [("--out", "a.avi"), ("--dt", "0"), ("--t-end", "1e4"), ("-m", "lame"), ("--dt", "nan")])
+@pytest.mark.parametrize("words", [("--out", "a.avi"), ("--dt", "0"), ("-m", "lame"), ("--dt", "nan")])
 def test_watch_refuses_before_a_file_exists(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = watch("brick_flip", *words)
     assert done.exit_code == 2, done.output
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["-m", "taylor,exact,lame"], []])
+def test_watch_shows_the_beginning_of_a_motion_that_turns_too_often(words, tmp_path):
+    done = watch("brick_flip", *words, "--t-end", "200", "--out", tmp_path / "a.html", "--json")  # 2,000 rad
+    assert done.exit_code == 0, done.output
+    data, runs = read((tmp_path / "a.html").read_text()), [run for run in json.loads(done.stdout)["runs"] if "dt" in run]
+    assert 0.95 * MOST_FRAMES < data["frames"] <= MOST_FRAMES + 1  # measured 0.99
+    assert all(data["duration"] <= run["t_end"] < data["duration"] + run["dt"] for run in runs)
+    assert runs[0]["error"]["attitude"] < 1e-6
+    done = watch("brick_flip", *words, "--t-end", "200", "--out", tmp_path / "a.html")
+    assert f"Only the first {data['duration']:.3g} s are drawn" in done.stdout
+
+
+def test_watch_prints_its_numbers_if_it_cannot_draw(tmp_path, monkeypatch):
+    def fault(*_):
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(Animation, "render", fault)
+    done = watch("brick_flip", "-m", "reduced,exact", "--t-end", "1", "--out", tmp_path / "a.html", "--json")
+    assert done.exit_code == 1
+    assert "ZeroDivisionError: planted" in done.stderr
+    assert json.loads(done.stdout)["runs"][0]["error"]["attitude"] > 1e-6
     assert list(tmp_path.iterdir()) == []
 
 
@@ -228,7 +265,7 @@ def test_watch_writes_the_last_frame_and_replaces_its_own(tmp_path):
 def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():
     file = ROOT / "reports" / "pictures" / "brick_flip.gif"
     assert MARK.encode() in file.read_bytes()[:HEAD]
-    assert file.stat().st_size < 1e6  # 971 kB
+    assert file.stat().st_size < 1e6  # 946 kB
     images = read_frames(file)
     last = [counts(part) for part in np.split(images[-1], 4, axis=1)]
     shown = [[each.get(colour, 0) for colour in FACES] for each in last]

@@ -91,7 +91,7 @@ def test_it_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(browser):
 def test_numbers_are_the_largest_so_far_with_their_colours(browser):
     at(browser, 6)
     assert values(browser) == [
-        ["✗ 0.04", "bad"], ["✗ 0.02", "bad"], ["✗ 0.6", "bad"], ["✓ < 1e-15", "good"], ["✓ < 1e-15", "good"],
+        ["✗ 0.04", "bad"], ["✗ 0.021", "bad"], ["✗ 0.64", "bad"], ["✓ < 1e-15", "good"], ["✓ < 1e-15", "good"],
     ]  # fmt: skip
     at(browser, 0)
     assert {name for _, name in values(browser)} == {"good"}
@@ -144,6 +144,6 @@ def test_without_webgl_a_sentence_says_so_and_the_numbers_remain(page, tmp_path)
         assert "WebGL" in browser.find_element("css selector", ".missing").text
         assert not browser.find_element("css selector", "canvas").is_displayed()
         browser.execute_script("const s = document.querySelector('.time'); s.value = 6; s.dispatchEvent(new Event('input'))")
-        assert values(browser)[2] == ["✗ 0.6", "bad"]
+        assert values(browser)[2] == ["✗ 0.64", "bad"]
     finally:
         browser.quit()

@@ -10,6 +10,7 @@ import conservative as cv
 from conservative.references.exact.method import Exact
 from conservative.reports.documentation import flip
 from conservative.reports.documentation.site import HERE
+from conservative.reports.numbers import angle
 
 from .test_animation_in_browser import WEBGL, at
 from .test_page_in_browser import load_axe, requests, start, wait
@@ -91,6 +92,20 @@ def test_the_motion_that_loses_energy_is_that_of_implicit_euler(browser, name):
     ).magnitude().max() < 1e-6  # measured 7e-8, near the separatrix
     assert np.abs(L - momenta).max() < 1e-6  # measured 5e-8
     assert np.linalg.norm(L[-1]) < 0.995  # measured 0.991: it loses
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_error_has_the_text_of_tables_and_is_the_largest_so_far(browser, name):
+    _, q, _, losing, _ = moved(browser, *SETTINGS[name])
+    largest = np.maximum.accumulate((Rotation.from_quat(q).inv() * Rotation.from_quat(losing)).magnitude())
+    (sizes,) = browser.execute_script("return document.querySelector('.motion').content.panels[2].sizes")
+    sizes = {frame: text for frame, text, _ in sizes}
+    assert len(sizes) > 30  # measured 83 to 139
+    shown = [sizes[max(frame for frame in sizes if frame <= n)] for n in range(len(q))]
+    others = [(text, value) for text, value in zip(shown, largest, strict=True) if text != angle(value)]
+    assert [pair for pair in others if pair[0] not in (angle(pair[1] - 1e-9), angle(pair[1] + 1e-9))] == []
+    assert len(others) <= 2  # whose last digit is round-off, as that of 0
 
 
 @pytest.mark.browser

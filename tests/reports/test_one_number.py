@@ -103,7 +103,7 @@ def test_tables_of_the_scene_and_of_the_terminal(said):
     values = rows[rows["dt"] == DT].groupby("study")["value"].first()
     assert set(values.index) == {"motion", "paper"}
     assert all(close(value, error) for value in values)
-    terminal = closing.scene_table(measured.rows, measured.points, scene.name)
+    terminal = closing.scene_table(measured.rows, measured.points, scene)
     assert any(shown(row[3], error) for row in terminal.rows)
     accuracy = scenes.accuracy(measured.rows, scene.name)
     assert any(close(row[1].value, error) for row in accuracy.rows)

@@ -14,6 +14,7 @@ from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.benchmarks.studies import selection, studies
 from conservative.benchmarks.studies.throughput import QUICK_BODIES
 from conservative.methods.gauss import Gauss
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
@@ -277,3 +278,10 @@ def test_provenance_has_command_version_and_commit():
     assert found.command == "conservative report --out 'a b'"
     assert Reduced().label.partition("/")[0] == f"conservative=={found.compared['conservative-rotation']}"
     assert re.fullmatch(r"([0-9a-f]{40}(\+changes)?)|unknown", found.commit)
+
+
+def test_a_run_that_was_skipped_has_its_reason():
+    outcome = Outcome(OutcomeKind.SKIPPED, "no reference solution: they differ")
+    rows = [row(study, "reduced", "energy drift max", float("nan"), outcome=outcome) for study in ("paper", "motion")]
+    (shown,) = failures.failures(frame(rows)).rows
+    assert [str(each) for each in shown] == ["made_up", "reduced", "skipped", outcome.reason, "paper, motion", "0.1"]
