@@ -46,7 +46,7 @@ def _warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     if not scene.loads or method.order is None:
         return
     if grid.dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:]), stacklevel=4)
+        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:3]), stacklevel=4)
     for load in scene.loads:
         if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
             warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)
