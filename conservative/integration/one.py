@@ -37,11 +37,11 @@ def require_support(method: Method, scene: Scene) -> None:
 
 def warn_of_steps(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if the steps of a grid are too long for a load or for the rotation of a rod; see `integrate`."""
-    _warn_of_loads(scene, method, grid)
+    warn_of_loads(scene, method, grid)
     _warn_of_rods(scene, method, grid.dt)
 
 
-def _warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
+def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
     if not scene.loads or method.order is None:
         return
