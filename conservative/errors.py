@@ -209,14 +209,15 @@ class AccuracyNotReached(UserWarning):
 
     def __init__(self, error: float, estimate: float, rounding: float = math.nan, rough: float | None = None) -> None:
         self.error, self.estimate, self.rounding, self.rough = error, estimate, rounding, rough
-        cause = "Shorter steps were not tried or did not help"
-        if rounding >= error / 2:
-            cause = f"Rounding the numbers of the scene alone changes this motion by {rounding:.2g} rad"
-        elif rough is not None:
-            cause = (
+        causes = []
+        if rough is not None:
+            causes.append(
                 f"A function of the scene is not smooth: near t = {rough:.6g} s errors do not fall as the order of the method "
                 "says. If it jumps or has a corner at known times, declare them: breaks=(...)"
             )
+        if rounding >= error / 2:
+            causes.append(f"Rounding the numbers of the scene alone changes this motion by {rounding:.2g} rad")
+        cause = ". ".join(causes or ["Shorter steps were not tried or did not help"])
         super().__init__(
             f"The error of {error:g} rad is not reached; {estimate:.2g} rad is estimated. {cause}. "
             "Ask for a larger error or a shorter t_end"

@@ -152,13 +152,16 @@ class Choice:
     Attributes
     ----------
     method, dt
-        The `Method` of the trajectory and its step size, s.
+        The `Method` of the trajectory and its step size, s. The steps of a method with a tolerance have any length; its dt is
+        the distance of samples.
     error
         Requested attitude error over the run, rad.
     estimate
-        Estimated attitude error over the run, rad, from the same run with twice the step size and one from a rounded start.
+        Estimated attitude error over the run, rad, from the same run with twice the step size or a larger tolerance, and one
+        from a rounded start.
     attempts
-        Step sizes of runs over the whole duration, s, and their estimates, rad.
+        Step sizes, s, of runs over the whole duration, and their estimates, rad; of runs with a tolerance the distance of
+        samples.
     """
 
     method: Any  # a `Method`; its file imports this one

@@ -37,16 +37,16 @@ def require_support(method: Method, scene: Scene) -> None:
 
 def warn_of_steps(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if the steps of a grid are too long for a load or for the rotation of a rod; see `integrate`."""
-    _warn_of_loads(scene, method, grid)
+    warn_of_loads(scene, method, grid)
     _warn_of_rods(scene, method, grid.dt)
 
 
-def _warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
+def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
     if not scene.loads or method.order is None:
         return
     if grid.dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:]), stacklevel=4)
+        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:3]), stacklevel=4)
     for load in scene.loads:
         if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
             warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)

@@ -90,8 +90,13 @@ def pick_hardest(bodies: Batch) -> list[int]:
 
 def find_worst(bodies: Batch, numbers: Sequence[int], method: Method, grid: Grid) -> tuple[Estimate, int]:
     """Return the estimate with the largest total error among the bodies of these numbers, and its number; 0 and -1 if none."""
-    estimates = ((trials_of(bodies.take(i)).estimate(method, grid, sensitivity=True)[0], i) for i in numbers)
-    return max(estimates, key=lambda pair: pair[0].total, default=(Estimate(0.0, 0.0), -1))
+    worst = Estimate(0.0, 0.0), -1
+    for i in numbers:
+        estimate, _ = trials_of(bodies.take(i)).estimate(method, grid, sensitivity=True)
+        worst = (estimate, i) if estimate.total > worst[0].total or worst[1] < 0 else worst
+        if math.isinf(worst[0].total):  # no other body is worse
+            break
+    return worst
 
 
 def require_steps(method: Method, bodies: Batch, grid: Grid) -> None:

@@ -5,8 +5,9 @@ whose time depends on the motion, then costs some dozen short steps, while the e
 second power of their length only. Steps also end at samples and at the break points of loads. Source: C. W. Gear, Numerical
 Initial Value Problems in Ordinary Differential Equations (1971), 5.4, on step doubling.
 
-What was tried instead: embedded formulas of order 5 and 3 need fewer calls, but the kernel's stages are in no order that they
-can use; a bisection of every corner in attitude needs to know which part of a function has it.
+Alternatives that were considered, but neither written nor measured: the embedded formulas of orders 5 and 3 would need a third
+of the calls for a step, and a kernel that returns its stages. A bisection of corners in attitude would need to know which part
+of a function has them.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ..attitude import Array
 from ..deferred_imports import kernels
 from ..errors import Diverged, IntegrationFailed, NotConverged
 from ..grid import Grid
+from ..method import Method
 from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
 from ..scene import Scene
@@ -39,8 +41,11 @@ GROW, SHRINK, SHARE = 4.0, 0.1, 0.9
 """Largest and smallest factor between two steps, and share of the step that the tolerance allows."""
 POWER = 1 / 9
 """Inverse of the power of the step to which its error is proportional, if functions are smooth."""
-MOST_TRIES = 5_000
-"""Largest number of steps that are tried: 180,000 calls of a function, some ten seconds."""
+MOST_TRIES, REJECTED, MOST_LONG = 5_000, 0.1, 100_000
+"""Largest number of steps that are tried if more than this share is rejected, which shows that a function is smooth nowhere:
+180,000 calls of a function, some seconds. Otherwise the motion is long, and more steps are possible."""
+FIRST_TRIES, BEYOND = 1_000, 10.0
+"""After so many tries, the walk also ends if the whole motion would take this many times `MOST_TRIES` at the same rate."""
 SAME = 1e-12
 """A sample that is closer to a break point, relative to the time, is at it."""
 ROUGH = 3e-3
@@ -68,13 +73,27 @@ class Walk:
 
     @property
     def control(self) -> StepControl:
-        """The sum of local errors, and the time of the shortest step, if it is much shorter than most."""
-        i = int(np.argmin(self.h)) if self.h else -1
-        return StepControl(self.local, self.ends[i] if self.h and self.h[i] < ROUGH * float(np.median(self.h)) else None)
+        """The sum of local errors, and the time of the shortest step, if it is much shorter than most; of the last one if too
+        many steps are rejected.
+        """
+        if not self.h:
+            return StepControl(self.local, 0.0 if self.erratic else None)
+        i = int(np.argmin(self.h))
+        if self.h[i] < ROUGH * float(np.median(self.h)):
+            return StepControl(self.local, self.ends[i])
+        return StepControl(self.local, self.ends[-1] if self.erratic else None)
+
+    @property
+    def erratic(self) -> bool:
+        """True if so many steps are rejected that the function seems to be smooth nowhere."""
+        if self.tries <= FIRST_TRIES or self.tries - len(self.h) <= REJECTED * self.tries:
+            return False
+        now = self.ends[-1] if self.ends else 0.0
+        return self.tries > MOST_TRIES or self.tries * float(self.t[-1]) > BEYOND * MOST_TRIES * now
 
 
 def walk(  # noqa: PLR0915  # one loop
-    scene: Scene, model: Any, find: Callable[[float], Any], tolerance: float, t: Array, most: int = MOST_TRIES
+    scene: Scene, model: Any, find: Callable[[float], Any], tolerance: float, t: Array
 ) -> Walk:
     """Return the states at increasing times t (n,), s, the first 0, of steps with a tolerance; `find` returns coefficients."""
     kernel, size, rate = kernels("projected"), model.scales[1], bound_rate(scene)
@@ -108,8 +127,8 @@ def walk(  # noqa: PLR0915  # one loop
                 step = left if h >= left * (1 - SAME) else min(h, left / 2)
                 least = SHORTEST * max(stop_at, end / 100)
                 found.tries += 1
-                if found.tries > most:
-                    found.reason = f"a tolerance of {tolerance:.2g} takes more than {most} steps"
+                if found.erratic or found.tries > MOST_LONG + len(t):
+                    found.reason = f"a tolerance of {tolerance:.2g} takes more than {found.tries - 1} steps, at t = {now:.6g} s"
                     return found
                 coarse, fine = take(now, step, 1, (first, last)), take(now, step / 2, 2, (first, last))
                 error = math.inf
@@ -136,6 +155,11 @@ def walk(  # noqa: PLR0915  # one loop
         if found.good == len(t):
             break
     return found
+
+
+def work_of_try(method: Method) -> float:
+    """Return the work of a step that is tried, ns by `Card.cost`: three steps."""
+    return 3 * method.card.cost(method).step
 
 
 def run_adaptively(

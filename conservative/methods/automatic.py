@@ -6,7 +6,8 @@
    reported estimate. Shorter trials cannot provide it, because a scene can amplify errors later. If
    the estimate is above the requested error, the step is cut and the run repeated, unless the cause is rounding of the scene.
 3. If a load or a function of a user acts, and no step reaches the error or the motion is not smooth, an adaptive method
-   follows, whose tolerance is cut in the same way. The run with the smallest estimate is the result.
+   follows, whose tolerance is cut in the same way. The run with the smallest estimate is the result. Long runs are made only
+   if shorter ones show the order of the method, so that the search on a function that is smooth nowhere ends early.
 """
 
 from __future__ import annotations
@@ -23,9 +24,19 @@ from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
+from .adaptive import MOST_TRIES, work_of_try
 from .between import SampleTimes, divide_step, sample_between, stride_of
 from .projected import Projected
-from .search import adaptive_method, adaptive_spacing, even_grid, find_cheapest, step_factor, stops_falling
+from .search import (
+    MOST_CALLING,
+    adaptive_method,
+    adaptive_spacing,
+    even_grid,
+    fallback,
+    find_cheapest,
+    step_factor,
+    stops_falling,
+)
 from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
 
 ATTEMPTS = 12
@@ -78,8 +89,8 @@ class Attempt(NamedTuple):
 
 
 def best_of(tried: Sequence[Attempt]) -> Attempt:
-    """Return the attempt with the smallest estimate, the last one of equals."""
-    return min(reversed(tried), key=lambda each: each.estimate.total)
+    """Return the attempt with the smallest estimate, the last one of equals; one that ended early only if all did."""
+    return min(reversed(tried), key=lambda each: (each.estimate.failed, each.estimate.total))
 
 
 def find_rough(tried: Sequence[Attempt]) -> float | None:
@@ -102,13 +113,20 @@ def reach(
     samples than are possible.
     """
     tried: list[Attempt] = []
+    parts = parts_for(scene)
+    most = MOST_CALLING if scene.calls_python else MOST_STEPS
     if getattr(method, "tolerance", None) is None:
-        parts = parts_for(scene)
-        tried = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples, parts), estimate)
+        tried = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples, parts), estimate, most)
         if presumed_smooth(scene) or method.order is None or best_of(tried).estimate.total <= error:
             return tried
-    adaptive = adaptive_method(error)
-    return [*tried, *cut_tolerance(adaptive, sampling_grid(t_end, samples), error, estimate)]
+        if scene.smoothness(t_end).noise:
+            return tried
+    tried += cut_tolerance(adaptive_method(error), sampling_grid(t_end, samples), error, estimate)
+    if all(each.estimate.failed for each in tried):
+        method, dt = fallback(scene, t_end)
+        grid = grid_of(dt, t_end, samples, parts)
+        tried.append(Attempt(method, grid, estimate(method, grid)))
+    return tried
 
 
 def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
@@ -124,11 +142,15 @@ def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
 def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Callable[[Method, Grid], Estimate]) -> list[Attempt]:
     """Cut the tolerance of a method until the estimated error is at most `error`, rad, or smaller ones do not help."""
     tried: list[Attempt] = []
+    spent = 0.0
     while True:
         run = estimate(method, grid)
         tried.append(Attempt(method, grid, run))
+        spent += run.work
         within = error - run.noise if run.noise < error else run.noise
         if run.error <= within or run.noise >= ASYMPTOTIC or len(tried) == TOLERANCES:
+            return tried
+        if run.failed or spent > 2 * MOST_TRIES * work_of_try(method):
             return tried
         if stops_falling([each.estimate.total for each in tried]):
             return tried
@@ -147,11 +169,13 @@ def cut_step(
     error: float,
     grid_with: Callable[[float], Grid],
     estimate: Callable[[Method, Grid], Estimate],
+    most: int = MOST_STEPS,
 ) -> list[Attempt]:
     """Cut a step dt, s, until the estimated error is at most `error`, rad, or shorter steps do not help.
 
     `grid_with` returns the grid of the whole run for a step, s, and `estimate` the estimate of a run, including its
-    sensitivity. Raise `BadInput` if the first step makes more steps or samples than are possible.
+    sensitivity. Runs of more than `most` steps follow only runs that show the order of the method. Raise `BadInput` if the
+    first step makes more steps or samples than are possible.
     """
     grid = grid_with(dt)
     tried: list[Attempt] = []
@@ -169,6 +193,8 @@ def cut_step(
         try:
             grid = grid_with(grid.dt * step_factor(run.error, within, method))
         except BadInput:  # too many steps or samples: the best run so far is the result
+            return tried
+        if grid.n_steps > most and not run.ordered:
             return tried
 
 

@@ -83,7 +83,8 @@ class Projected(Method):
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         if self.tolerance is not None:
-            grid = Grid(grid.dt, grid.n_steps + 3 * MOST_TRIES, grid.n_steps + 3 * MOST_TRIES)
+            n = grid.n_steps + 3 * MOST_TRIES  # in the same time: nothing is asked beyond it
+            grid = Grid(grid.last / n, n, n)
         return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:

@@ -6,7 +6,8 @@ next, with a shorter step, and the search ends when that candidate already has a
 2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
-Fixed steps are given up as soon as those of one candidate show that the motion is not smooth: an adaptive method follows.
+Fixed steps are given up as soon as those of one candidate show that the motion is not smooth, or when steps as short as a trial
+allows show no order: an adaptive method follows. It is not tried on noise of time, which no step resolves.
 
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
@@ -43,6 +44,8 @@ MOST_PROBED = 10**7
 """Largest number of steps of a trial run: a second by the fastest method."""
 MOST_CALLING = 20_000
 """Largest number of steps of a trial run that calls functions of Python: ten seconds."""
+MOST_UNORDERED = 4096
+"""Largest number of steps of such a run if those before show no order."""
 MOST_COMPARED = 10**5
 """Largest number of samples of a trial run."""
 LENIENCY = 3.0
@@ -51,6 +54,8 @@ PENALTY = 10.0
 """Factor on the work of a candidate that stalls above the error, so that one that reaches the error is preferred."""
 RESOLVED = 0.01
 """If runs with shorter steps, in radians of that rotation, still differ completely, the sensitivity to rounding is measured."""
+MOST_ROUGH, ROUGH = 2**13, 0.01
+"""Largest number of steps of a run of a function that no method resolves, and its step in radians of that rotation."""
 TRIAL = 2e5
 """Time that a trial takes beside its runs, ns."""
 FIRST = 1.5
@@ -83,6 +88,8 @@ class Candidate:
         Largest number of steps of a trial run.
     rough
         True if the last attempt shows that the motion is not smooth.
+    ordered
+        True if the last attempt shows the order of the method, or there is none.
     """
 
     method: Method
@@ -96,6 +103,7 @@ class Candidate:
     runs: float = 1.0
     most_steps: int = MOST_PROBED
     rough: bool = False
+    ordered: bool = True
 
     @property
     def reached(self) -> bool:
@@ -112,7 +120,8 @@ class Candidate:
     @property
     def hopeless(self) -> bool:
         """True if the candidate is given up."""
-        return not self.settled and (self.duration / self.dt > self.most_steps or len(self.attempts) >= ATTEMPTS)
+        most = self.most_steps if self.ordered else min(self.most_steps, MOST_UNORDERED)
+        return not self.settled and (self.duration / self.dt > most or len(self.attempts) >= ATTEMPTS)
 
     @property
     def work(self) -> float:
@@ -133,6 +142,7 @@ class Candidate:
             step_work=trial.work / grid.n_steps,
             sensitivity=(trial.sensitivity or 0.0) if lost else 0.0,
             rough=trial.rough is not None,
+            ordered=trial.ordered,
         )
         return after if after.settled else replace(after, dt=grid.dt * step_factor(trial.error, self.error, self.method))
 
@@ -164,11 +174,15 @@ def find_cheapest(
     `methods` are by default the `candidates` of the scene. The choice is for runs of so many bodies. If the motion is not
     smooth, the method is adaptive, and the step the distance of samples.
     """
+    if not methods and trials.scene.smoothness(t_end).noise:
+        return fallback(trials.scene, t_end)
     spent = 0.0
     running = [begin(method, trials.scene, error, t_end, bodies) for method in methods or candidates(trials.scene)]
     while True:
         i = most_promising(running)
         if running[i].settled or running[i].hopeless or (len(running) == 1 and running[i].method.order is None):
+            if running[i].hopeless and not running[i].ordered and not methods:
+                return adaptive_method(error), adaptive_spacing(t_end)
             return running[i].method, running[i].dt
         running[i] = running[i].advance(trials)
         if running[i].rough and not running[i].reached and not methods:
@@ -179,6 +193,11 @@ def find_cheapest(
         cheapest = min((each for each in running if each.reached), key=lambda each: each.work, default=None)
         if cheapest and spent > cheapest.work * cheapest.runs:
             return cheapest.method, cheapest.dt
+
+
+def fallback(scene: Scene, t_end: float) -> tuple[Method, float]:
+    """Return a method and a step, s, for motions that are not smooth enough for any: the run says how far errors are."""
+    return Projected(), max(t_end / MOST_ROUGH, min(t_end / ADAPTIVE_SAMPLES, ROUGH / scene.derive(bound_rate)))
 
 
 def adaptive_method(error: float) -> Projected:
@@ -204,7 +223,7 @@ def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: floa
     likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
     dt = min(duration / 2, method.card.longest / rate, math.inf if scene.calls_python else likely)
     if scene.loads:  # runs at two to eight times the step have to differ everywhere (`conservative.methods.pieces`)
-        breaks, step, _ = scene.smoothness(t_end)
+        breaks, step, *_ = scene.smoothness(t_end)
         dt = min(dt, step, t_end / parts_for(scene) / (1 + np.count_nonzero(breaks < t_end)))
     if method.order is None:
         dt = min(method.longest_step(scene) / 2, t_end / 16)

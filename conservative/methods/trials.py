@@ -51,6 +51,9 @@ MAGNIFIED = 2.0**20
 """Factor on the change of a scene that represents rounding, for adaptive methods; the effect is divided by it."""
 LOOSER = 30.0
 """Factor between the tolerances of the two runs of an adaptive method."""
+BY_CHANCE = 3.0
+"""Factor on the difference of runs of two tolerances, which a corner may make small by chance. Of 21 runs of functions with
+corners, the difference was 0.3 to 300 times the error."""
 NEAR = 0.1
 """A spring is not presumed smooth if its points can come as near to each other as this, relative to their distance from the
 pivot: its force has no direction where they meet."""
@@ -86,12 +89,18 @@ class Estimate:
         Attitude error caused by rounding inertia and initial state, rad; None if not measured.
     rough
         Time, s, near which differences of runs do not fall in order, so that a function is not smooth there; None if they do.
+    ordered
+        Whether differences of runs fall as the order of the method says, or are presumed to.
+    failed
+        Whether the run itself ended early.
     """
 
     error: float
     work: float
     sensitivity: float | None = None
     rough: float | None = None
+    ordered: bool = True
+    failed: bool = False
 
     @property
     def noise(self) -> float:
@@ -134,7 +143,7 @@ class Trials:
             self.last.clear()
             self.observe(method, grid)
             self.last[method, grid] = run_twice(method, self.scene, grid)
-        error, fine, coarse, rough = self.last[method, grid]
+        error, fine, coarse, rough, ordered = self.last[method, grid]
         cost, counters = method.card.cost(method), fine.counters
         work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
         moved = 0.0 if sensitivity else None
@@ -150,7 +159,7 @@ class Trials:
                 moved = math.inf if nearby is None else float(angle_between(coarse.R_WB, nearby.R_WB).max()) / factor
                 if factor * moved < RESOLVED:
                     break
-        estimate = Estimate(error, work, moved, rough)
+        estimate = Estimate(error, work, moved, rough, ordered, not fine.ok)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
         self.known[method, replace(grid)] = estimate  # a copy, without the times that a grid caches
@@ -204,38 +213,44 @@ def presumed_smooth(scene: Scene) -> bool:
 def run_twice(method: Method, scene: Scene, grid: Grid) -> Runs:
     """Return the estimated error of a run, rad, its trajectory, and the trajectory at twice the step, or a larger tolerance.
 
-    If a run fails, the estimate is inf and the last trajectory None. The last value is the time of `Estimate.rough`.
+    If a run fails, the estimate is inf and the last trajectory None.
     """
     fine = method.solve(scene, grid)
     other, longer = coarser(method, grid)
-    coarse = _solve(other, scene, longer)
+    given_up = fine.control is not None and not fine.ok  # such steps may be thousands of short ones
+    coarse = None if given_up else _solve(other, scene, longer)
     if not fine.ok or coarse is None:
-        return Runs(math.inf, fine, None, fine.control and fine.control.rough)
-    difference, rough = _largest_difference(fine, coarse), None
+        return Runs(math.inf, fine, None, fine.control and fine.control.rough, presumed_smooth(scene))
+    difference, rough, ordered = _largest_difference(fine, coarse), None, True
     if fine.control is not None:
-        error, rough = max(difference, fine.control.local), fine.control.rough
+        error, rough = BY_CHANCE * max(difference, fine.control.local), fine.control.rough
     elif presumed_smooth(scene) or method.order is None:
         error = difference / convergence_factor(method)
     else:
-        error, rough = _by_shown_order(method, scene, grid, fine, coarse)
+        error, rough, ordered = _by_shown_order(method, scene, grid, fine, coarse)
     # Rounding of the angular velocity, which a comparison of two runs cannot show.
     rounding = ROUNDED / 2 * float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * fine.t[-1]
-    return Runs(error + float(rounding) if difference < ASYMPTOTIC else math.inf, fine, coarse, rough)
+    return Runs(error + float(rounding) if difference < ASYMPTOTIC else math.inf, fine, coarse, rough, ordered)
 
 
 class Runs(NamedTuple):
-    """The estimated error of a run, rad; its trajectory and the coarser one, None if a run failed; `Estimate.rough`."""
+    """The estimated error of a run, rad; its trajectory and the coarser one, None if a run failed; `rough` and `ordered` of
+    `Estimate`.
+    """
 
     error: float
     fine: Trajectory
     coarse: Trajectory | None
     rough: float | None
+    ordered: bool
 
 
 def _by_shown_order(
     method: Method, scene: Scene, grid: Grid, fine: Trajectory, coarse: Trajectory
-) -> tuple[float, float | None]:
-    """Return the error, rad, by the order that two successive halvings of the step show, and the time of `Estimate.rough`."""
+) -> tuple[float, float | None, bool]:
+    """Return the error, rad, by the order that two halvings of the step show, and `rough` and `ordered` of `Estimate`."""
+    _, _, interval, noise = scene.smoothness(grid.last)
+    noisy = interval[0] if noise else None
     differences, before, longer = [_largest_difference(fine, coarse)], coarse, coarse_grid(grid)
     while len(differences) < HALVINGS and differences[-1] < ASYMPTOTIC and longer.n_steps % 2 == 0:
         longer = coarse_grid(longer)
@@ -244,17 +259,17 @@ def _by_shown_order(
         before = coarse if after is None else after
     seen = [each for each in differences if each < ASYMPTOTIC]
     if len(seen) < 2:  # one difference alone may be small by chance
-        return math.inf, None
+        return math.inf, noisy, False
     if len(seen) == HALVINGS:
         most = convergence_factor(method) + 1
         factors = [min(most, second / first) if first > 0 else most for first, second in pairwise(seen)]
         if min(factors) >= SHOWN * most and max(factors) <= ALIKE * min(factors):
-            return seen[0] / (min(factors) - 1), None
+            return seen[0] / (min(factors) - 1), noisy, True
     # As far as rounding explains the differences, they say nothing about the function; long steps do not show an order, either.
     floor = NOTHING * (1.0 + float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * float(fine.t[-1]))
     shown = len(seen) == HALVINGS and min(seen) > floor and max(seen) < RESOLVED
     rough = shown and seen[-1] < (LOW * (convergence_factor(method) + 1)) ** 2 * seen[0]
-    return max(seen), _roughest(fine, coarse) if rough else None
+    return max(seen), _roughest(fine, coarse) if rough and noisy is None else noisy, False
 
 
 def _roughest(fine: Trajectory, coarse: Trajectory) -> float:

@@ -3,7 +3,8 @@
 The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps and corners between two of them are found
 by bisection; steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the
 sum over all times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be
-missed.
+missed. If not even two intervals agree, the worst intervals are scanned again, more finely: a function that is not smooth
+there, either, is noise, and no step resolves it.
 """
 
 from __future__ import annotations
@@ -33,12 +34,21 @@ MOST_CORNERS, LEAST_BEND, NARROW, ZOOM = 4096, 1e-10, 1e-11, 8
 are found to a share of t_end, by intervals that are divided into so many parts."""
 
 
+CLOSER, NARROWER, WORST = 1024, 64, 8
+"""Number of parts into which an interval is divided, in so many of the worst blocks, and the ratio of the spacings at which
+second differences are compared: they fall with its square in smooth functions, with its first power at corners, not at all in
+noise."""
+
+
 class Smoothness(NamedTuple):
-    """Break points (n,) above 0, s; the longest step that resolves the functions, s; and where longer ones differ most, s."""
+    """Break points (n,) above 0, s; the longest step that resolves the functions, s; where longer ones differ most, s; and
+    whether no step resolves them.
+    """
 
     breaks: Array
     step: float
     interval: tuple[float, float]
+    noise: bool = False
 
 
 SMOOTH = Smoothness(np.empty(0), math.inf, (0.0, math.inf))
@@ -56,8 +66,8 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
         (_, unit), *_ = (load.origin for load in loads)
         known = examine(tuple(load.origin[0] for load in loads), t_end * unit)
         first, last = known.interval
-        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit))
-    step, interval = math.inf, (0.0, t_end)
+        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit), known.noise)
+    step, interval, noise = math.inf, (0.0, t_end), False
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
     for load in loads:
@@ -73,9 +83,11 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
         breaks = np.union1d(breaks, found)
         breaks = np.union1d(breaks, _drop_near(_find_corners(function, times, values, other), breaks, 1e-9 * t_end))
         resolved, where = _resolve(times, values, breaks)
-        if resolved < step:
+        if resolved <= times[1] and (place := _find_noise(function, times, values, breaks)) is not None:
+            step, interval, noise = resolved, place, True
+        elif resolved < step and not noise:
             step, interval = resolved, where
-    return Smoothness(read_only(breaks[breaks > 0]), step, interval)
+    return Smoothness(read_only(breaks[breaks > 0]), step, interval, noise)
 
 
 def _at_attitude(function: Callable[[float, Array], Array], R_WB: Array, t: float) -> Array:
@@ -159,18 +171,39 @@ def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[f
     total, step = float(np.abs(values).mean(axis=0).max()), float(times[1])
     size, result = 2, (step, (0.0, float(times[-1])))
     while size <= SCANNED:
-        blocks = values[:-1].reshape(-1, size, values.shape[1])
-        ends = np.concatenate([blocks[1:, 0], values[-1:]])
-        dense = blocks.mean(axis=1) + (ends - blocks[:, 0]) / (2 * size)
-        rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
-        off = np.abs(rule - dense).max(axis=1)
-        for side in ("left", "right"):  # a break point between two blocks is part of both
-            off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0
+        off = _compare_blocks(times, values, breaks, size)
         if off.mean() > AGREED * total:
             worst = int(off.argmax())
             return result[0], (float(times[worst * size]), float(times[(worst + 1) * size]))
         result, size = (size * step, result[1]), 2 * size
     return math.inf, result[1]
+
+
+def _compare_blocks(times: Array, values: Array, breaks: Array, size: int) -> Array:
+    """Return the difference of Simpson's rule and the sum over all times in blocks of so many intervals; 0 at breaks."""
+    blocks = values[:-1].reshape(-1, size, values.shape[1])
+    ends = np.concatenate([blocks[1:, 0], values[-1:]])
+    dense = blocks.mean(axis=1) + (ends - blocks[:, 0]) / (2 * size)
+    rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
+    off: Array = np.abs(rule - dense).max(axis=1)
+    for side in ("left", "right"):  # a break point between two blocks is part of both
+        off[np.searchsorted(times[::size], breaks, side).clip(1, len(off)) - 1] = 0.0
+    return off
+
+
+def _find_noise(function: Callable[[float], Array], times: Array, values: Array, breaks: Array) -> tuple[float, float] | None:
+    """Return an interval, s, in which a function is not smooth, if it is so in most of the worst blocks; otherwise None."""
+    worst = np.argsort(-_compare_blocks(times, values, breaks, 2), kind="stable")[:WORST]
+    found = []
+    for i in (2 * worst).tolist():
+        a, b = float(times[i]), float(times[i + 2])
+        closer = np.array([_value(function, t) for t in np.linspace(a, b, 2 * CLOSER + 1).tolist()])
+        far, near = (
+            float(np.linalg.norm(closer[: -2 * n] - 2 * closer[n:-n] + closer[2 * n :], axis=1).max()) for n in (NARROWER, 1)
+        )
+        if near > far / (4 * NARROWER):
+            found.append((a, b))
+    return found[0] if len(found) > WORST / 2 else None
 
 
 class Unresolved(NamedTuple):

@@ -1,6 +1,9 @@
 """Automatic choice of a method and a step size: rules, cost, remembered trial runs, and estimates of errors."""
 
+import functools
+import hashlib
 import math
+import struct
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -557,6 +560,64 @@ def test_a_corner_at_a_time_is_found_and_costs_nothing():
     assert angle_between(truth, found.R_WB).max() < 1e-13  # measured 1e-15; 1e-6 without the break point at pi / 3
     np.testing.assert_allclose(found.scene.breaks, [np.pi / 3], atol=1e-10)
     assert found.counters.steps < 100
+
+
+def noise(x):
+    """Return a number between -1 and 1 that a hash of x determines."""
+    return int.from_bytes(hashlib.blake2b(struct.pack("d", x), digest_size=7).digest(), "big") / 2**55 - 1
+
+
+def counted(function):
+    """Return a function, and a list to which each call adds."""
+    calls = []
+
+    @functools.wraps(function)  # whose arguments decide whether it is one of attitude
+    def call(*arguments):
+        calls.append(1)
+        return function(*arguments)
+
+    return call, calls
+
+
+ROUGH = {  # a function, and the largest number of its calls
+    "noise": (lambda t: np.array((0.3, -0.2, 0.5)) * noise(t), 200_000),  # measured: 114,000
+    "small noise": (lambda t: np.array((0.3, -0.2, 0.5)) * (math.sin(t) + 1e-3 * noise(t)), 600_000),  # measured: 0
+    "6,400 jumps": (lambda t: np.array((0.3, -0.2, 0.5)) * np.sign(math.sin(2e4 * t)), 200_000),
+    "noise of attitude": (lambda t, R: np.array((0.3, -0.2, 0.5)) * noise(float(R[0, 0] + R[1, 2])), 600_000),
+}
+"""Functions that are smooth nowhere."""
+
+
+@pytest.mark.parametrize("kind", ["noise", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ROUGH if kind != "noise")])
+def test_a_function_that_is_smooth_nowhere_ends_with_a_warning_after_few_calls(kind):
+    function, most = ROUGH[kind]
+    function, calls = counted(function)
+    scene = cv.Scene("rough", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (1.0, 0.5, -0.3), 2.0, torque=cv.Torque(function))
+    with pytest.warns(AccuracyNotReached, match="not smooth: near t = ") as caught:
+        found = cv.integrate(scene, error=1e-9)
+    assert [each.message.estimate for each in caught] == [found.choice.estimate]
+    assert found.choice.estimate > 1e-9
+    assert 0 <= caught[0].message.rough <= 2.0
+    assert found.t[-1] == 2.0
+    print(len(calls))
+    assert len(calls) < most
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (noise, True),
+        (lambda t: np.sign(math.sin(2e4 * t)), True),  # 12,700 jumps
+        # 127,000 corners, which a step per interval does not resolve
+        pytest.param(lambda t: abs(math.sin(2e5 * t)), True, marks=pytest.mark.slow),
+        (lambda t: math.sin(2e5 * t), False),  # four intervals of the scan are less than one period
+        (lambda t: math.sin(2e4 * t), False),
+        (lambda t: abs(math.sin(20 * t)), False),  # its corners are found
+        (lambda t: math.sin(t) + 1e-9 * noise(t), False),
+    ],
+)
+def test_noise_is_what_no_scan_resolves(function, expected):
+    assert bent(lambda t: np.array((function(t), 0.0, 0.0))).smoothness().noise is expected
 
 
 @pytest.mark.parametrize("how", ["error", "samples of an error", "dt", "t_eval", "adaptive", "scipy"])
