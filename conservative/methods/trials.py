@@ -52,8 +52,8 @@ MAGNIFIED = 2.0**20
 LOOSER = 30.0
 """Factor between the tolerances of the two runs of an adaptive method."""
 BY_CHANCE = 3.0
-"""Factor on the difference of runs of two tolerances, which a corner may make small by chance. Of 21 runs of functions with
-corners, the difference was 0.3 to 300 times the error."""
+"""Factor on the difference of runs of two tolerances, which a corner may make small by chance. In 19 runs of
+functions with corners, the error was 2.8 times the difference in one, and at most 0.8 times in the others."""
 NEAR = 0.1
 """A spring is not presumed smooth if its points can come as near to each other as this, relative to their distance from the
 pivot: its force has no direction where they meet."""
