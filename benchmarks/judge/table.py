@@ -316,7 +316,10 @@ def _open(path: Path) -> IO[str]:
     stream: Any = open_file(path)
     packed = stream.read(2) == b"\x1f\x8b"
     stream.seek(0)
-    return TextIOWrapper(gzip.GzipFile(fileobj=stream) if packed else stream, encoding="utf-8-sig", errors="replace")
+    if packed:  # a GzipFile closes only a file that it has opened itself
+        stream.close()
+        stream = gzip.GzipFile(path)
+    return TextIOWrapper(stream, encoding="utf-8-sig", errors="replace")
 
 
 def _each_line(stream: IO[str]) -> Iterator[str]:
@@ -427,7 +430,8 @@ def _separate(line: str) -> tuple[str | None, list[str]] | None:
 def _parquet(path: Path) -> Any:
     from pyarrow.parquet import ParquetFile
 
-    return ParquetFile(open_file(path))
+    open_file(path).close()  # refuses a pipe or a device
+    return ParquetFile(path)
 
 
 def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:

@@ -300,7 +300,10 @@ def test_a_program_is_right_or_its_mistake_is_named(register, tmp_path):
 )
 def test_a_program_without_usable_accelerations_is_described(formats, accelerations, words, register, tmp_path):
     answers = [GREETING | {"engine": {"formats": formats}}, {"accelerations": accelerations}]
-    (tmp_path / "p.py").write_text("".join(f"input()\nprint({json.dumps(each)!r}, flush=True)\n" for each in answers))
+    hello, load = map(json.dumps, answers)
+    # It reads on: a request to a program that is just ending is a crash or a restart, by chance.
+    lines = "input()", f"print({hello!r}, flush=True)", f"while input(): print({load!r}, flush=True)"
+    (tmp_path / "p.py").write_text("\n".join(lines))
     register(p=[sys.executable, tmp_path / "p.py"])
     done = run(GENERIC, "--engines", "p")
     assert done.exit_code in (1, 2)
