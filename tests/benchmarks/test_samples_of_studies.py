@@ -56,17 +56,20 @@ TUMBLING = Scene(
 @pytest.mark.parametrize("scene", [TUMBLING, registry.scene("lagrange_top:t_end=0.1")], ids=lambda scene: scene.name)
 def test_a_motion_has_the_states_of_its_first_duration_and_a_curve_on_the_unit_sphere(scene):
     rows, lines = findings("motion", cv.Reduced(), scenes=(scene,))
-    drifts = [motion.SIGNED + invariant.name for invariant in scene.invariants]
-    assert [line.quantity for line in lines] == [*motion.STATES, *drifts, *motion.AXES] * 2
+    largest, drifts = ([kind + each.name for each in scene.invariants] for kind in (motion.LARGEST, motion.SIGNED))
+    quantities = [*motion.STATES, *largest, *drifts, *motion.AXES]
+    second = len(quantities)
+    with_error = [*motion.STATES, *largest, motion.ERROR, *drifts, *motion.AXES]
+    assert [line.quantity for line in lines] == [*quantities, *with_error]
     assert {row.method for row in rows} == {"reduced"}
-    for start, step in ((0, scene.t_end / motion.FRAMES), (len(lines) // 2, scene.dt)):
+    for start, step in ((0, scene.t_end / motion.FRAMES), (second, scene.dt)):
         states = np.array([line.value for line in lines[start : start + 7]]).T
         grid = Grid(step, round(scene.t_end / step))
         method = Exact() if start == 0 else cv.Reduced()
         expected = method.solve(scene, grid)
         np.testing.assert_allclose(from_quaternion(states[:, :4]), expected.R_WB, atol=1e-12)  # measured 1e-15
         np.testing.assert_allclose(states[:, 4:], expected.w_WB_B, atol=1e-9)
-    for curve in (lines[len(lines) // 2 - 3 : len(lines) // 2], lines[-3:]):
+    for curve in (lines[second - 3 : second], lines[-3:]):
         off = np.linalg.norm([line.value for line in curve], axis=0) - 1
         assert np.abs(off).max() < 1e-13  # measured 3e-16
         assert len(off) <= motion.SAMPLES

@@ -1,6 +1,7 @@
 """The pytest plugin and its gate: runs of pytest in another project, and the rows of its results."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -265,7 +266,8 @@ Path("ended.json").write_text(json.dumps(ended))
 def select(folder, *selections):
     """Return the exit code, the rows and the missing rows of a run for each selection, in one process."""
     code = [sys.executable, "-c", RUNS, json.dumps(selections)]
-    subprocess.run(code, cwd=folder, capture_output=True, check=True)
+    variables = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}  # a cache of its own, for --lf
+    subprocess.run(code, cwd=folder, capture_output=True, check=True, env=variables)
     return json.loads((folder / "ended.json").read_text())
 
 
