@@ -134,7 +134,7 @@ def test_very_small_scenes_are_integrated_in_their_own_units():
         (lambda: cv.Damping(np.eye(3), ([1, 0], [1, 2])), "times", "0 after 1"),
         (lambda: cv.Damping(np.eye(3), lambda t: 1.0, breaks=[np.inf]), "breaks", "inf"),
         (lambda: loaded(damping=cv.Damping(np.eye(3), ([0, 1], [1, 2]))), "factor", "a table from 0 to 1 s"),
-        (lambda: loaded(damping=cv.Damping(np.eye(3), lambda t: 2 - t)), "factor", "returns -0.03125 at t = 2.03"),
+        (lambda: loaded(damping=cv.Damping(np.eye(3), lambda t: 2 - t)), "factor", "returns -0.0312"),
     ],
 )
 def test_bad_input_names_the_argument_and_its_value(build, argument, said):

@@ -126,7 +126,7 @@ def test_a_store_has_what_was_supplied_and_is_resumed_to_the_same(name, tmp_path
     run(name, path=place)
     for part in place.glob("supplied/c/1/*/*"):
         part.unlink()  # a lost block
-    with pytest.raises(cv.BadInput, match="missing or damaged"):
+    with pytest.raises(cv.BadInput, match="missing, damaged or edited"):
         cv.open_ensemble(place)
     run(name, path=place, resume=True)
     functions = any(callable(load.value) for load in RUNS[name][0].loads)
