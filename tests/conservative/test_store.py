@@ -141,7 +141,7 @@ import os, signal, sys
 sys.path.insert(0, sys.argv[1])
 import zarr
 from conservative.integration import blocks
-from test_store import run
+from tests.conservative.test_store import run
 blocks.MOST_BODIES = 8
 put = zarr.storage._local._put
 
@@ -160,7 +160,7 @@ run(sys.argv[2])
 @pytest.mark.slow
 def test_a_killed_run_continues_to_the_same_bytes(whole, tmp_path):
     place = tmp_path / "a.zarr"
-    command = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(place)]
+    command = [sys.executable, "-c", KILLED, str(Path(__file__).parents[2]), str(place)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
     assert (place / "R_WB/c/1/0/0/0").exists()  # of a block that is not done
