@@ -85,8 +85,17 @@ def test_a_page_of_a_file_without_a_step(seed, tmp_path, without_files):
     assert done.exit_code == 0, done.output
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*registry.list_scenes(), *range(10)])
+SOME = ("lagrange_top", "dual_spin_turn", "gazebo_box", "librating_satellite", 1, 5)
+"""A top, a rotor, free flight, a turning field, and two files: all others take half an hour and run with `--attack`."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(each, marks=pytest.mark.slow if each in SOME else pytest.mark.attack)
+        for each in (*registry.list_scenes(), *range(10))
+    ],
+)
 def test_report_and_watch_end_with_a_page(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scene = str(name) if isinstance(name, str) else str(random_file(tmp_path, name))

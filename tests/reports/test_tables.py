@@ -135,7 +135,7 @@ def test_failures_and_unsupported_runs_have_separate_tables():
         row("convergence", "observed order", nan, dt=nan, outcome=cannot("2 points", "no order")),
     ]
     table = frame(found)
-    assert failures.failures(table).rows == [["made_up", "reduced", "diverged after t = 1 s", "paper, long_runs", "0.01"]]
+    assert failures.failures(table).rows == [["made_up", "reduced", "diverged after t = 1 s", "", "paper, long_runs", "0.01"]]
     assert failures.unsupported(table).rows == [
         ["made_up", "unsupported", "for free bodies", "reduced"],
         ["made_up", "missing", "pip install x", "reduced"],
