@@ -44,6 +44,8 @@ AXES = ("x", "y", "z")
 """Quantities of a curve, in units of the sphere's radius."""
 STATES = ("q_w", "q_x", "q_y", "q_z", "w_x", "w_y", "w_z")
 """Quantities of the first duration: attitude as a quaternion, body to world, and rates, rad/s, body axes."""
+MOST_SAMPLES = 10**6
+"""Largest number of samples of one duration: three hours of a satellite are 5,400,000 steps of an engine."""
 SIGNED = "drift of "
 """Begins the quantities of relative drifts; that of a vector is the change of its length."""
 LARGEST = "largest drift of "
@@ -85,8 +87,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
 def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[Case]:
     """Return the runs of a method of which the first that succeeds is shown: ten durations if it is drawn, and one."""
     step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
+    every = math.ceil(scene.t_end / step / MOST_SAMPLES)
+    if every > 1:  # the samples of ten durations would not be those of one; and the run is long enough
+        drawn = False
     ends = dict.fromkeys((*([end_of(scene)] if drawn else []), scene.t_end))
-    return [Case(study.name, scene, method, grid_for(scene, step, end)) for end in ends]
+    return [Case(study.name, scene, method, grid_for(scene, step, end, every)) for end in ends]
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:

@@ -89,6 +89,14 @@ def test_a_motion_has_signed_drifts_and_the_errors_of_the_first_duration_at_the_
     np.testing.assert_allclose(energy.value[-1], long.energy[-1] / long.energy[0] - 1, atol=1e-13)
 
 
+def test_hours_of_a_satellite_have_samples_that_fit_at_the_step_of_an_engine():
+    scene, engine = registry.scene("librating_satellite"), registry.method("mujoco:RK4")
+    (case,) = motion.list_runs(Study("motion", (scene,), (engine,), quick=True), scene, engine, drawn=True)
+    assert case.grid.dt == engine.card.usual_dt
+    assert case.grid.n_steps > 5 * motion.MOST_SAMPLES  # measured: 5,400,000; ten durations did not fit
+    assert case.grid.n_samples <= motion.MOST_SAMPLES + 1
+
+
 def test_a_motion_that_fails_has_rows_with_the_outcome():
     rows, lines = findings("motion", cv.Lame())
     assert {row.outcome.kind for row in rows} == {OutcomeKind.UNSUPPORTED}
