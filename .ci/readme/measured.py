@@ -24,7 +24,7 @@ KEPT = [
     for scene, momentum in (("brick_flip", "momentum"), ("lagrange_top", "vertical momentum"))
     for invariant in ("energy", momentum)
 ]
-"""What the paper's map conserves."""
+"""Quantities that the map of the paper conserves."""
 VARIANTS = {"MuJoCo": "RK4", "Pinocchio": "RK4"}
 
 

@@ -24,7 +24,7 @@ from . import baseline, compare, results
 from .results import Results, Row, Status
 
 Made = pytest.Item | pytest.Collector | list[pytest.Item | pytest.Collector] | None
-"""What pytest makes of a name in a module."""
+"""Kinds of items that pytest collects from a name in a module."""
 
 
 class GateFailed(Exception):

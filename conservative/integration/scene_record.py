@@ -26,7 +26,7 @@ _PACKAGE = __name__.partition(".")[0]
 _NOT_OF_MOTION = {field.name for field in fields(Scene)} - {*fields_of_motion(Scene)} | {"t_end"}
 """Fields of a scene that do not change the motion of its bodies on a given grid."""
 _BY = f"2 {sys.implementation.cache_tag}"
-"""What digests of functions depend on besides the function: the rules of `identity`, and the bytecode of the interpreter."""
+"""Versions that change the digests of functions: the rules of `identity`, and the bytecode of the interpreter."""
 
 
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:

@@ -61,7 +61,7 @@ TRIAL = 2e5
 FIRST = 1.5
 """First step, in units of the step that order and rate predict: short enough for 85 % of random bodies."""
 FIRST_TOLERANCE, ADAPTIVE_SAMPLES = 300.0, 64
-"""Requested error over the first tolerance of an adaptive method; samples of its runs, if nobody asks for others."""
+"""Requested error over the first tolerance of an adaptive method; samples of its runs, if no others are requested."""
 
 
 @dataclass(frozen=True)

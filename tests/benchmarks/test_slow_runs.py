@@ -110,7 +110,7 @@ def test_the_scenes_own_step_comes_before_shorter_ones(costs):
     done = {row.dt: row.outcome.kind for row in rows if row.measure is Measure.ATTITUDE_MAX}
     assert done == {0.02: OutcomeKind.OK, 0.01: OutcomeKind.SKIPPED, 0.005: OutcomeKind.SKIPPED}
     agreements = [row.dt for row in rows if row.measure is Measure.AGREEMENT]
-    assert agreements == [0.02]  # no reference solution is made for steps that nobody takes
+    assert agreements == [0.02]  # no reference solution is made for steps that are not taken
     costs["splitting"] = 0.08
     rows = list(studies.rows(plan("paper", scene_of(Counted()), METHODS[:2])))
     assert {row.family for row in rows if row.outcome.ok and row.measure is Measure.ATTITUDE_MAX} == {"reduced", "splitting"}

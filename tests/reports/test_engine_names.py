@@ -109,7 +109,7 @@ def methods_in(value):
 
 
 def ask(monkeypatch, name, command, parameter, text):
-    """Return what a command selects for a name, and its settings, or its refusal; "==" is written as "@" in it."""
+    """Return the methods and settings that a command selects for a name, or its refusal; "==" is written as "@" in it."""
 
     def capture(*values, **others):
         raise Captured(*values, *others.values())
