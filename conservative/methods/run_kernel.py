@@ -72,7 +72,7 @@ def prepare_run(
             trajectory = object.__new__(Trajectory)
             trajectory.__dict__.update(
                 scene=scene, t=t.copy(), R_WB=R_WB, w_WB_B=w_WB_B, label=label, counters=counters, failure=None, choice=None,
-                supplied=L[:, 3:].copy() if loaded else None, frame=None,
+                supplied=L[:, 3:].copy() if loaded else None, frame=None, control=None,
             )  # fmt: skip
             return trajectory
         n_good = n if done == n_steps else grid.count_samples(done)

@@ -239,11 +239,17 @@ def write_excerpts(app: Any, error: Exception | None) -> None:
     (Path(app.outdir) / "_static" / "excerpts.js").write_text(script, encoding="utf-8")
 
 
+def skip_field(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out the fields of named tuples, which the section Attributes of their docstring describes."""
+    return True if type(thing).__name__ == "_tuplegetter" else None
+
+
 def setup(app: Any) -> None:
     """Extend Sphinx: our docstrings and formulas, narrow tables, and a search with excerpts from disk."""
     from sphinx.util import inspect
 
     app.connect("autodoc-process-docstring", as_restructured, priority=400)  # before napoleon
+    app.connect("autodoc-skip-member", skip_field)
     inspect.TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]  # else the class is shown, in unions
     app.connect("doctree-read", divide_tables)
     app.connect("html-page-context", add_excerpts)
