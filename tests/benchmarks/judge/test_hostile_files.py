@@ -15,6 +15,7 @@ import conservative as cv
 from conservative.attitude import to_quaternion
 from conservative.benchmarks.judge import table, verdict
 
+from ...environments import PATIENCE
 from .made import FREE, T, exact
 
 R, W = exact(FREE)
@@ -145,7 +146,7 @@ print("done")
 """
     made = subprocess.run(
         [sys.executable, "-c", code, *map(str, paths)],
-        input="0,1,2,3\n", text=True, capture_output=True, timeout=300, check=False, preexec_fn=limit_memory,
+        input="0,1,2,3\n", text=True, capture_output=True, timeout=PATIENCE, check=False, preexec_fn=limit_memory,
     )  # fmt: skip
     assert (made.stdout, made.returncode) == ("done\n", 0), made.stdout + made.stderr[-2000:]
 
