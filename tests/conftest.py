@@ -11,7 +11,7 @@ import tarfile
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from conservative.errors import BadInput
 from conservative.registry import Name, read_name
@@ -43,7 +43,8 @@ def pytest_addoption(parser):
     parser.addoption("--attack", action="store_true", help="Also run the tests that search for failures at random.")
 
 
-settings.register_profile("default", deadline=None)  # no verdict depends on how busy the machine is
+# No verdict depends on how busy the machine is, not even that examples are drawn too slowly.
+settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("default")
 
 

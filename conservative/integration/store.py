@@ -300,7 +300,7 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
     add("outcome", (n,), ("body",), "uint8", 255).update_attributes({"kinds": list(_KINDS)})
     add("failure", (n,), ("body",), "string", "")
     for name, values in list_inputs(bodies).items():
-        add(name, values.shape, ("body", *(f"{name} {k}" for k in range(1, values.ndim))))
+        add(name, values.shape, ("body", *(f"{name} {k}" for k in range(1, len(values.shape)))))
     count = len(range(0, n, block))
     group.create_array(_CHECKSUMS, shape=(count,), chunks=(1,), dtype="uint64", dimension_names=("block",), **options)
     group.update_attributes({_CHECKSUM: _digest_metadata(folder)})
@@ -322,7 +322,11 @@ def _digest_metadata(folder: Path) -> str:
 def list_inputs(bodies: Batch) -> dict[str, Array]:
     """Return the initial values and parameters (n, ...) that differ from body to body, by the names of their arrays."""
     start = {"R_WB0": bodies.R_WB0, "w_WB_B0": bodies.w_WB_B0, "inertia": bodies.inertia}
-    own = {f"start/{name}": values for name, values in start.items() if values is not None and values.strides[0] != 0}
+    own = {
+        f"start/{name}": values
+        for name, values in start.items()
+        if isinstance(values, _OnDisk) or (values is not None and values.strides[0] != 0)
+    }
     return own | {f"parameters/{name}": values for name, values in bodies.parameters.items()}
 
 

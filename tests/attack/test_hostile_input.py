@@ -26,11 +26,12 @@ from conservative.references.exact.method import free_body, lagrange_top
 from conservative.references.importers.model_files import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
 
+from ..environments import PATIENCE
 from .effort import tries
 
 pytestmark = pytest.mark.attack
 REFUSALS = (cv.BadInput, cv.IntegrationFailed, cv.PotentialFailed, cv.MissingEngine)
-SECONDS = 30.0  # a try that takes longer hangs; the slowest reads a model file
+SECONDS = PATIENCE  # a try that takes longer hangs
 GROSS = 1e-6  # error of R'R - 1, and of the energy relative to the scene's scale
 BRICK = cv.integrate(cv.scenes.brick_flip(), 0.01, t_end=0.1)
 
@@ -239,18 +240,20 @@ def attempt(call, seconds=SECONDS):
         raise Hang
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warnings.simplefilter("ignore", cv.AccuracyNotReached)
-            value = call()
+        try:
+            signal.setitimer(signal.ITIMER_REAL, seconds)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                warnings.simplefilter("ignore", cv.AccuracyNotReached)
+                value = call()
+        finally:  # an alarm may come until here, and has to be caught below
+            signal.setitimer(signal.ITIMER_REAL, 0)
     except REFUSALS:
         return
     except Hang:
         raise AssertionError(f"no answer after {seconds:g} s") from None
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     if isinstance(value, cv.Trajectory) and value.ok:
         assert len(value) >= 2
@@ -293,7 +296,7 @@ FAULTS = {
     "not orthonormal": lambda: replace(BRICK, R_WB=1.001 * BRICK.R_WB),
     "lost energy": lambda: replace(BRICK, w_WB_B=np.linspace(1, 1.1, len(BRICK))[:, None] * BRICK.w_WB_B),
     "times": lambda: replace(BRICK, t=BRICK.t[::-1]),
-    "a hang": lambda: time.sleep(60),
+    "a hang": lambda: time.sleep(PATIENCE),
 }
 
 

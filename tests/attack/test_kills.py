@@ -73,6 +73,8 @@ def test_ctrl_c_at_any_moment(command, tmp_path):
         folder.mkdir()
         code, err = end_at(moment, signal.SIGINT, ENDLESS[command], folder)
         assert temporaries(folder) == [], moment
+        if code == 0 and command == "a report":
+            continue  # it ended before
         if code == -signal.SIGINT and "in launch" not in err:
             continue  # Python was starting
         said = [line for line in err.splitlines() if line.startswith("Interrupted")]

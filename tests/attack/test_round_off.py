@@ -6,6 +6,7 @@ test runs. `ATTACK_EFFORT=100 pytest --attack` takes 10^8 steps.
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -166,6 +167,7 @@ def test_symmetric_bodies_drift_linearly_as_published(scene, method, dt, invaria
     assert found.ok, found.failure
     half, end = np.linalg.norm(np.reshape(found.drift(invariant), (3, -1)), axis=1)[1:]
     assert end == pytest.approx(drift, rel=0.5)  # measured 6.7e-14, 4.2e-13 and 1.07e-13
+    assert f"{drift:g}" in (Path(cv.__file__).parent / "methods" / "DERIVATION.md").read_text(encoding="utf-8")
     assert end / half == pytest.approx(2, abs=0.5)  # measured 1.8 to 2.0
 
 

@@ -16,6 +16,7 @@ from conservative.benchmarks.studies.study import Study
 from conservative.outcome import OutcomeKind
 
 from .. import declared
+from ..environments import PATIENCE
 from .generic_study import Broken, truth
 
 BRICK = cv.scenes.brick_flip()
@@ -26,7 +27,9 @@ STEPS = 0.1 * 0.5 ** np.arange(8)
 
 @cache
 def rows(name, engines=ENGINES, scene=BRICK):
-    return studied(name, tuple(map(registry.method, engines)), scene, time_limit=5.0)  # no point is left out on a busy machine
+    return studied(
+        name, tuple(map(registry.method, engines)), scene, time_limit=PATIENCE
+    )  # no point is left out on a busy machine
 
 
 def studied(name, methods, scene=BRICK, **options):

@@ -11,7 +11,9 @@ from conservative.benchmarks.measures.processes import Processes
 from conservative.benchmarks.measures.timing import Timing
 from conservative.outcome import OutcomeKind
 
-HOW = {"limit": 60.0, "rounds": 3, "min_time": 1e-4, "budget": 0.1}
+from ..environments import PATIENCE
+
+HOW = {"limit": PATIENCE, "rounds": 3, "min_time": 1e-4, "budget": 0.1}
 
 
 class Fixed:

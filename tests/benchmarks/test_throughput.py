@@ -20,6 +20,8 @@ from conservative.references.precise import Precise
 from conservative.references.solvers.scipy import SciPy
 from conservative.references.truth import TIGHTEST, Disagreement, reference
 
+from ..environments import PATIENCE
+
 
 @dataclass(frozen=True)
 class Ours(MuJoCo):
@@ -67,8 +69,7 @@ def test_starts_of_one_body_differ_and_the_body_does_not():
 @pytest.fixture(scope="module")
 def rows():
     study = throughput.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=4)
-    tops = throughput.ThroughputStudy(study.name, study.scenes[:1], study.methods, True, sizes=(1, 3), bodies=4)
-    return list(studies.rows(tops))
+    return list(studies.rows(replace(study, scenes=study.scenes[:1], time_limit=PATIENCE)))
 
 
 def of(rows, method, measure, **fields):
@@ -123,14 +124,14 @@ def test_an_engine_that_raises_has_a_row(rows):
     results = of(rows, "fails", Measure.ATTITUDE_MAX, quantity="median")
     assert {row.outcome.kind for row in results} == {OutcomeKind.CRASHED}
     with pytest.raises(RuntimeError):
-        many_runs.attempt_many(Way(OursFails()), draw("heavy_tops", 2), Grid(0.1, 2), 10.0)
+        many_runs.attempt_many(Way(OursFails()), draw("heavy_tops", 2), Grid(0.1, 2), PATIENCE)
 
 
 def test_a_missing_engine_is_an_error_or_an_outcome():
     absent, bodies, grid = Missing("mjx", error=MissingEngine("MJX", "mjx")), draw("free_bodies", 2), Grid(0.1, 2)
-    assert many_runs.attempt_many(Way(absent), bodies, grid, 10.0, skip_missing=True).kind is OutcomeKind.MISSING
+    assert many_runs.attempt_many(Way(absent), bodies, grid, PATIENCE, skip_missing=True).kind is OutcomeKind.MISSING
     with pytest.raises(MissingEngine):
-        many_runs.attempt_many(Way(absent), bodies, grid, 10.0)
+        many_runs.attempt_many(Way(absent), bodies, grid, PATIENCE)
 
 
 def test_without_a_truth_there_is_one_row_of_each_kind():

@@ -124,7 +124,13 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
 @pytest.fixture
 def on_an_idle_machine(monkeypatch):
     """Count only the pauses of `Slow` as its wall time, because the machine may be busy."""
-    monkeypatch.setattr(line, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
+
+    def pauses(case):
+        return case.grid.n_steps * getattr(case.method, "pause", 0.0)
+
+    monkeypatch.setattr(study, "HANG_LIMIT", PATIENCE)
+    monkeypatch.setattr(line, "cost_of_run", lambda study, case, done, first: pauses(case))
+    monkeypatch.setattr(Study, "expected_cost", lambda study, case: pauses(case))
 
 
 def test_a_slow_engine_has_a_line_of_fewer_points(on_an_idle_machine):
@@ -149,7 +155,7 @@ def test_a_slow_engine_has_an_order(on_an_idle_machine):
     assert measured[Measure.ORDER].value == pytest.approx(4, abs=0.5)
 
 
-def test_a_slow_engine_is_timed_over_fewer_steps():
+def test_a_slow_engine_is_timed_over_fewer_steps(on_an_idle_machine):
     measured = rows("speed", Slow(pause=0.01), cv.Reduced(), quick=True, time_limit=0.1)
     mine = {row.measure: row for row in measured if row.method.startswith("foreign_slow")}
     assert all(row.outcome.ok and row.value > 0 for row in mine.values())

@@ -29,11 +29,19 @@ from conservative.references.environments.catalogue import __getattr__ as adapte
 from conservative.reports.cli.main import main
 from conservative.reports.sections.twins import changes
 
+from ..environments import PATIENCE
+
 BY_NAME = {pair.name: pair for pair in PAIRS}
 RIGHT = ("exact", "reduced", "mujoco:RK4")
 SLOW = ("heyoka", "taylor", "lie_variational")
 """Others were tried once: see the page of results."""
 WAYS = {pair.way for pair in PAIRS} - {"", "quaternion", "zero"}
+
+
+@pytest.fixture(autouse=True)
+def on_an_idle_machine(monkeypatch):
+    """No body is left out because the machine is busy."""
+    monkeypatch.setattr(compare, "LONGEST", PATIENCE)
 
 
 def conservative(*arguments):

@@ -330,6 +330,20 @@ def compiled(t):
     return K * t
 
 
+FACTORS = [1.0, 2.0]
+"""A list, which can change after a cache has stored what follows from it."""
+
+
+@functools.lru_cache
+def remembered_default(t, factors=FACTORS):
+    return factors[0] * t
+
+
+@functools.lru_cache
+def remembered_keyword_default(t, *, factors=FACTORS):
+    return factors[0] * t
+
+
 def generator():
     yield 1.0
 
@@ -350,6 +364,8 @@ UNKNOWN = {
     "a counter": counting,
     "a global counter": lambda: counting_globally,
     "a cache": lambda: remembered,
+    "a cache with a list as a default": lambda: remembered_default,
+    "a cache with a list as a keyword default": lambda: remembered_keyword_default,
     "compiled code that reads a global": lambda: compiled,
     "random numbers": lambda: closure_over(np.random.default_rng(0).normal),
     "global random numbers": lambda: lambda t: random.random() * t,

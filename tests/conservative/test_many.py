@@ -475,24 +475,29 @@ def wait_for_ever(block):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 2)
-    begun = threading.active_count()
+    begun, over = set(threading.enumerate()), threading.Event()
     WAITING.clear()
 
     def interrupt():
         WAITING.wait()
-        os.kill(os.getpid(), signal.SIGINT)
+        if not over.is_set():
+            os.kill(os.getpid(), signal.SIGINT)
 
     sender = threading.Thread(target=interrupt)
     sender.start()
-    with pytest.raises(KeyboardInterrupt):
-        cv.integrate_many(scene(), *starts(FEW), method=Damaged(wait_for_ever), threads=threads, **EVERY_OTHER)
-    sender.join()
-    wait_until(lambda: threading.active_count() == begun)  # a thread that is just starting is not joined
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            cv.integrate_many(scene(), *starts(FEW), method=Damaged(wait_for_ever), threads=threads, **EVERY_OTHER)
+    finally:  # a run that ends otherwise leaves no thread that interrupts another test
+        over.set()
+        WAITING.set()
+        sender.join()
+    wait_until(lambda: set(threading.enumerate()) <= begun)  # a thread that is just starting is not joined
 
 
 def test_a_failure_of_one_block_ends_the_others(monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 2)
-    begun = threading.active_count()
+    begun = set(threading.enumerate())
 
     def fail(block):
         if len(block.finished) < 2:  # the last one
@@ -501,7 +506,7 @@ def test_a_failure_of_one_block_ends_the_others(monkeypatch):
 
     with pytest.raises(RuntimeError, match="broken"):
         cv.integrate_many(scene(), *starts(3), method=Damaged(fail), threads=2, **EVERY_OTHER)
-    wait_until(lambda: threading.active_count() == begun)
+    wait_until(lambda: set(threading.enumerate()) <= begun)
 
 
 THOUSAND = 1000

@@ -14,6 +14,8 @@ from conservative import registry, shapes, toml_reader
 from conservative.scene_files import scene_file
 from conservative.toml_reader import DEEPEST, LARGEST, BadFile, key_lines, read
 
+from ..environments import PATIENCE
+
 AXIS, ANGLE = np.array([0.3, -1.2, 0.7]), 0.83
 R = Rotation.from_rotvec(ANGLE * AXIS / np.linalg.norm(AXIS)).as_matrix()
 TENSOR = [[3.1, 0.2, -0.1], [0.2, 2.7, 0.3], [-0.1, 0.3, 1.9]]
@@ -292,7 +294,7 @@ def test_a_pipe_and_a_device_are_refused(tmp_path, kind):
     else:
         place.symlink_to(kind.split()[0])
     command = [sys.executable, "-c", "import sys; from conservative.scene_files.scene_file import load; load(sys.argv[1])"]
-    made = subprocess.run([*command, place], input="t_end = 1", text=True, capture_output=True, timeout=100, check=False)
+    made = subprocess.run([*command, place], input="t_end = 1", text=True, capture_output=True, timeout=PATIENCE, check=False)
     assert "got a pipe or a device, not a file; expected a TOML file" in made.stderr
 
 

@@ -89,9 +89,10 @@ class Stop(BaseException):
 def signals(handler: Callable[[], object], wait: float = 0.05, times: int = 1) -> Iterator[None]:
     """Send signals from another thread, each after the last one was handled; none comes after the block.
 
-    `wait`, s, lets the block get to its work. If it does not, the signal comes a little early.
+    `wait`, s, lets the block get to its work. If it does not, the signal comes a little early. No signal comes before the
+    clean-up is prepared.
     """
-    handled, over = threading.Event(), threading.Event()
+    begun, handled, over = threading.Event(), threading.Event(), threading.Event()
 
     def handle(number: int, frame: object) -> None:
         handled.set()
@@ -99,6 +100,7 @@ def signals(handler: Callable[[], object], wait: float = 0.05, times: int = 1) -
             handler()
 
     def send() -> None:
+        begun.wait()
         over.wait(wait)
         for _ in range(times):
             if over.is_set():
@@ -110,6 +112,7 @@ def signals(handler: Callable[[], object], wait: float = 0.05, times: int = 1) -
     before, sender = signal.signal(signal.SIGUSR1, handle), threading.Thread(target=send)
     sender.start()
     try:
+        begun.set()
         yield
     finally:
         over.set()

@@ -2,10 +2,12 @@
 
 import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -117,6 +119,11 @@ def test_samples_stay_on_the_disk(whole):
 
 def test_an_ensemble_in_memory_is_written_to_the_same_bytes(whole, in_memory, tmp_path):
     in_memory.to_zarr(tmp_path / "copy.zarr")
+    assert digest(tmp_path / "copy.zarr") == digest(whole)
+
+
+def test_an_open_ensemble_is_written_to_the_same_bytes(whole, tmp_path):
+    cv.open_ensemble(whole).to_zarr(tmp_path / "copy.zarr")
     assert digest(tmp_path / "copy.zarr") == digest(whole)
 
 
@@ -233,6 +240,46 @@ def test_a_damaged_block_is_not_opened_and_is_computed_again(whole, tmp_path, ch
     run(place, resume=True, progress=seen.append)
     assert len(seen) == 1
     assert digest(place) == digest(whole)
+
+
+READINGS = {
+    "values": lambda found: [np.asarray(each) for each in (found.R_WB, found.w_WB_B, found.supplied)],
+    "last samples": lambda found: [each[:, -1] for each in (found.R_WB, found.w_WB_B, found.supplied)],
+    "a body": lambda found: found[9],
+    "another body of its block": lambda found: found[14],
+    "all bodies": list,
+    "some bodies": lambda found: found[5:12],
+    "some of some bodies": lambda found: found[:][9],
+    "to_pandas": lambda found: found.to_pandas(),
+    "bodies of to_pandas": lambda found: found.to_pandas("bodies"),
+    "to_zarr": lambda found: found.to_zarr("copy.zarr"),
+    "pickle": lambda found: pickle.dumps(found[:10]),
+}
+OF_MOTIONS = {"to_xarray": lambda found: found.to_xarray(), "plot": lambda found: found.plot()}
+"""Ways that read attitudes or rates, and no work of loads."""
+
+
+@pytest.mark.parametrize("array", ["R_WB", "w_WB_B", "supplied"])
+def test_each_way_of_reading_finds_a_flipped_bit(array, tmp_path, monkeypatch):
+    """A block of motions is read after it is opened. Its bodies 8 to 15 have a flipped bit; body 9 has failed."""
+    monkeypatch.chdir(tmp_path)
+    scene, place, w = replace(cv.scenes.lagrange_top(), torque=cv.Torque((0.0, 0.1, 0.2))), tmp_path / "a.zarr", starts()
+    w[[3, 9]] = w[[9, 3]]
+    run(place, scene=scene, w_WB_B0=w, method="reduced")
+    (chunk,) = (file for file in (place / array / "c" / "1").rglob("*") if file.is_file())
+    flip_a_bit(chunk)
+    found = cv.open_ensemble(place)
+    ways = READINGS if array == "supplied" else READINGS | OF_MOTIONS
+    missed = []
+    for name, read in ways.items():
+        try:
+            read(found)
+            missed.append(name)
+        except ValueError as damage:
+            assert "checksum" in str(damage)  # noqa: PT017
+    assert missed == ["plot"] * (array == "w_WB_B")  # which shows attitudes
+    assert found[7].ok
+    assert found[16].ok  # of other blocks
 
 
 @pytest.mark.parametrize("lost", ["R_WB/zarr.json", "zarr.json"])

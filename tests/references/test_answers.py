@@ -10,13 +10,31 @@ import conservative as cv
 from conservative.programs import Program
 from conservative.references.environments.programs import DESCRIPTION, UnusableProgram, _check_description, program_class
 from conservative.references.worker.client import ANSWERS, EngineCrashed, EngineError, Worker
+from conservative.references.worker.program import from_json
 
 ENGINE = (Path(__file__).parent / "programs" / "engine.py").read_text()
 BRICK = cv.scenes.brick_flip(t_end=0.1)
 GIVEN = {"settings": {}, "free": True, "q0": [1, 0, 0, 0], "w0": [0, 0.05, 10], "moments": [13, 5, 10], "dt": 0.01}
 GIVEN |= {"n_steps": 2, "steps": [0, 1, 2]}
-TEXTS = ["true", "-1", '"x"', "[]", "{}", '"inf"', "1" + "0" * 400, '[["1"]]', "[[true, 1.0]]", "[[1, 2], 3]"]
-"""JSON of wrong values."""
+HUGE = "1" + "0" * 400
+NO_NUMBER = ["true", "-1", "-1e-300", '"x"', "[]", "{}", "NaN", "Infinity", '"nan"', '"inf"', '"-inf"', HUGE]
+NO_TEXT = ["true", "-1", "[]", "{}", "NaN"]
+NO_ARRAY = ["true", "-1", "NaN", '"x"', "{}", '"inf"', HUGE, '[["1"]]', "[[true, 1.0]]", "[[1, 2], 3]", f"[{HUGE}]"]
+WRONG = {
+    ("hello", "protocol"): NO_NUMBER,
+    ("hello", "program"): NO_TEXT,
+    ("hello", "version"): NO_TEXT,
+    ("hello", "framing"): [*NO_TEXT, '"x"'],
+    ("hello", "engine"): ["true", "-1", '"x"', "[]", "NaN"],
+    ("prepare", "run"): NO_NUMBER,
+    ("run", "q"): NO_ARRAY,
+    ("run", "w"): NO_ARRAY,
+    ("run", "evaluations"): ["true", "-1", "NaN", '"x"', "{}", '"inf"', HUGE, '[["1"]]', "[[true, 1.0]]"],
+    ("run", "steps"): ["true", "-1", "NaN", '"x"', "{}", '"inf"', HUGE, '[["1"]]', "[[true, 1.0]]"],
+    ("run", "reason"): NO_TEXT,
+    ("time", "seconds"): NO_NUMBER,
+}
+"""JSON of wrong values of each field. They are not taken from the rules of the client, which they test."""
 UNREADABLE = ["1" * 5000, "[" * 10_000 + "]" * 10_000, "1, 2"]
 
 
@@ -46,20 +64,23 @@ def ask(command, do):
         worker.close()
 
 
-FIELDS = [
-    (do, field) for do, fields in ANSWERS.items() if do != "load" for field in fields if field not in ("R", "w_W", "p", "v")
-]
+ALIKE = {"R", "w_W", "p", "v"}
+"""Fields with the rule of `q`."""
 
 
-@pytest.mark.parametrize(("do", "field"), FIELDS)
+def test_every_field_has_wrong_values():
+    fields = {(do, field) for do, fields in ANSWERS.items() if do != "load" for field in fields}
+    assert fields == set(WRONG) | {("run", field) for field in ALIKE}
+    assert {ANSWERS["run"][field] for field in ALIKE} == {ANSWERS["run"]["q"]}
+
+
+@pytest.mark.parametrize(("do", "field"), WRONG)
 def test_every_field_of_another_kind_is_named(do, field, tmp_path):
-    is_right, _ = ANSWERS[do][field]
-    wrong = [value for value in (json.loads(text) for text in TEXTS) if not is_right(value)]
-    assert len(wrong) >= 5
-    for value in wrong:
+    for text in WRONG[do, field]:
+        value = from_json(f'{{"value": {text}}}'.encode())["value"]
         with pytest.raises(EngineCrashed, match=rf"my_program answers `{do}` with `{field}`"):
             Worker(["my_program"])._check(do, {field: value})
-    for text in (json.dumps(wrong[0]), *UNREADABLE[: 3 * (field in ("protocol", "q", "seconds"))]):
+    for text in (WRONG[do, field][0], *UNREADABLE[: 3 * (field in ("protocol", "q", "seconds"))]):
         with pytest.raises(EngineCrashed, match=f"`{field}`|an answer that cannot be read from {sys.executable}"):
             ask(written(tmp_path, do, field, text), do)
     needed = {"prepare": ["run"], "run": ["q", "w"], "time": ["seconds"], "hello": ["protocol"]}[do]
@@ -68,6 +89,13 @@ def test_every_field_of_another_kind_is_named(do, field, tmp_path):
             ask(written(tmp_path, do, field, None), do)
     else:
         ask(written(tmp_path, do, field, None), do)
+
+
+@pytest.mark.parametrize("text", ["-0.5", "NaN", '"nan"', "-Infinity", '"inf"'])
+def test_a_time_that_is_negative_or_no_number_is_an_outcome(text, tmp_path):
+    run = program_class(Program("wrong", tmp_path / "conservative.toml", " ".join(written(tmp_path, "time", "seconds", text))))
+    with pytest.raises(EngineCrashed, match="`time` with `seconds`"):
+        run().prepare(BRICK, cv.Grid(0.01, 10)).own_loop.wall_time(1)
 
 
 @pytest.mark.parametrize("text", [None, '""', "null"])

@@ -20,7 +20,7 @@ from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import EngineCrashed, EngineTimeout, close_workers
 from conservative.references.worker.program import MAGIC, PREFIX
 
-from ..environments import PATIENCE, run_python
+from ..environments import PATIENCE, run_python, wait_until
 
 
 def hang():
@@ -76,9 +76,11 @@ def answer_by_half():
     os._exit(4)
 
 
-@pytest.mark.parametrize(("work", "description"), [(close_all, "signal 9"), (answer_by_half, "exit code 4")])
-def test_a_process_with_an_incomplete_answer_is_ended(work, description, monkeypatch):
-    monkeypatch.setattr(client, "_PATIENCE", 0.5)
+@pytest.mark.parametrize(
+    ("work", "patience", "description"), [(close_all, 0.5, "signal 9"), (answer_by_half, PATIENCE, "exit code 4")]
+)
+def test_a_process_with_an_incomplete_answer_is_ended(work, patience, description, monkeypatch):
+    monkeypatch.setattr(client, "_PATIENCE", patience)
     with pytest.raises(EngineCrashed, match=description):
         run_within(PATIENCE, work)
     assert children() == []
@@ -134,8 +136,7 @@ def test_an_interrupt_ends_the_work(tmp_path):
     begun = tmp_path / "begun"
 
     def interrupt():
-        while not begun.exists():
-            time.sleep(0.01)
+        wait_until(begun.exists)
         os.kill(os.getpid(), signal.SIGINT)
 
     sender = threading.Thread(target=interrupt)
@@ -219,18 +220,18 @@ ORPHAN = """
 import sys, threading, time
 from conservative.references.worker.calls import _idle, run_within
 run_within(1800, int)
-print(_idle[0].pid, flush=True)
+number = _idle[0].pid
 if sys.argv[1] == "busy":
-    run_within(600, lambda: [None for _ in iter(int, 1)])
-time.sleep(600)
+    run_within(1800, lambda: (print(number, flush=True), [None for _ in iter(int, 1)]))
+print(number, flush=True)
+time.sleep(1800)
 """
 
 
 @pytest.mark.parametrize("how", ["idle", "busy"])
 def test_the_process_does_not_outlive_a_parent_that_is_killed(how, start):
-    parent = start([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, text=True)
+    parent = start([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     process = psutil.Process(int(parent.stdout.readline()))
-    time.sleep(0.5)
     parent.kill()
     gone, _ = psutil.wait_procs([process], timeout=PATIENCE)
     assert gone == [process]

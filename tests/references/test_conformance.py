@@ -14,6 +14,8 @@ from conservative.references.worker import client
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
+from ..environments import PATIENCE
+
 PLANTED = Path(__file__).parent / "programs" / "planted.py"
 
 
@@ -80,8 +82,10 @@ NAMED = {
 
 
 @pytest.mark.parametrize("mistake", NAMED)
-def test_a_mistake_is_named(mistake):
+def test_a_mistake_is_named(mistake, monkeypatch):
     """In a method of order 1, whose error is close to that of a delay."""
+    if mistake == "one call":  # only a machine on which a call takes longer than `PACE` hides it
+        monkeypatch.setattr(conformance, "PACE", PATIENCE)
     (found,) = failures("euler", mistake)
     assert NAMED[mistake] in found
 

@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import zipfile
 
 import pytest
@@ -201,41 +200,44 @@ def test_an_environment_without_a_record_is_created_again(cache, wheels):
     assert (again.new, again.trouble) == (True, "")
 
 
-INSTALL = (
-    "import sys; from pathlib import Path\n"
-    "from conservative.references.environments.install import install\n"
-    "from conservative.references.environments.lock import Source\n"
-    "print('start', flush=True); install('trial', Source(Path(sys.argv[1]))); print('whole', flush=True)"
-)
+INSTALL = """
+import os, signal, sys
+from pathlib import Path
+from conservative.references.environments.install import install
+from conservative.references.environments.lock import Source
+changes, last = [], int(sys.argv[2])
+def note(event, arguments):
+    if event in ("os.rename", "subprocess.Popen"):
+        changes.append(event)
+        if len(changes) == last:
+            os.killpg(0, signal.SIGKILL)
+sys.addaudithook(note)
+install("trial", Source(Path(sys.argv[1])))
+print(*changes)
+"""
+"""It is killed before one of its changes: the start of a program, or the new name of a file or folder."""
 
 
-def start_install(start, wheels):
-    command = [sys.executable, "-c", INSTALL, str(wheels)]
+def install_until(start, wheels, last=0):
+    """Install up to a change, or to the end; return the changes of an installation that ended."""
+    command = [sys.executable, "-c", INSTALL, str(wheels), str(last)]
     path = os.pathsep.join([str(ROOT), *sys.path])
-    return start(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=variables(PYTHONPATH=path),
-        text=True,
-    )
+    process = start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=variables(PYTHONPATH=path), text=True)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == (-signal.SIGKILL if last else 0), err
+    return out.split()
 
 
 def test_a_kill_leaves_no_incomplete_environment(cache, wheels, start):
-    began = time.monotonic()
-    process = start_install(start, wheels)
-    assert process.communicate(timeout=PATIENCE)[0] == "start\nwhole\n"
-    duration, whole = time.monotonic() - began, 0
-    for part in (0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
+    changes = install_until(start, wheels)
+    whole = len(changes) - changes[::-1].index("os.rename")  # it has its name after the last of these
+    assert len(changes) > whole > 6  # measured 9 and 8
+    for last in range(1, len(changes) + 1):
         install.remove("trial")
-        process = start_install(start, wheels)
-        time.sleep(part * duration)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate(timeout=PATIENCE)
-        whole += len(environment.list_environments())
+        install_until(start, wheels, last)
+        assert len(environment.list_environments()) == (last > whole)
         assert installed(wheels).trouble == ""
         assert [path.name for path in (cache / "trial").iterdir()] == ["1.10"]
-    assert whole < 6
 
 
 def test_a_full_disk_leaves_nothing_and_is_reported(wheels, tmp_path, monkeypatch, trial_registered):

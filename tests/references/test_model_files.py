@@ -255,6 +255,6 @@ def test_reading_a_file_has_limits(written, monkeypatch):
     with pytest.raises(cv.BadInput) as caught:  # it filled the machine's memory, or took minutes
         body_from_mjcf(path, "arm")
     assert "2 GiB" in caught.value.allowed
-    monkeypatch.setattr(readers, "SECONDS", 0.01)
+    monkeypatch.setattr(readers, "SECONDS", 1e-6)
     with pytest.raises(cv.BadInput, match="whose reading ended"):
         body_from_mjcf(written(mjcf(JOINT + FULL[0])), "arm")

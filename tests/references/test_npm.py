@@ -25,7 +25,7 @@ from conservative.references.environments.plain_numbers import describe
 from conservative.references.worker.client import EngineCrashed
 
 from ..environments import run_python
-from .test_workers import _ends
+from .test_workers import wait_for_end
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not shutil.which("npm"), reason="needs Node and npm")]
 ADAPTER = """/* Trial engine.
@@ -208,7 +208,7 @@ def test_it_ends_with_its_client(trial):
     )
     status, out, errors = run_python(code)
     assert status == 0, errors
-    assert _ends(int(out))
+    wait_for_end(int(out))
 
 
 def test_the_data_of_an_adapter(trial):

@@ -20,7 +20,7 @@ from conservative.reports.cli.main import main
 from conservative.reports.terminal import interrupts
 from conservative.reports.terminal.interrupts import Interrupted, handle_signals
 
-from ..environments import PATIENCE, ROOT, programs, variables
+from ..environments import PATIENCE, ROOT, programs, variables, wait_until
 
 CLI = [sys.executable, "-m", "conservative"]
 SWEEP = ["sweep", "brick_flip", "--spread", "rate=1%", "--starts", "1e5", "--t-end", "600", "--dt", "1e-3", "--out", "s.zarr"]
@@ -43,10 +43,8 @@ def start(popen, arguments, folder, code=None):
         stderr=subprocess.PIPE,
         text=True,
     )
-    end = time.monotonic() + PATIENCE
-    while not temporaries(folder) and process.poll() is None and time.monotonic() < end:
-        time.sleep(0.01)
-    time.sleep(0.5)
+    wait_until(lambda: temporaries(folder) or process.poll() is not None)
+    time.sleep(0.5)  # s, so that it is usually further on; a signal that comes earlier has to end it as well
     return process
 
 
@@ -89,8 +87,7 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
     with programs() as popen:
         process = start(popen, [], tmp_path, code)
         for name in (".busy", "tidying"):
-            while not (tmp_path / name).exists() and process.poll() is None:
-                time.sleep(0.01)
+            wait_until(lambda name=name: (tmp_path / name).exists() or process.poll() is not None)
             process.send_signal(signal.SIGTERM)  # the second one of these is ignored
             time.sleep(0.1)
         assert process.poll() is None
@@ -102,8 +99,8 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
 def test_work_in_another_process_ends_with_its_command(tmp_path):
     code = (
         "import os, pathlib\nfrom conservative.references.worker.calls import run_within\n"
-        "pathlib.Path('pid').write_text(str(run_within(1800, os.getpid)))\npathlib.Path('.busy').touch()\n"
-        "run_within(600, lambda: [None for _ in iter(int, 1)])"
+        "pathlib.Path('pid').write_text(str(run_within(1800, os.getpid)))\n"
+        "run_within(600, lambda: (pathlib.Path('.busy').touch(), [None for _ in iter(int, 1)]))"
     )
     with programs() as popen:
         process = start(popen, [], tmp_path, code)

@@ -229,7 +229,7 @@ def test_a_table_sorts_by_number_both_ways(unfolded):
 
 
 def load_axe(opened):
-    opened.set_script_timeout(300)  # s: on a busy machine axe needs more than the usual 30
+    opened.set_script_timeout(PATIENCE)  # on a busy machine axe needs more than the usual 30 s
     axe = Path(find_spec("axe_core_python").submodule_search_locations[0]) / "axe.min.js"
     opened.execute_script(axe.read_text(encoding="utf-8"))
 

@@ -144,6 +144,16 @@ def test_an_error_instead_of_a_step():
     assert content["samples"] == 6  # by default
 
 
+@pytest.mark.parametrize(("dt", "error"), [(0.01, 3.1), (0.002, 0.24), (1e-4, 6e-4)])
+def test_the_error_of_a_sweep_without_a_target_is_said(dt, error):
+    """It is measured where runs of two steps differ completely, and estimated elsewhere; up to 0.1 rad a motion is accurate."""
+    arguments = ("lagrange_top", "--starts", "2", "--spread", "rate=1%", "--dt", dt, "-m", "reduced", "--t-end", "0.3")
+    content = json.loads(conservative(*arguments, "--json").stdout)
+    assert content["error"]["estimate"] == pytest.approx(error, rel=0.1)
+    assert content["error"]["reached"] is (error < 0.1)
+    assert ("the motions are inaccurate" in conservative(*arguments).stdout) is (error > 0.1)
+
+
 def test_an_error_that_is_not_reached_is_said():
     arguments = ("brick_flip", "--starts", "2", "--spread", "rate=1%", "--error", "1e-18", "--t-end", "0.2")
     content = json.loads(conservative(*arguments, "--json").stdout)

@@ -5,6 +5,7 @@ import pty
 import re
 import subprocess
 import sys
+from select import select
 
 import pytest
 
@@ -12,57 +13,68 @@ from conservative.reports.document.model import Table
 from conservative.reports.document.terminal import fit_columns, print_table
 from conservative.reports.terminal import progress
 
+from ..environments import PATIENCE, programs
+
 STEPS = """
-from time import sleep
+import sys
+from itertools import count
+from select import select
 from conservative.reports.terminal.progress import progress
 with progress() as step:
-    for k in range(8):
-        step(k / 8, "a study: a scene, with a long name")
-        sleep(0.2)
+    for k in count(1):
+        step(0.9 * k / (k + 1), "a study: a scene, with a long name")
+        if select([sys.stdin], [], [], 0.2)[0]: break
 """
-SLOW = """
-from time import sleep
+WAITING = """
+import sys
 from conservative.reports.terminal import progress
 progress.DELAY = 0.1
 with progress.show_waiting("a scene: a method"):
-    sleep(3.0)
+    sys.stdin.read()
 """
-FAST = SLOW.replace("DELAY = 0.1", "DELAY = 1800.0").replace("sleep(3.0)", "sleep(0.3)")
+QUICK = WAITING.replace("DELAY = 0.1", "DELAY = 1e6")
 
 
-def on_a_terminal(code, columns=80):
-    """Return the output of a program on a terminal of that width."""
+def on_a_terminal(code, shown="", columns=80):
+    """Return the output of a program on a terminal of that width, whose input is closed once it shows a pattern."""
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "COLUMNS": str(columns), "TERM": "xterm-256color"}
-    process = subprocess.Popen([sys.executable, "-c", code], stderr=theirs, stdout=theirs, env=environment)
-    os.close(theirs)
-    found = b""
-    while True:
-        try:
-            read = os.read(ours, 4096)
-        except OSError:  # what Linux says when the other end is closed
-            break
-        if not read:
-            break
-        found += read
-    os.close(ours)
-    assert process.wait() == 0
-    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", found.decode())
+    environment, found = {**os.environ, "COLUMNS": str(columns), "TERM": "xterm-256color"}, ""
+    with programs() as start:
+        process = start([sys.executable, "-c", code], stdin=subprocess.PIPE, stderr=theirs, stdout=theirs, env=environment)
+        os.close(theirs)
+        read = b""
+        while True:
+            if re.search(shown, found):
+                process.stdin.close()
+            assert select([ours], [], [], PATIENCE)[0], found
+            try:
+                part = os.read(ours, 4096)
+            except OSError:  # what Linux says when the other end is closed
+                break
+            if not part:
+                break
+            read += part
+            found = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", read.decode(errors="replace"))
+        os.close(ours)
+        assert process.wait(PATIENCE) == 0
+    return found
 
 
 @pytest.mark.parametrize("columns", [50, 80, 140])
 def test_a_terminal_shows_share_time_spent_and_time_left(columns):
-    lines = re.split(r"[\r\n]+", on_a_terminal(STEPS, columns))
-    assert any(re.search(r" \d\d% 0:00:\d\d left 0:00:\d\d a study", line) for line in lines), lines
+    times = r" \d\d% \d:\d\d:\d\d left \d:\d\d:\d\d a study"
+    lines = re.split(r"[\r\n]+", on_a_terminal(STEPS, times, columns))
+    assert any(re.search(times, line) for line in lines), lines
     assert max(map(len, lines)) <= columns - len("^C")  # or the terminal's ^C breaks the line, which then stays
 
 
 def test_a_single_piece_of_work_that_takes_long_is_shown():
-    assert re.search(r"0:00:0[1-9] .* a scene: a method", on_a_terminal(SLOW))
+    time = r"\d:\d\d:\d[1-9] .* a scene: a method"
+    assert re.search(time, on_a_terminal(WAITING, time))
 
 
 def test_fast_work_shows_nothing():
-    assert on_a_terminal(FAST).strip() == ""
+    assert on_a_terminal(QUICK).strip() == ""
 
 
 def test_elsewhere_there_is_nothing(capsys):

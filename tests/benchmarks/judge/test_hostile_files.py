@@ -15,6 +15,7 @@ import conservative as cv
 from conservative.attitude import to_quaternion
 from conservative.benchmarks.judge import table, verdict
 
+from ...environments import PATIENCE
 from .made import FREE, T, exact
 
 R, W = exact(FREE)
@@ -97,6 +98,12 @@ FILES = {
     "nothing": "",
     "a field of nothing": "\0" * 1000,
 }
+WORDS = {
+    "3 million fields in a row": "line 3 has more than 1000000 characters",
+    "3 million names": "line 1 has more than 1000000 characters",
+    "20,000 columns": "20000 columns",
+}
+"""What the limit of a size says; without the limit another one would be met later, or none."""
 JSON = {
     "digits": '{"t": 0, "w_x": 1, "w_y": 2, "w_z": ' + "9" * 100_000 + "}\n",
     "401 digits": '{"t": 0, "w_x": 1, "w_y": 2, "w_z": 3}\n{"t": 1, "w_x": 1, "w_y": 2, "w_z": ' + "9" * 401 + "}\n",
@@ -141,13 +148,18 @@ for path in sys.argv[1:]:
     except BadInput as error:
         assert len(str(error)) < 7000, (path, len(str(error)))
         assert "run: got " + path in str(error), str(error)
+        print(repr(str(error)[:200]))
 print("done")
 """
     made = subprocess.run(
         [sys.executable, "-c", code, *map(str, paths)],
-        input="0,1,2,3\n", text=True, capture_output=True, timeout=300, check=False, preexec_fn=limit_memory,
+        input="0,1,2,3\n", text=True, capture_output=True, timeout=PATIENCE, check=False, preexec_fn=limit_memory,
     )  # fmt: skip
-    assert (made.stdout, made.returncode) == ("done\n", 0), made.stdout + made.stderr[-2000:]
+    assert made.returncode == 0, made.stderr[-2000:]
+    *refused, done = made.stdout.splitlines()
+    assert (len(refused), done) == (len(paths), "done")
+    for (name, _), line in zip(FILES.items(), refused, strict=False):
+        assert WORDS.get(name, "") in line
 
 
 def test_a_name_that_is_not_used_is_shown_in_part(tmp_path):

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import conservative as cv
 
+from ...environments import PATIENCE
+
 MOTIONS = Path(cv.__file__).parents[1] / "references" / "motions"
 HERE = Path(__file__).parent
 MARK = re.compile(r"^(/\*|//|#) YOUR ENGINE.*?^(/\* END \*/|// END|# END)$", re.DOTALL | re.MULTILINE)
@@ -80,7 +82,7 @@ def run(language, folder, mistake, method, order, angle=0.01, single=False):
     if build:
         subprocess.run(build, check=True, cwd=folder)
     own = {"JavaScript": [MOTIONS], "Python": []}.get(language, files)
-    done = subprocess.run([*command, *map(str, own)], text=True, capture_output=True, timeout=300, cwd=folder)
+    done = subprocess.run([*command, *map(str, own)], text=True, capture_output=True, timeout=PATIENCE, cwd=folder)
     assert done.returncode in (0, 1), done.stderr
     lines = done.stdout.splitlines()
     if language != "Python":
