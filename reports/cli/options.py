@@ -35,6 +35,7 @@ VOCABULARY: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxy
 )
 """Options of several commands: their names, and those of the last release, which work with a note until the next one."""
 FAILED = "a run failed"
+FAILED_OR_INACCURATE = f"{FAILED}, or its attitude error is above 0.1 rad"
 EXIT_CODES = {
     0: "done",
     2: "invalid command or input, or a missing engine or baseline",

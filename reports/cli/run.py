@@ -9,7 +9,7 @@ import click
 from conservative.errors import require_extra
 
 from .options import (
-    FAILED,
+    FAILED_OR_INACCURATE,
     Output,
     OutputCommand,
     epilog,
@@ -34,7 +34,7 @@ FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
 @click.command(
     cls=OutputCommand,
     short_help="Integrate a scene once.",
-    codes={1: f"{FAILED}, or its attitude error is above 0.1 rad"},
+    codes={1: FAILED_OR_INACCURATE},
     epilog=epilog(
         "conservative run my_body.toml --error 1e-9 --csv run.csv",
         "conservative run brick_flip -m reduced,mujoco:RK4           a table of both",

@@ -12,7 +12,7 @@ from conservative.errors import BadInput, require_extra
 
 from . import completion
 from .options import (
-    FAILED,
+    FAILED_OR_INACCURATE,
     Count,
     FilePath,
     OutputCommand,
@@ -36,7 +36,7 @@ from .options import (
 @click.command(
     cls=OutputCommand,
     short_help="Integrate many random initial states of one scene.",
-    codes={1: FAILED},
+    codes={1: FAILED_OR_INACCURATE},
     epilog=epilog(
         "conservative sweep my_body.toml --starts 100000 --spread attitude=5deg,rate=2% --picture sweep.svg",
         "conservative sweep lagrange_top --spread inertia=1% --spread potential.weight=2% --dt 0.001 --json",
@@ -91,7 +91,8 @@ def sweep(
 ) -> None:
     """Integrate random variations of SCENE, and show the spread of attitudes, the drifts and the failures.
 
-    Without --methods and --dt, both are chosen for an attitude error of 1e-6 rad.
+    Without --methods and --dt, both are chosen for an attitude error of 1e-6 rad. The exit code is 1 if a body fails or the
+    attitude error is above 0.1 rad.
 
     Deviations are normally distributed. --spread gives the standard deviation of each component: of a rotation vector that
     turns the initial attitude, of the initial rate, of the second moments of mass, and of parameters of the potential. A

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..document.cells import angle, bound
 from ..document.model import Document, Facts
+from ..run.single_run import LARGE
 from ..run.sweep import rate_text
 
 
@@ -18,6 +19,9 @@ def build(summary: dict[str, Any]) -> Document:
         failed, first = summary["bodies"] - summary["outcomes"]["ok"], summary["failures"][0]
         words = f"{failed:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
         failures.append(f"{summary['label']} on {summary['scene']}: {words}")
+    estimate = summary["error"]["estimate"]
+    if estimate is not None and estimate > LARGE:
+        failures.append(f"{summary['label']} on {summary['scene']}: inaccurate: the attitude error is {angle(estimate)} rad")
     title = f"{summary['bodies']:,} bodies of {summary['scene']}"
     return Document("conservative sweep", title, [Facts(list(_facts(summary)))], data=summary, failures=failures)
 

@@ -110,10 +110,13 @@ def test_a_lost_motion_is_never_ok_without_a_sentence(tmp_path):
     assert "reduced: inaccurate: the attitude error is 3" in watched.stdout
     swept = conservative("sweep", *LOST, "--starts", "2", "--spread", "rate=1%")
     assert "the motions are inaccurate" in swept.stdout
+    assert swept.exit_code == 1
     coarse = ("-m", "taylor:order=16", "--dt", "0.25", "--t-end", "0.5")  # accurate, but not with twice the step
-    assert "inaccurate" not in conservative("sweep", "brick_flip", *coarse, "--starts", "2", "--spread", "rate=1%").stdout
-    right = conservative("sweep", "lagrange_top", "--dt", "0.0001", "--t-end", "0.01", "--starts", "2", "--spread", "rate=1%")
-    assert "inaccurate" not in right.stdout
+    fine = ("--dt", "0.0001", "--t-end", "0.01")
+    for right in (("brick_flip", *coarse), ("lagrange_top", *fine)):
+        swept = conservative("sweep", *right, "--starts", "2", "--spread", "rate=1%")
+        assert "inaccurate" not in swept.stdout
+        assert swept.exit_code == 0
     assert run_as_json("lagrange_top", "--no-truth")["status"] == "ok"  # its error is estimated
 
 
