@@ -113,6 +113,7 @@ def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_ends(fits: pd.DataFrame) -> pd.DataFrame:
-    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad)."""
+    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad); uncertain fits are left out."""
+    fits = fits[fits["stderr"] <= SURE]
     ends = [fits.rename(columns={end: "dt", f"error_{end}": "error"})[["name", "dt", "error"]] for end in ("coarse", "fine")]
     return pd.concat(ends, ignore_index=True).dropna()
