@@ -17,6 +17,7 @@ from conservative.needs import Need
 from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
+from conservative.reports.document import latex
 from conservative.reports.document.attempt import failed_parts
 from conservative.reports.document.model import Document, Motion, Paragraph, Table, walk
 from conservative.reports.run import measure
@@ -214,6 +215,15 @@ def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, tmp_pat
     page = (tmp_path / "report" / "index.html").read_text()
     assert page.count("ZeroDivisionError: planted") == 1
     assert "observed order" in page  # the table next to it
+
+
+def test_tables_in_latex_that_fail_leave_the_pages(rows_of_a_report, tmp_path, monkeypatch):
+    monkeypatch.setattr(latex, "render", fault)
+    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--latex"])
+    assert done.exit_code == 1
+    assert "'report.tex' could not be made (ZeroDivisionError: planted)" in done.stderr
+    assert {"index.html", "report.md", "measurements.csv"} <= {path.name for path in (tmp_path / "report").iterdir()}
+    assert "observed order" in (tmp_path / "report" / "index.html").read_text()
 
 
 def test_measurements_are_written_if_no_page_can_be(rows_of_a_report, tmp_path, monkeypatch):
