@@ -17,6 +17,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement, Samples
 from ..measures.timing import Preparation, Timing, prepare_and_run
@@ -73,6 +74,18 @@ class Case:
     def rows(self, values: Iterable[Value], outcome: Outcome = OK, detail: str = "") -> list[Measurement]:
         """Return a row for each value."""
         return [self.row(value, outcome, detail) for value in values]
+
+    def accuracy_rows(self, trajectory: Trajectory, truth: Trajectory | Outcome) -> list[Measurement]:
+        """Return a row for every error and drift of a run that reached its end.
+
+        `truth` is the reference solution at the same times, or the reason why there is none. Then errors are rows with the
+        reason; drifts need no reference solution.
+        """
+        if isinstance(truth, Trajectory):
+            return self.rows(errors.measure_errors(trajectory, truth))
+        drifts = errors.measure_drifts(trajectory)
+        known = {value.key for value in drifts}
+        return self.rows(drifts) + self.rows((value for value in errors.blanks(self.scene) if value.key not in known), truth)
 
     def time_row(self, measure: Measure, spent: float, timing: Timing, process: int | None = None) -> Measurement:
         """Return the row of a measured time, s; its detail is the number of rounds and calls."""

@@ -122,7 +122,10 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
 
     They are those of this engine, of the most accurate engine, and of our methods, each at its worst and at its best setting.
     """
-    engines, ours = ([each for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
+    known = [each for each in found if each.outcome.ok and not math.isnan(each.error)]
+    if not known and any(each.outcome.ok for each in found):
+        return f"The attitude errors on {scene.name} are not known, because its two reference solutions disagree."
+    engines, ours = ([each for each in known if each.ours is side] for side in (False, True))
     parts, others = [], dict[str, float]()
     if engines:
         worst, best = engines[0], engines[-1]

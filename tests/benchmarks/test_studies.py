@@ -159,6 +159,26 @@ def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
     assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
 
 
+@pytest.mark.parametrize("name", ["paper", "motion"])
+def test_drifts_are_measured_without_a_reference_solution(name):
+    def find(scene, grid):
+        raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
+
+    measured = {}
+    for source in (find, truth):
+        found = [*studies.rows(Study(name, (SCENE,), (cv.Reduced(),), quick=True, truth=source))]
+        measured[source] = {(row.dt, row.measure, row.quantity): row for row in found if row.method}
+    assert measured[find].keys() == measured[truth].keys()
+    errors_of_samples = {value.measure for value in errors.blanks(SCENE) if not value.quantity} - {Measure.ORTHONORMALITY}
+    for key, row in measured[find].items():
+        if key[1] in errors_of_samples:
+            assert row.outcome.kind is OutcomeKind.SKIPPED
+            assert "one and other differ by 0.5 rad" in row.outcome.reason
+        else:
+            assert row.value == measured[truth][key].value
+            assert row.outcome.ok
+
+
 def test_a_disagreement_is_found_once():
     asked = []
 
