@@ -90,6 +90,11 @@ def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
     assert words in told(*lines).sentence
 
 
+def test_a_scene_without_measured_times_says_so():
+    none = points(with_names(frame([*OURS])).iloc[:0])
+    assert summary.of_scene(none, False).sentence.endswith("No time was measured against an error.")
+
+
 def test_the_best_of_a_family_is_its_front():
     bad = point("gauss:stages=2", "ours", 1e-2, 9e-6)
     picture = told(OURS, bad, SOLVER).points
