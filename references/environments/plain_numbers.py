@@ -9,7 +9,7 @@ import numpy as np
 
 from conservative.attitude import to_quaternion
 from conservative.batch import Batch
-from conservative.errors import IntegrationFailed, shorten
+from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.methods.many import Block
 from conservative.methods.units import SI, find_units
@@ -139,7 +139,7 @@ def _count(answer: Mapping[str, Any], name: str) -> int | None:
     """Return a count of an answer for one body; arrays are of many bodies."""
     value = answer.get(name)
     if value is not None and not (is_number(value) and value == int(value)):
-        raise EngineCrashed(f"it answers `run` with `{name}`: {shorten(repr(value)[:100])}; expected a whole number of 0 or more")
+        raise EngineCrashed(f"it answers `{name}`: {repr(value)[:100]}; expected a whole number of 0 or more")
     return None if value is None else int(value)
 
 
