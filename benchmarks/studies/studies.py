@@ -65,8 +65,12 @@ def findings(study: Study, progress: Progress = lambda share, what: None) -> Ite
 def _go_on(study: Study, progress: Progress) -> Iterator[Finding]:
     left: Study | None = study
     while left:
+
+        def tell(share: float, what: str, part: float = len(left.scenes) / len(study.scenes)) -> None:
+            progress(1 - part + share * part, what)
+
         try:
-            yield from STUDIES[study.name].findings(left, progress)
+            yield from STUDIES[study.name].findings(left, tell)
             return
         except Disagreement as failure:
             i = [scene.name for scene in left.scenes].index(failure.scene)

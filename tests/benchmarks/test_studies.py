@@ -7,6 +7,7 @@ import pytest
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, Value
+from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
@@ -152,9 +153,11 @@ def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
             raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
         return truth(scene, grid)
 
-    scenes = (SCENE.rename("first"), SCENE.rename("unknown"), SCENE)
-    found = [*studies.rows(Study(name, scenes, (cv.Reduced(),), quick=True, truth=find))]
-    kinds = {(row.scene, row.outcome.kind) for row in found}
+    scenes, shares = (SCENE.rename("first"), SCENE.rename("unknown"), SCENE), []
+    study = Study(name, scenes, (cv.Reduced(),), quick=True, truth=find)
+    found = [*studies.findings(study, lambda share, _: shares.append(share))]
+    kinds = {(row.scene, row.outcome.kind) for row in found if isinstance(row, Measurement)}
+    assert shares == sorted(shares)
     assert {scene for scene, kind in kinds if kind in (OutcomeKind.OK, OutcomeKind.NO_ORDER)} >= {"first", SCENE.name}
     assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
 
