@@ -132,7 +132,7 @@ class Gate:
     def is_left_out(self, id: str) -> bool:
         """Return whether a benchmark exists, as far as this run has looked, and was not run, because it was not selected.
 
-        One that was not seen can exist in a file or a class that was not read, because a path, node id or option selects others.
+        One that was not seen can exist in a file or a class that was not read, because paths or options select others.
         """
         if id in self.rows:
             return False
