@@ -170,7 +170,7 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
     if ours := list(dict.fromkeys(each.family for each in found if each.ours)):
         caption += f" Ours: {listed(ours)}."
-    kept = [each for each in found if each.drifts and max(each.drifts.values()) <= CONSERVED]
+    kept = [each for each in found if each.drifts and all(drift <= CONSERVED for drift in each.drifts.values())]
     if still := [each.line for each in kept if each.error > RIGHT]:
         names = listed([each.name for each in scene.invariants])
         caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."
