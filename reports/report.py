@@ -22,7 +22,7 @@ from .run.provenance import provenance
 from .terminal.progress import Step, announce
 from .terminal.report_folder import MANIFEST, report_folder
 
-AGAIN = "All measurements are written. After an update of the package, the same command with --resume makes it from them."
+AGAIN = "All measurements are written. Once the fault is mended, the same command with --resume makes it without measuring."
 
 
 def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
