@@ -168,6 +168,8 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
     caption += f"✗ above {tolerance(SMALL)}. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
+    if scene.loaded:
+        caption += " A balance counts work and impulse as the method sums them, or as the reference solution does."
     if ours := list(dict.fromkeys(each.family for each in found if each.ours)):
         caption += f" Ours: {listed(ours)}."
     kept = [each for each in found if each.drifts and all(drift <= CONSERVED for drift in each.drifts.values())]
