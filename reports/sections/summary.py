@@ -63,8 +63,10 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool, measured: boo
         sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if first is ours else -1]
         times = f"{_speedup(first, second)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
-    elif there := ours or engine:
-        parts.append(f"Only {there.name} reaches {goal}.")
+    elif ours:
+        parts.append(f"Our fastest general integrator, {ours.name}, reaches {goal}; no measured engine or solver does.")
+    elif engine:
+        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; none of our general integrators does.")
     else:
         parts.append(f"No measured method reaches {goal}." if measured else "No time was measured against an error.")
     if solution and engine:
