@@ -144,7 +144,11 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
     panels = []
     for kind, part in drifts.groupby("quantity", sort=False):
         ends = part["drift"].min(), part["drift"].max()
+        largest = max(-ends[0], ends[1])
         powers = [10.0**k for k in range(-12, 13, 3)]
+        if 0 < largest < powers[0]:  # of round-off alone: one number on each side
+            decade = math.floor(math.log10(largest))
+            powers = [max(each for each in (float(f"{digit}e{decade}") for digit in (1, 2, 5)) if each <= largest)]
         ticks = [-p for p in powers if -p >= 10 * ends[0]] + [0.0] + [p for p in powers if p <= 10 * ends[1]]
         axis = alt.Axis(
             title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"

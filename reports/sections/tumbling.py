@@ -112,7 +112,7 @@ def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list
     signs = "Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far."
     if exact and (end := motions[exact[0]].t[-1]) < scene.t_end * (1 - 1e-9):
         signs += f" Only the first {end:.3g} s are drawn, because the body turns too often."
-    labels = [names.get(name, "exact") for name in shown]
+    labels = [names.get(name, lines.EXACT) for name in shown]
     motion = Motion([motions[name] for name in shown], labels, 0 if exact else None, [values.get(name) for name in shown])
     return [motion, Paragraph(signs, Emphasis.NOTE)]
 

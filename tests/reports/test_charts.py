@@ -134,6 +134,29 @@ def test_guides_of_growth_stay_within_the_axes_and_have_their_slopes():
     assert found["shown"].between(1e-15, part["shown"].max() * (1 + 1e-9)).all()
 
 
+@pytest.mark.parametrize(("largest", "tick"), [(9.98e-17, 5e-17), (3e-13, 2e-13), (2e-12, 1e-12), (0.3, 1.0)])
+def test_an_axis_of_drifts_has_a_number_beside_zero(largest, tick):
+    rows = pd.DataFrame({"t": [0.0, 1.0], "drift": [0.0, -largest], "quantity": "energy", "name": "a", "family": "a"})
+    spec = figures.signed_drift(rows).to_dict()
+    values = spec["hconcat"][0]["encoding"]["y"]["axis"]["values"]
+    assert min(values) == -tick  # up to ten times the largest drift
+    assert 0 in values
+
+
+def test_the_exact_motion_has_one_name_and_methods_without_a_balance_no_line():
+    methods = ["precise", "reduced", "scipy"]
+    columns = {
+        "study": "motion",
+        "scene": "s",
+        "t": 0.0,
+        "quantity": "drift of energy balance",
+        "method": methods,
+        "family": methods,
+    }
+    more = {"line": ["precise 256 bits", "reduced", "scipy"], "role": ["truth", "ours", "engine"], "value": [0.0, 1e-9, np.nan]}
+    assert lines.signed_drifts(pd.DataFrame(columns | more))["name"].tolist() == ["exact", "reduced"]
+
+
 def test_an_uncertain_fit_has_neither_a_bold_stretch_nor_a_guide():
     fits = pd.DataFrame({"name": ["a", "b"], "stderr": [0.1, 19.0]})
     fits = fits.assign(coarse=1.0, fine=0.1, error_coarse=1.0, error_fine=1e-4)
