@@ -79,8 +79,9 @@ def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
     """Return dashed rising lines of known slopes with labels, from the two ends of each: columns text, and those of x and y."""
     base = alt.Chart(ends).encode(x=x, y=y)
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
-    first, second = (np.log(end) for end in (ends.groupby("text").first(), ends.groupby("text").last()))
-    places = (first + LABELS_AT * (second - first)).apply(np.exp).reset_index()  # at the ends they would run into an axis
+    logs: Any = ends.set_index("text").apply(np.log).groupby("text")
+    first, second = logs.first(), logs.last()
+    places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # at the ends they would run into an axis
     labels = alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, color=PALETTE["grey"])
     return [lines, labels.encode(x=x, y=y, text="text:N")]
 
