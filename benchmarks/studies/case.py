@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import conservative
 from conservative.attitude import Array
 from conservative.card import Maker
-from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine, PotentialFailed, TorqueFailed
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.outcome import OK, Outcome, OutcomeKind
@@ -151,7 +151,9 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
         return Outcome(OutcomeKind.MISSING, str(error))
     if isinstance(error, IntegrationFailed):
         return error.outcome
-    if isinstance(error, BadInput) and not isinstance(error, MissingEngine):  # a step that the method does not have
+    if isinstance(
+        error, BadInput | PotentialFailed | TorqueFailed
+    ):  # a step that the method does not have, a function that fails
         return Outcome(OutcomeKind.UNSUPPORTED, str(error))
     if isinstance(error, MissingEngine) or method.role != Role.ENGINE:
         raise error
@@ -161,8 +163,8 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
 def attempt(case: Case, skip_missing: bool = False) -> Success | Outcome:
     """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
 
-    Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome; see
-    `outcome_of_error`.
+    Failures of the integration, unsupported scenes and steps, functions of the scene that fail, and exceptions of an engine
+    become an outcome; see `outcome_of_error`.
     """
     try:
         if reason := case.method.unsupported(case.scene):

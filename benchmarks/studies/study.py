@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from conservative.check import positive_integer, positive_number
-from conservative.errors import BadInput
+from conservative.errors import BadInput, PotentialFailed, TorqueFailed
 from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.truth import Disagreement, Truth, reference
+from conservative.references.truth import Disagreement, Truth, Unsolvable, reference
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -54,6 +54,8 @@ def remember_truths(find: FindTruth = reference) -> FindTruth:
         except Disagreement as failure:
             failed[scene] = end, failure
             raise
+        except (BadInput, PotentialFailed, TorqueFailed) as failure:  # such as of a record up to t_end, in a last step beyond
+            raise Unsolvable(scene.name, failure) from None
 
     return remembered
 
@@ -146,7 +148,7 @@ class Study:
         return attempt_here(self.hang_limit, case, self.skip_missing)
 
     def find_truth(self, scene: Scene, grid: Grid) -> Trajectory | Outcome:
-        """Return the reference solution, or the outcome of rows that cannot be measured because two solutions disagree."""
+        """Return the reference solution, or the outcome of rows that cannot be measured without a confirmed one."""
         try:
             return self.truth(scene, grid).trajectory
         except Disagreement as failure:
@@ -192,7 +194,7 @@ class Study:
 
 
 def without_truth(failure: Disagreement) -> Outcome:
-    """Return the outcome of rows that need a reference solution, of a scene whose two solutions disagree."""
+    """Return the outcome of rows that need a reference solution, of a scene without a confirmed one."""
     return Outcome(OutcomeKind.SKIPPED, f"no reference solution: {failure}")
 
 

@@ -124,7 +124,7 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
     """
     known = [each for each in found if each.outcome.ok and not math.isnan(each.error)]
     if not known and any(each.outcome.ok for each in found):
-        return f"The attitude errors on {scene.name} are not known, because its two reference solutions disagree."
+        return f"The attitude errors on {scene.name} are not known: no reference solution is confirmed by another one."
     engines, ours = ([each for each in known if each.ours is side] for side in (False, True))
     parts, others = [], dict[str, float]()
     if engines:

@@ -2,6 +2,7 @@ import math
 from contextlib import nullcontext
 from functools import cache
 
+import numpy as np
 import pytest
 
 import conservative as cv
@@ -16,7 +17,7 @@ from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
-from conservative.references.truth import Disagreement, Truth
+from conservative.references.truth import Disagreement, Truth, reference
 from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
@@ -160,6 +161,24 @@ def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
     assert shares == sorted(shares)
     assert {scene for scene, kind in kinds if kind in (OutcomeKind.OK, OutcomeKind.NO_ORDER)} >= {"first", SCENE.name}
     assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
+
+
+@pytest.mark.parametrize("name", ["paper", "motion"])
+def test_a_function_that_fails_in_a_last_step_beyond_its_record_loses_no_scene(name):
+    def torque(t):
+        if t > 0.205:
+            raise ValueError("beyond the record")
+        return 0.1, 0.0, 0.2
+
+    start = np.eye(3), (0.1, 1.0, 0.2), 0.205
+    recorded = cv.Scene("recorded", cv.RigidBody((1, 2, 2.5)), *start, torque=cv.Torque(torque), dt=0.02)
+    find = remember_truths(lambda scene, grid: (truth if scene is SCENE else reference)(scene, grid))
+    study = Study(name, (recorded, SCENE), (cv.Reduced(),), quick=True, truth=find)
+    rows = [*studies.rows(study)]
+    reasons = [row.outcome.reason for row in rows if row.scene == "recorded" and not row.outcome.ok]
+    assert reasons
+    assert all("beyond the record" in reason for reason in reasons)
+    assert any(row.scene == SCENE.name and row.outcome.ok for row in rows)
 
 
 @pytest.mark.parametrize("name", ["paper", "motion"])
