@@ -211,6 +211,19 @@ def printable_text(argument: str, value: object, allowed: str) -> str:
     return value
 
 
+LONGEST_NAME = 1000
+"""Most characters of a name, which is in messages, tables, pictures and each row of measurements."""
+NAME = f"a text of one character to {LONGEST_NAME:,}"
+
+
+def name_text(value: object) -> str:
+    """Return the argument `name`, a text that can be shown."""
+    name = printable_text("name", value, NAME)
+    if not 0 < len(name) <= LONGEST_NAME:
+        raise BadInput("name", describe(name), NAME)
+    return name
+
+
 def unit_vector(argument: str, value: ArrayLike, allowed: str = "three finite numbers (3,), not all 0", size: int = 3) -> Array:
     """Return the unit vector (size,) along a vector (size,) of any length above 0."""
     direction = finite_array(argument, value, ((size,),), allowed)

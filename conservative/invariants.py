@@ -11,13 +11,12 @@ import numpy as np
 
 from .attitude import Array
 from .body import RigidBody
-from .check import describe, printable_text, real_number
+from .check import describe, name_text, printable_text, real_number
 from .errors import BadInput
 from .potentials.potential import AnyPotential, depends_on_time, energy_at
 from .potentials.turning import Turning
 from .potentials.uniform_gravity import UniformGravity
 
-_NAME = "a text of one character or more"
 MOMENTUM_UNIT = "kg m^2/s"
 AXIAL_MOMENTUM = "axial momentum"
 JACOBI_INTEGRAL = "Jacobi integral"
@@ -48,8 +47,7 @@ class Invariant:
     supplied: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
-        if not printable_text("name", self.name, _NAME):
-            raise BadInput("name", "''", _NAME)
+        name_text(self.name)
         printable_text("unit", self.unit, "a text")
         number = real_number(self.scale)
         if number is None or not 0 < number < math.inf:

@@ -18,6 +18,7 @@ from .check import (
     PickledByFields,
     describe,
     finite_array,
+    name_text,
     positive_number,
     printable_text,
     replace_unchecked,
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Settings = TypeVarTuple("Settings")
-_NAME = "a text of one character or more"
 MOST_DERIVATIONS = 64
 """Largest number of results in the cache of `Scene.derive`."""
 
@@ -123,8 +123,7 @@ class Scene(PickledByFields):
         v_WB0: ArrayLike | None = None,
         flight: Flight | None = None,
     ) -> None:
-        if not printable_text("name", name, _NAME):
-            raise BadInput("name", "''", _NAME)
+        name = name_text(name)
         if p_WB0 is not None or v_WB0 is not None:
             (body, flight), potential = read_flight(body, potential, p_WB0, v_WB0), None
         if not isinstance(body, RigidBody):

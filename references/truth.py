@@ -62,6 +62,14 @@ class Disagreement(ArithmeticError):
         )
 
 
+class Unsolvable(Disagreement):
+    """A scene without a reference solution up to a time, because one of its functions fails before."""
+
+    def __init__(self, scene: str, cause: Exception) -> None:
+        self.scene, self.cause = scene, cause
+        ArithmeticError.__init__(self, f"scene: got {scene!r}, which cannot be solved ({cause})")
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """A reference solution.

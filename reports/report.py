@@ -22,18 +22,7 @@ from .run.provenance import provenance
 from .terminal.progress import Step, announce
 from .terminal.report_folder import MANIFEST, report_folder
 
-AGAIN = "All measurements are written. After an update of the package, the same command with --resume makes it from them."
-
-
-def render_pages(document: Document, folder: Path) -> None:
-    """Write the documents next to a document, and their badges."""
-    from .document import html, markdown
-
-    for name, page in document.pages.items():
-        files.write_text(folder / f"{name}.md", markdown.render(page), "out")
-        files.write_text(folder / f"{name}.html", html.render(page), "out")
-        if page.badge:
-            files.write_text(folder / f"{name}.svg", page.badge, "out")
+AGAIN = "All measurements are written. Once the fault is mended, the same command with --resume makes it without measuring."
 
 
 def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
@@ -64,7 +53,6 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
                 from .sections.report import build  # here, as altair takes a second to import
 
                 document = render(build(plan, measurements, source), folder, plan.png, plan.latex)
-                render_pages(document, folder)
             except NotWritten:
                 raise
             except Exception as error:  # the folder has the measurements
@@ -77,26 +65,47 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
         if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
         raise
-    if not (failed := list(dict.fromkeys(failed_parts([*document.blocks, *(document.brief or [])])))):
+    pages = [block for page in document.pages.values() for block in page.blocks]
+    if not (failed := list(dict.fromkeys(failed_parts([*document.blocks, *(document.brief or []), *pages])))):
         progress.remove()
     return replace(document, failures=[*document.failures, *failed])
 
 
 def render(document: Document, folder: Path, png: bool, latex: bool = False) -> Document:
-    """Write report.md with its pictures, the page and, if `latex`, the tables in report.tex.
+    """Write report.md with its pictures, the page, the pages next to it, and, if `latex`, the tables in report.tex.
 
-    Return the document as it was written, in which the parts that could not be drawn are sentences.
+    Return the document as it was written, in which the parts that could not be made are sentences.
     """
-    from .document import html, markdown, text
+    from .document import latex as tables
 
-    document, pictures = with_pictures(document, draw_into(folder, png), AGAIN)
-    document, page = render_all(document, html.render, AGAIN)
-    document, words = render_all(document, lambda part: markdown.render(part, lambda figure: pictures[figure.name]), AGAIN)
-    files.write_text(folder / "report.md", words, "out")
-    files.write_text(folder / "index.html", page, "out")
+    draw = draw_into(folder, png)
+    document = write_page(document, draw, folder / "index.html", folder / "report.md")
     if latex:
-        files.write_text(folder / "report.tex", text(document, "latex"), "out")
-    return document
+        document = write_text(document, folder / "report.tex", tables.render)
+    pages = dict[str, Document]()
+    for name, page in document.pages.items():
+        pages[name] = write_page(page, draw, folder / f"{name}.html", folder / f"{name}.md")
+        if page.badge:
+            files.write_text(folder / f"{name}.svg", page.badge, "out")
+    return replace(document, pages=pages)
+
+
+def write_page(document: Document, draw: Callable[[Figure], str], page: Path, words: Path) -> Document:
+    """Write a document as HTML and as Markdown with its pictures, and return it as `render` does."""
+    from .document import html, markdown
+
+    document, pictures = with_pictures(document, draw, AGAIN)
+    document = write_text(document, page, html.render)
+    return write_text(document, words, lambda part: markdown.render(part, lambda figure: pictures[figure.name]))
+
+
+def write_text(document: Document, path: Path, render: Callable[[Document], str]) -> Document:
+    """Write a document as a text into a file, and return it as `render` does. No file is written if all of it fails."""
+    made = attempt(f"The file {path.name!r}", lambda: render_all(document, render, AGAIN), AGAIN)
+    if isinstance(made, Paragraph):
+        return replace(document, blocks=[*document.blocks, made])
+    files.write_text(path, made[1], "out")
+    return made[0]
 
 
 def with_pictures(document: Document, draw: Callable[[Figure], str], then: str = "") -> tuple[Document, dict[str, str]]:

@@ -59,6 +59,7 @@ API = [
     (lambda: cv.RigidBody("heavy"), "inertia", "'heavy'", "(3,)"),
     # scenes
     (lambda: scene(name=""), "name", "''", "one character"),
+    (lambda: scene(name="n" * 1001), "name", "'nnn", "1,000"),
     (lambda: scene(body=(1, 2, 3)), "body", "(1, 2, 3)", "RigidBody"),
     (lambda: scene(R_WB0=SHEAR), "R_WB0", "|R'R - 1| = 0.001", "rotation"),
     (lambda: scene(R_WB0=np.diag([1, 1, -1])), "R_WB0", "reflection", "determinant +1"),
@@ -146,6 +147,7 @@ API = [
     (lambda: cv.Card(takes=frozenset({"uniform gravity", cv.Need.ROTOR})), "takes", "'uniform gravity'", "Need.GRAVITY"),
     (lambda: cv.Card(takes=[cv.Need.GRAVITY]), "takes", "Need.GRAVITY", "a set of members"),
     (lambda: scene(potential=Texts(1.0, (0, 0, 1))), "needs", "'gravity'", "Need.GRAVITY"),
+    (lambda: cv.Invariant("i" * 1001, "J", 1.0, len), "name", "'iii", "1,000"),
     (lambda: cv.Invariant("i", "J", 0.0, len), "scale", "0.0", "above 0"),
     (lambda: cv.Invariant("i", "J", 1.0, None), "evaluate", "None", "a function"),
     (lambda: body_from_mjcf("a\0b", "arm"), "path", "x00", "without NUL"),

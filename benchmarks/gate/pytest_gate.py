@@ -132,14 +132,15 @@ class Gate:
     def is_left_out(self, id: str) -> bool:
         """Return whether a benchmark exists, as far as this run has looked, and was not run, because it was not selected.
 
-        One that was not seen can exist in a file or a class that was not read, because paths, node ids or `--lf` select others.
+        One that was not seen can exist in a file or a class that was not read, because paths or options select others.
         """
         if id in self.rows:
             return False
         if id in self.benchmarks or any(id.startswith(f"{name}::") for name in self.classes - self.read):
             return True
         file, some = id.partition("::")[0], self.config.args_source is pytest.Config.ArgsSource.ARGS
-        return file not in self.read and (some or self.config.getoption("lf", False)) and self.has_file(file)
+        some = some or any(self.config.getoption(name, None) for name in ("lf", "ignore", "ignore_glob"))
+        return file not in self.read and some and self.has_file(file)
 
     def has_file(self, name: str) -> bool:
         """Return whether the suite or the project has a file of a name, outside of folders that pytest does not search."""

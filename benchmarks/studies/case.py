@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import conservative
 from conservative.attitude import Array
 from conservative.card import Maker
-from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine, PotentialFailed, TorqueFailed
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement, Samples
 from ..measures.timing import Preparation, Timing, prepare_and_run
@@ -73,6 +74,18 @@ class Case:
     def rows(self, values: Iterable[Value], outcome: Outcome = OK, detail: str = "") -> list[Measurement]:
         """Return a row for each value."""
         return [self.row(value, outcome, detail) for value in values]
+
+    def accuracy_rows(self, trajectory: Trajectory, truth: Trajectory | Outcome) -> list[Measurement]:
+        """Return a row for every error and drift of a run that reached its end.
+
+        `truth` is the reference solution at the same times, or the reason why there is none. Then errors are rows with the
+        reason; drifts need no reference solution.
+        """
+        if isinstance(truth, Trajectory):
+            return self.rows(errors.measure_errors(trajectory, truth))
+        drifts = errors.measure_drifts(trajectory)
+        known = {value.key for value in drifts}
+        return self.rows(drifts) + self.rows((value for value in errors.blanks(self.scene) if value.key not in known), truth)
 
     def time_row(self, measure: Measure, spent: float, timing: Timing, process: int | None = None) -> Measurement:
         """Return the row of a measured time, s; its detail is the number of rounds and calls."""
@@ -138,7 +151,9 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
         return Outcome(OutcomeKind.MISSING, str(error))
     if isinstance(error, IntegrationFailed):
         return error.outcome
-    if isinstance(error, BadInput) and not isinstance(error, MissingEngine):  # a step that the method does not have
+    if isinstance(
+        error, BadInput | PotentialFailed | TorqueFailed
+    ):  # a step that the method does not have, a function that fails
         return Outcome(OutcomeKind.UNSUPPORTED, str(error))
     if isinstance(error, MissingEngine) or method.role != Role.ENGINE:
         raise error
@@ -148,8 +163,8 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
 def attempt(case: Case, skip_missing: bool = False) -> Success | Outcome:
     """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
 
-    Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome; see
-    `outcome_of_error`.
+    Failures of the integration, unsupported scenes and steps, functions of the scene that fail, and exceptions of an engine
+    become an outcome; see `outcome_of_error`.
     """
     try:
         if reason := case.method.unsupported(case.scene):

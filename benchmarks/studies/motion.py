@@ -65,8 +65,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
         tell(f"{scene.name}: exact")
         exact = truth_of_frames(study, scene)
         solver = Exact() if Exact().unsupported(scene) is None else Precise()
-        grid = Grid(scene.t_end / FRAMES, FRAMES)
-        yield from _lines(Case(study.name, scene, solver, grid), exact, exact, exact)
+        if isinstance(exact, Trajectory):
+            grid = Grid(scene.t_end / FRAMES, FRAMES)
+            yield from _lines(Case(study.name, scene, solver, grid), exact, exact, exact)
         runs = {method: list_runs(study, scene, method, method in drawn) for method in study.competitors}
         skipped = study.skip_slow([each[-1] for each in runs.values()], [each[0] for each in runs.values() if len(each) > 1])
         for method, cases in runs.items():
@@ -75,9 +76,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
             for case in cases:
                 done = skipped.get(case) or study.attempt(case)
                 if isinstance(done, Success):
-                    begin, truth = head(done.trajectory, first.n_samples), study.truth(scene, first).trajectory
-                    yield from case.rows(errors.measure_errors(begin, truth))
-                    if method in drawn:
+                    begin, truth = head(done.trajectory, first.n_samples), study.find_truth(scene, first)
+                    yield from case.accuracy_rows(begin, truth)
+                    if method in drawn and isinstance(exact, Trajectory) and isinstance(truth, Trajectory):
                         yield from _lines(case, done.trajectory, begin, exact, angle_between(truth.R_WB, begin.R_WB))
                     break
             if isinstance(done, Outcome):
@@ -102,15 +103,20 @@ def select_methods(methods: Sequence[Method]) -> list[Method]:
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 
 
-def truth_of_frames(study: Study, scene: Scene) -> Trajectory:
-    """Return the exact motion at the times of frames: of the first duration, or of the part that `MOST_FRAMES` can show."""
-    exact = study.truth(scene, Grid(scene.t_end / FRAMES, FRAMES)).trajectory
+def truth_of_frames(study: Study, scene: Scene) -> Trajectory | Outcome:
+    """Return the exact motion at the times of frames: of the first duration, or of the part that `MOST_FRAMES` can show.
+
+    If two reference solutions disagree, return the reason (`Study.find_truth`).
+    """
+    exact = study.find_truth(scene, Grid(scene.t_end / FRAMES, FRAMES))
+    if isinstance(exact, Outcome):
+        return exact
     fastest = float(np.linalg.norm(exact.w_WB_B, axis=1).max())
     if fastest * scene.t_end <= FRAMES * TURN:
         return exact
     end = min(scene.t_end, MOST_FRAMES * TURN / fastest)
     n = min(MOST_FRAMES, math.ceil(fastest * end / TURN))
-    return study.truth(scene, Grid(end / n, n)).trajectory
+    return study.find_truth(scene, Grid(end / n, n))
 
 
 def _lines(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from conservative.grid import Grid, grid_for
 from conservative.method import Role
 from conservative.outcome import Outcome
-from conservative.references.truth import Truth
+from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -16,7 +16,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .declaration import Declaration
-from .study import Progress, Study
+from .study import Progress, Study, without_truth
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
@@ -36,11 +36,16 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             for grid in grids
         ]
         skipped = study.skip_slow(*ranks)
-        truths: dict[Grid, Truth] = {}
+        truths: dict[Grid, Trajectory | Outcome] = {}
         for grid, rank in zip(grids, ranks, strict=True):
             if not skipped or any(case not in skipped and not case.method.unsupported(scene) for case in rank):
-                truths[grid] = study.truth(scene, grid)
-                yield agreement_row(study, scene, grid.dt, truths[grid])
+                try:
+                    truth = study.truth(scene, grid)
+                except Disagreement as failure:
+                    truths[grid] = without_truth(failure)
+                else:
+                    truths[grid] = truth.trajectory
+                    yield agreement_row(study, scene, grid.dt, truth)
         for method in study.methods:
             tell(f"{scene.name}: {method.name}")
             for case in (case for rank in ranks for case in rank if case.method is method):
@@ -48,7 +53,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 if isinstance(done, Outcome):
                     yield from case.rows(errors.blanks(scene), done)
                 else:
-                    yield from measure_accuracy(case, done, truths[case.grid].trajectory)
+                    yield from measure_accuracy(case, done, truths[case.grid])
 
 
 def agreement_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
@@ -67,8 +72,8 @@ def agreement_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measur
     )
 
 
-def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> list[Measurement]:
-    """Return a row for every measure and counter; without values if the run failed."""
+def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory | Outcome) -> list[Measurement]:
+    """Return a row for every measure and counter (see `Case.accuracy_rows`); without values if the run failed."""
     if isinstance(done, Outcome):
         return case.rows(errors.blanks(case.scene), done)
     counters = done.trajectory.counters
@@ -78,7 +83,7 @@ def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> 
         Measure.EVALUATIONS: counters.evaluations,
     }
     counts = [Value(measure, float(count)) for measure, count in work.items() if count is not None]
-    return case.rows(errors.measure_errors(done.trajectory, truth) + counts)
+    return case.accuracy_rows(done.trajectory, truth) + case.rows(counts)
 
 
 STUDY = Declaration(findings)

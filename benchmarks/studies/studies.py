@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from conservative.check import choice
 from conservative.grid import grid_for
-from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.truth import Disagreement
 
 from ..measures import errors
@@ -36,7 +35,7 @@ from . import (
 )
 from .case import Case
 from .declaration import Declaration
-from .study import Finding, Progress, Study
+from .study import Finding, Progress, Study, without_truth
 
 _IN_ORDER = (
     *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time),
@@ -50,6 +49,7 @@ def findings(study: Study, progress: Progress = lambda share, what: None) -> Ite
     """Yield rows and samples of a study as they are measured.
 
     A scene without a reference solution has rows that are skipped with the reason, and the study goes on with the next scene.
+    The studies of accuracy measure the drifts of such a scene all the same.
 
     Raises
     ------
@@ -65,12 +65,16 @@ def findings(study: Study, progress: Progress = lambda share, what: None) -> Ite
 def _go_on(study: Study, progress: Progress) -> Iterator[Finding]:
     left: Study | None = study
     while left:
+
+        def tell(share: float, what: str, part: float = len(left.scenes) / len(study.scenes)) -> None:
+            progress(1 - part + share * part, what)
+
         try:
-            yield from STUDIES[study.name].findings(left, progress)
+            yield from STUDIES[study.name].findings(left, tell)
             return
         except Disagreement as failure:
             i = [scene.name for scene in left.scenes].index(failure.scene)
-            scene, reason = left.scenes[i], Outcome(OutcomeKind.SKIPPED, f"no reference solution: {failure}")
+            scene, reason = left.scenes[i], without_truth(failure)
             for method in left.competitors:
                 case = Case(study.name, scene, method, grid_for(scene, min(scene.dt, scene.t_end)))
                 yield from case.rows(errors.blanks(scene), reason)

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from conservative.check import positive_integer, positive_number
-from conservative.errors import BadInput
+from conservative.errors import BadInput, PotentialFailed, TorqueFailed
 from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.truth import Disagreement, Truth, reference
+from conservative.references.truth import Disagreement, Truth, Unsolvable, reference
 from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from ..measures.measurement import Measurement, Samples
 from .case import Case, Drawn, Success
@@ -53,6 +54,8 @@ def remember_truths(find: FindTruth = reference) -> FindTruth:
         except Disagreement as failure:
             failed[scene] = end, failure
             raise
+        except (BadInput, PotentialFailed, TorqueFailed) as failure:  # such as of a record up to t_end, in a last step beyond
+            raise Unsolvable(scene.name, failure) from None
 
     return remembered
 
@@ -144,6 +147,13 @@ class Study:
         """Return the result of a case whose run is to be timed; see `time_limit.attempt_here`."""
         return attempt_here(self.hang_limit, case, self.skip_missing)
 
+    def find_truth(self, scene: Scene, grid: Grid) -> Trajectory | Outcome:
+        """Return the reference solution, or the outcome of rows that cannot be measured without a confirmed one."""
+        try:
+            return self.truth(scene, grid).trajectory
+        except Disagreement as failure:
+            return without_truth(failure)
+
     def expected_cost(self, case: Case) -> float:
         """Return the wall time, s, that a run of a case is expected to take, from a short run; 0 if its steps are quick."""
         if is_quick(case) or case.method.unsupported(case.scene):
@@ -181,6 +191,11 @@ class Study:
         positive_integer("processes", self.processes)
         if self.time_limit is not None:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
+
+
+def without_truth(failure: Disagreement) -> Outcome:
+    """Return the outcome of rows that need a reference solution, of a scene without a confirmed one."""
+    return Outcome(OutcomeKind.SKIPPED, f"no reference solution: {failure}")
 
 
 def too_long(cost: float, limit: str) -> Outcome:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
-from ..check import describe, finite_array, finite_number, rotation, unit_vector
+from ..check import NAME, describe, finite_array, finite_number, rotation, unit_vector
 from ..deferred_imports import BODY_FILES, list_entries, load_entry
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
@@ -87,7 +87,7 @@ def load(path: str | Path) -> Scene:
         with table.blame(rotor_momentum="momentum"):
             body = RigidBody(body.inertia, table.call(build))
     R_WB0, w_WB_B0, flight = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
-    name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
+    name = top.text("name", NAME) if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
     if flight and mass is None:
         raise top.bad("body", "the inertia alone", "inertia_com, mass and com_B, or a shape, together with p_WB or v_WB")

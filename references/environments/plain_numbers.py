@@ -23,7 +23,7 @@ from conservative.trajectory import Counters, Trajectory
 
 from ..engine import EngineAxes, mass_model, principal_axes
 from ..samples import MATRIX, QUATERNION, States, to_body_axes
-from ..worker.client import EngineCrashed
+from ..worker.client import EngineCrashed, is_number
 
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """Numbers that all bodies of a run have in common."""
@@ -135,13 +135,22 @@ def read_many(axes: Sequence[EngineAxes], grid: Grid) -> Callable[[Answer], Bloc
     return read
 
 
+def _count(answer: Mapping[str, Any], name: str) -> int | None:
+    """Return a count of an answer for one body; arrays are of many bodies."""
+    value = answer.get(name)
+    if value is not None and not (is_number(value) and value == int(value)):
+        raise EngineCrashed(f"it answers `{name}`: {repr(value)[:100]}; expected a whole number of 0 or more")
+    return None if value is None else int(value)
+
+
 def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Trajectory]:
     """Return a function that converts an answer into a trajectory in body axes, which has no samples after a failure."""
 
     def read(answer: Answer) -> Trajectory:
         if isinstance(answer, IntegrationFailed):
             return Trajectory(axes.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), label, Counters(0), answer)
-        work = Counters(answer.get("steps", grid.n_steps), evaluations=answer.get("evaluations"))
+        steps, evaluations = (_count(answer, name) for name in ("steps", "evaluations"))
+        work = Counters(grid.n_steps if steps is None else steps, evaluations=evaluations)
         reason, frame = answer.get("reason") or "the state is not finite", None
         if axes.scene.flight:
             try:

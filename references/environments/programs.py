@@ -80,6 +80,7 @@ DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "rotors": (lambda value: isinstance(value, bool), "true or false"),
 }
 """Fields of `engine` in the answer to `hello`, and of its `card`, and what they have to be."""
+_COMMAND = "an executable or a command line"
 
 
 def _check_description(engine: dict[str, Any]) -> None:
@@ -126,9 +127,14 @@ def find_program(text: str) -> Program | None:
 
 
 def read_program(text: str, name: str = "", project: bool = False) -> Program:
-    """Return the program of a command line, by default with the name of its last file. Raise `BadInput` for a bad name."""
+    """Return the program of a command line, by default with the name of its last file. Raise `BadInput` for a bad one."""
     file = project_file() if project else user_file()
-    words = [text] if Path(text).is_file() else shlex.split(text)
+    try:
+        words = [text] if Path(text).is_file() else shlex.split(text)
+    except ValueError as error:  # a quote without another one
+        raise BadInput("command", f"{text!r} ({error})", _COMMAND) from None
+    if not words:
+        raise BadInput("command", repr(text), _COMMAND)
     files = [word for word in words if Path(word).is_file()]
     here = [word for word in files if not Path(word).is_absolute()]
     places = {word: f"./{os.path.relpath(word, file.parent)}" if project else str(Path(word).absolute()) for word in here}

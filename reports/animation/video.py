@@ -20,9 +20,11 @@ from .frames import COLOURS, FACES, Panel, speeds
 ARROW, TRACE, OUTLINE, INK = (str(COLOURS[name]) for name in ("arrow", "trace", "outline", "ink"))
 RATES = {".gif": 12.5, ".mp4": 30.0}
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, BELOW, DPI, FINE = 1.92, 0.64, 100, 300
-"""Sides of the picture of a panel and of the text below it, inches: multiples of 16 pixels, which encoders ask for. Pixels per
-inch of a video, and of a single frame."""
+SIDE, BELOW, PIECE, DPI, FINE = 1.92, 0.64, 0.16, 100, 300
+"""Sides of the picture of a panel and of the least text below it, inches: multiples of 16 pixels, a piece, which encoders ask
+for. Pixels per inch of a video, and of a single frame."""
+TITLE, LINE = 0.17, 0.117
+"""Heights of the title of a panel and of a line of numbers, inches."""
 TILT, TURN = 20.0, 34.4
 """Direction to the eye, degrees, as in the page."""
 EYE = np.array([math.cos(math.radians(TURN)), math.sin(math.radians(TURN)), math.tan(math.radians(TILT))])
@@ -86,10 +88,11 @@ def _images(
     from matplotlib.figure import Figure
 
     columns, rows = min(len(panels), 4), math.ceil(len(panels) / 4)
-    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + BELOW)), dpi=dpi)
+    below = max(BELOW, PIECE * math.ceil((TITLE + LINE * max(len(panel.sizes) for panel in panels)) / PIECE))
+    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + below)), dpi=dpi)
     canvas: Any = FigureCanvasAgg(figure)
     axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
-    figure.subplots_adjust(0, BELOW / (SIDE + BELOW) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=BELOW / SIDE)
+    figure.subplots_adjust(0, below / (SIDE + below) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=below / SIDE)
     clock = figure.text(0.01, 0.99, "", va="top", size=8, color=INK)
     for number, frame in enumerate(shown):
         progress(number / len(shown))
@@ -130,5 +133,12 @@ def _draw_panel(axes: Any, panel: Panel, frame: int, exact: Panel | None) -> Non
                 axes.add_collection3d(Line3DCollection(part, colors=colour, linewidths=width, zorder=order))
     axes.scatter(*arrow, color=ARROW, marker="^", s=34, depthshade=False, zorder=3)
     values = "\n".join(f"{name}: {panel.text(name, frame)[0]}" for name in panel.sizes)
-    axes.text2D(0.5, 0.0, panel.label, transform=axes.transAxes, ha="center", va="top", size=8, weight="bold", color=INK)
-    axes.text2D(0.5, -0.08, values, transform=axes.transAxes, ha="center", va="top", size=7, color=INK)
+    widest = max((len(f"{name}: ✓ 1.1e-11") for name in panel.sizes), default=0)  # the same in all frames
+    where: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "top", "color": INK}
+    axes.text2D(0.5, 0.0, panel.label, size=_fit(8, len(panel.label), 25), weight="bold", **where)
+    axes.text2D(0.5, -0.08, values, size=_fit(7, widest, 33), **where)
+
+
+def _fit(size: float, length: int, most: int) -> float:
+    """Return the size of a text of a length, so that it is not wider than a panel, which has room for `most` characters."""
+    return size * min(1.0, most / max(1, length))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 import altair as alt
 import numpy as np
@@ -32,6 +32,8 @@ CLASS_DASHES = {name: dash for name, (_, dash) in _CLASSES.items()}
 _ENGINE_COLOURS = tuple(
     PALETTE[name] for name in ("blue", "vermilion", "green", "orange", "purple", "indigo", "sky", "wine", "olive", "teal")
 )
+LABELS_AT = 0.86
+"""Place of the label of a guide, from its first end to its second."""
 _GROWTHS = (("∝ √t", 0.5), ("∝ t", 1.0))
 """Growth of an error whose parts are random, and of one whose parts have the same direction."""
 _KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
@@ -73,17 +75,15 @@ def _about_bars(data: pd.DataFrame) -> str:
     return "; bars: from the fastest process to the slowest" * bool((data["high"] > data["low"]).any())
 
 
-def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y, align: Literal["left", "right"]) -> list[alt.Chart]:
-    """Return dashed lines of known slopes with labels, from the two ends of each: columns text, and those of x and y.
-
-    The labels are below the second ends, which are on the left or the right of their lines, as `align` says.
-    """
+def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
+    """Return dashed rising lines of known slopes with labels, from the two ends of each: columns text, and those of x and y."""
     base = alt.Chart(ends).encode(x=x, y=y)
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
-    last = alt.Chart(ends.groupby("text", sort=False).tail(1)).encode(x=x, y=y)
-    shift = 8 if align == "left" else -8
-    labels = last.mark_text(align=align, dx=shift, dy=9, fontSize=10, color=PALETTE["grey"]).encode(text="text:N")
-    return [lines, labels]
+    logs: Any = ends.set_index("text").apply(np.log).groupby("text")
+    first, second = logs.first(), logs.last()
+    places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # at the ends they would run into an axis
+    labels = alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, color=PALETTE["grey"])
+    return [lines, labels.encode(x=x, y=y, text="text:N")]
 
 
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:
@@ -145,7 +145,11 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
     panels = []
     for kind, part in drifts.groupby("quantity", sort=False):
         ends = part["drift"].min(), part["drift"].max()
+        largest = max(-ends[0], ends[1])
         powers = [10.0**k for k in range(-12, 13, 3)]
+        if 0 < largest < powers[0]:  # of round-off alone: one number on each side
+            decade = math.floor(math.log10(largest))
+            powers = [max(each for each in (float(f"{digit}e{decade}") for digit in (1, 2, 5)) if each <= largest)]
         ticks = [-p for p in powers if -p >= 10 * ends[0]] + [0.0] + [p for p in powers if p <= 10 * ends[1]]
         axis = alt.Axis(
             title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"
@@ -183,11 +187,22 @@ def growth(lines: pd.DataFrame) -> Any:
     panels = []
     for (scene, quantity), part in data.groupby(["scene", "quantity"], sort=False):
         chart = alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=f"{scene}: {quantity}")
-        first, last, least = float(part.loc[part["t"] > 0, "t"].min()), float(part["t"].max()), float(part["shown"].min())
-        ends = [{"text": text, "t": t, "shown": least * (t / first) ** k} for text, k in _GROWTHS for t in (first, last)]
         drawn = chart.mark_line(strokeWidth=1.8, clip=True).encode(x=x, y=y, **channels)
-        panels.append(alt.layer(*_guides(pd.DataFrame(ends), x, y, "right"), drawn))
+        panels.append(alt.layer(*_guides(growth_guides(part, data["shown"].max()), x, y), drawn))
     return apply_style(alt.concat(*panels, columns=3))
+
+
+def growth_guides(part: pd.DataFrame, largest: float) -> pd.DataFrame:
+    """Return the ends of lines of known growth, from the first time and the smallest value: columns text, t, shown.
+
+    Each ends at the last time or the largest value: the scale would draw what is beyond at its end, with another slope.
+    """
+    first, last, least = float(part.loc[part["t"] > 0, "t"].min()), float(part["t"].max()), float(part["shown"].min())
+    rows = []
+    for text, power in _GROWTHS:
+        factor = min(last / first, (largest / least) ** (1 / power))
+        rows += [(text, first * each, least * each**power) for each in (1.0, factor)]
+    return pd.DataFrame(rows, columns=["text", "t", "shown"])
 
 
 def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any:
@@ -203,7 +218,7 @@ def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=channels["shape"])
     bold = alt.Chart(fit_ends).mark_line(strokeWidth=6, opacity=0.35, strokeCap="round")
     ends = order_guides(errors, fit_ends)
-    guides = _guides(ends, x, y, "left") if len(ends) else []
+    guides = _guides(ends, x, y) if len(ends) else []
     bold = bold.encode(x=x, y=y, color=channels["color"])
     return apply_style(alt.layer(*guides, bold, base.mark_line(strokeWidth=1.2), marks))
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from shutil import which
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conservative.errors import require_extra
+from conservative.errors import BadInput, require_extra
 
 from .options import Group, allow_build_option, epilog, find_links_option, json_option, show
 
@@ -84,6 +85,7 @@ def add(command: str, name: str, project: bool, as_json: bool) -> None:
     require_extra("conservative engines", "environments")
     from conservative.references.environments.programs import read_program, register
 
+    _refuse_engine(command)
     _show([register(read_program(command, name, project))], lambda program: f"{program}: added", as_json)
 
 
@@ -104,11 +106,28 @@ def check(ctx: click.Context, command: str, as_json: bool) -> None:
     from conservative.references.environments.conformance import check
     from conservative.references.environments.programs import find_program, read_program
 
-    program = find_program(command) or read_program(command, "program")
+    if (program := find_program(command)) is None:
+        _refuse_engine(command)
+        program = read_program(command, "program")
     results = _show(
         check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json, f"testing {command}"
     )
     ctx.exit(int(not all(right for right, _ in results)))
+
+
+def _refuse_engine(command: str) -> None:
+    """Raise an error with the command that installs or tests an engine, if a text is the name of one and not a command."""
+    from conservative.benchmarks.studies.engine_selection import select_engines
+
+    if which(command) or Path(command).is_file():
+        return
+    try:
+        select_engines([command])
+    except BadInput:
+        return
+    raise BadInput(
+        "command", repr(command), f"a program. To test this engine, run: conservative study motions --engines {command}"
+    )
 
 
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))

@@ -9,6 +9,9 @@ import warnings
 
 from ..terminal.interrupts import handle_signals, received
 
+_shown = set[str]()
+"""Texts of warnings that were printed: methods with the same steps warn of the same."""
+
 
 def launch() -> None:
     """Run the command line."""
@@ -28,8 +31,10 @@ def launch() -> None:
 
 
 def show_warning(message: Warning | str, *place: object, **options: object) -> None:
-    """Print a warning as a line, without the place in our code that issues it."""
-    print(f"Warning: {message}", file=sys.stderr)
+    """Print a warning as a line, once, without the place in our code that issues it."""
+    if (text := str(message)) not in _shown:
+        _shown.add(text)
+        print(f"Warning: {text}", file=sys.stderr)
 
 
 def _open_streams() -> None:

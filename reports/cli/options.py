@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conservative.errors import BadInput
+from conservative.errors import BadInput, NotWritten
 
 from ..document import MARK, PICTURES
 from . import completion
@@ -283,7 +283,8 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
     Callable
         Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
         given to it as functions without arguments, such as `csv=...`, which return a text or bytes. They are called last, and
-        a file that cannot be made leaves the others: it keeps its content, and the returned document has the failure.
+        a file that cannot be made leaves the others: it keeps its content, and the returned document has the failure. A disk
+        that becomes full leaves the others, too: `NotWritten` is raised after them.
     """
     from conservative.files import make_folder, text_file
 
@@ -302,18 +303,21 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
             opened[name] = context, context.enter_context(text_file(*place))
 
         def write(document: Document, **others: Callable[[], str | bytes]) -> Document:
-            failures = list(document.failures)
+            failures, unwritten = list(document.failures), list[NotWritten]()
             for name in sorted(opened, key=lambda name: name.rpartition(".")[2] in others):
                 (context, stream), kind = opened[name], name.rpartition(".")[2]
                 make = others.get(kind) or partial(text, document, kind)
-                made = attempt(f"The file {str(places[name][0])!r}", make)
-                if isinstance(made, Paragraph):
-                    failures.append(made.text)
-                    with suppress(_NotMade), context:
-                        raise _NotMade  # closes the file, which keeps its content
-                else:
-                    with context:  # on the disk before the next one is drawn
+                try:
+                    with suppress(_NotMade), context:  # on the disk before the next one is drawn
+                        made = attempt(f"The file {str(places[name][0])!r}", make)
+                        if isinstance(made, Paragraph):
+                            failures.append(made.text)
+                            raise _NotMade  # closes the file, which keeps its content
                         stream.buffer.write(made.encode() if isinstance(made, str) else made)
+                except NotWritten as error:  # such as a full disk, on which the others need not be
+                    unwritten.append(error)
+            if unwritten:
+                raise unwritten[0]
             return replace(document, failures=failures)
 
         yield write

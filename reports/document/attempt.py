@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from conservative.errors import BadInput, NotWritten
+from conservative.errors import BadInput, NotWritten, shorten
 
 from .model import Block, Document, Emphasis, Paragraph, Section, walk
 
@@ -23,8 +23,9 @@ def attempt(what: str, make: Callable[[], T], then: str = "") -> T | Paragraph:
     except NotWritten:
         raise
     except Exception as error:  # a mistake in one drawing must not cost an hour of measurements
-        reason = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
-        return Paragraph(f"{what} could not be made ({reason}). {then}".strip(), Emphasis.FAILED)
+        kind = "" if isinstance(error, BadInput | ImportError) else f"{type(error).__name__}: "
+        reason = " ".join(shorten(error).split())  # in one line
+        return Paragraph(f"{what} could not be made ({kind}{reason}). {then}".strip(), Emphasis.FAILED)
 
 
 def failed_parts(blocks: Iterable[Block]) -> list[str]:

@@ -11,6 +11,7 @@ from conservative.attitude import Array, from_quaternion
 from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, motion
+from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -18,6 +19,8 @@ from conservative.trajectory import Trajectory
 from ..animation.frames import ERROR, drift_name
 from .names import of_measure, of_study, with_outcome
 
+EXACT = "exact"
+"""Name of the line of the exact motion."""
 ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
 SURE = 0.5
 """Largest standard error of an order in a short table. Above it, the fit does not tell the order from the next one."""
@@ -26,8 +29,8 @@ SURE = 0.5
 def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the relative drifts of the study of motions: columns scene, method, family, name, t (s), quantity, drift."""
     rows = samples[samples["study"] == motion.STUDY.name].rename(columns={"value": "drift"})
-    rows = rows[rows["quantity"].str.startswith(motion.SIGNED)]
-    rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=rows["line"])
+    rows = rows[rows["quantity"].str.startswith(motion.SIGNED) & rows["drift"].notna()]  # not every method has balances
+    rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=_names(rows))
     return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
 
 
@@ -62,7 +65,12 @@ def curves(samples: pd.DataFrame) -> pd.DataFrame:
     """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
     keys = ["scene", "method", "family", "name", "t"]
     rows = samples[samples["study"] == motion.STUDY.name]
-    return _points(rows.assign(name=rows["line"]), keys, motion.AXES)
+    return _points(rows.assign(name=_names(rows)), keys, motion.AXES)
+
+
+def _names(rows: pd.DataFrame) -> pd.Series[str]:
+    """Return the names of lines; that of the exact motion does not depend on the solver, of which some scenes have several."""
+    return rows["line"].where(rows["role"] != Role.TRUTH, EXACT)
 
 
 def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) -> pd.DataFrame:
@@ -113,6 +121,7 @@ def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_ends(fits: pd.DataFrame) -> pd.DataFrame:
-    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad)."""
+    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad); uncertain fits are left out."""
+    fits = fits[fits["stderr"] <= SURE]
     ends = [fits.rename(columns={end: "dt", f"error_{end}": "error"})[["name", "dt", "error"]] for end in ("coarse", "fine")]
     return pd.concat(ends, ignore_index=True).dropna()

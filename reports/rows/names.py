@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from enum import StrEnum
@@ -113,11 +114,15 @@ def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.D
 def largest_drifts(run: pd.DataFrame, scene: Scene) -> dict[str, float]:
     """Return the largest drift of each invariant of a scene in the rows of a run, NaN if there is none.
 
-    The drift of a balance is the larger one of those with the loads of the method and of the truth.
+    The drift of a balance is that with the work and impulse of the method, as everywhere, or with those of the truth if the
+    method does not sum them.
     """
-    drifts = run[run["measure"] == Measure.DRIFT_MAX.text]
-    names = [each.name for each in scene.invariants]
-    return {name: float(drifts[drifts["quantity"].isin([name, name + OF_TRUTH])]["value"].max()) for name in names}
+    values = run[run["measure"] == Measure.DRIFT_MAX.text].groupby("quantity")["value"].max()
+    found = {}
+    for invariant in scene.invariants:
+        own, of_truth = (float(values.get(invariant.name + end, math.nan)) for end in ("", OF_TRUTH))
+        found[invariant.name] = of_truth if math.isnan(own) else own
+    return found
 
 
 def outcomes(rows: pd.DataFrame) -> list[Outcome]:

@@ -7,7 +7,7 @@ from functools import partial
 
 import pandas as pd
 
-from conservative.benchmarks.studies import long_runs, motion
+from conservative.benchmarks.studies import motion
 from conservative.scene import Scene
 
 from ..charts import figures, spheres, vega_embed
@@ -41,9 +41,9 @@ def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None
     picture = figures.signed_drift(drifts)
     return Figure(
         f"drift_{scene.name}" if methods is None else "drift_over_time",
-        f"{scene.name}: change of energy and momentum in {long_runs.end_of(scene):.3g} s",
-        f"Steps of {scene.dt:g} s, unless adaptive. Middle line: exact. Above it a method gains, below it loses. The axis is "
-        "logarithmic on both sides of it.",
+        f"{scene.name}: change of energy and momentum in {drifts['t'].max():.3g} s",
+        f"Step: the engine's default, or {scene.dt:g} s if it has none. Middle line: exact. Above it a method gains, below it "
+        "loses. The axis is logarithmic on both sides of it.",
         picture if methods is None else None,
         vega_embed.embed(picture, ("name", "t", "drift"), 260),
         vega_embed.legend(families_of(drifts), marks=False),

@@ -6,6 +6,7 @@ import math
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -17,6 +18,7 @@ from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import version_key
 from conservative.version import VERSION
 
+from ..document.attempt import attempt
 from ..document.badge import badge
 from ..document.cells import DASH, angle
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
@@ -58,7 +60,11 @@ def pages(measured: Measured, sections: Mapping[str, Any]) -> dict[str, Document
     families: dict[str, list[str]] = {}
     for label in sorted(labels, key=lambda label: version_key(label.partition("==")[2]), reverse=True):
         families.setdefault(label.partition("==")[0], []).append(label)
-    return {file_name(family): _page(measured, family, versions, scenes, sections) for family, versions in families.items()}
+    found = dict[str, Document]()
+    for family, versions in families.items():
+        page = attempt(f"The page of {family}", partial(_page, measured, family, versions, scenes, sections))
+        found[file_name(family)] = page if isinstance(page, Document) else Document("conservative report", family, [page])
+    return found
 
 
 def _badge(found: pd.DataFrame, version: str) -> str:
@@ -82,7 +88,9 @@ def _page(
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
     found = measured.rows[measured.rows["engine"].str.partition("@")[0] == family]
-    blocks += [part.section(found, measured.samples) for name, part in sections.items() if (found["study"] == name).any()]
+    for name, part in sections.items():
+        if (found["study"] == name).any():
+            blocks.append(attempt(f"The section {name!r}", partial(part.section, found, measured.samples)))
     blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions, sections)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = newest.replace("==", " ")

@@ -47,11 +47,12 @@ class Summary:
 
 def of_scene(points: pd.DataFrame, integrable: bool) -> Summary:
     """Return the summary of a scene from its points."""
-    scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
-    return Summary(_sentence(scene, costs(points, [MIDDLE]), integrable), picture(points))
+    measured = len(points) > 0
+    scene = str(points["scene"].iloc[0]) if measured else "This scene"
+    return Summary(_sentence(scene, costs(points, [MIDDLE]), integrable, measured), picture(points))
 
 
-def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
+def _sentence(scene: str, reached: pd.DataFrame, integrable: bool, measured: bool) -> str:
     """Return a sentence on the faster side at `MIDDLE`, without our closed forms, and on the speed of the closed forms."""
     ours, engine = cheapest(of_classes(reached, MethodClass.GENERAL)), cheapest(of_classes(reached, *OF_ENGINES))
     solution = cheapest(of_classes(reached, MethodClass.SOLUTION))
@@ -62,10 +63,12 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
         sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if first is ours else -1]
         times = f"{_speedup(first, second)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
-    elif there := ours or engine:
-        parts.append(f"Only {there.name} reaches {goal}.")
+    elif ours:
+        parts.append(f"Our fastest general integrator, {ours.name}, reaches {goal}; no measured engine or solver does.")
+    elif engine:
+        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; none of our general integrators does.")
     else:
-        parts.append(f"No measured method reaches {goal}.")
+        parts.append(f"No measured method reaches {goal}." if measured else "No time was measured against an error.")
     if solution and engine:
         only = ", which solves integrable motions only"
         if engine.time >= solution.time:

@@ -112,7 +112,7 @@ def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list
     signs = "Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far."
     if exact and (end := motions[exact[0]].t[-1]) < scene.t_end * (1 - 1e-9):
         signs += f" Only the first {end:.3g} s are drawn, because the body turns too often."
-    labels = [names.get(name, "exact") for name in shown]
+    labels = [names.get(name, lines.EXACT) for name in shown]
     motion = Motion([motions[name] for name in shown], labels, 0 if exact else None, [values.get(name) for name in shown])
     return [motion, Paragraph(signs, Emphasis.NOTE)]
 
@@ -122,7 +122,10 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
 
     They are those of this engine, of the most accurate engine, and of our methods, each at its worst and at its best setting.
     """
-    engines, ours = ([each for each in found if each.outcome.ok and each.ours is side] for side in (False, True))
+    known = [each for each in found if each.outcome.ok and not math.isnan(each.error)]
+    if not known and any(each.outcome.ok for each in found):
+        return f"The attitude errors on {scene.name} are not known: no reference solution is confirmed by another one."
+    engines, ours = ([each for each in known if each.ours is side] for side in (False, True))
     parts, others = [], dict[str, float]()
     if engines:
         worst, best = engines[0], engines[-1]
@@ -165,9 +168,11 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
     caption += f"✗ above {tolerance(SMALL)}. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
+    if scene.loaded:
+        caption += " A balance counts work and impulse as the method sums them, or as the reference solution does."
     if ours := list(dict.fromkeys(each.family for each in found if each.ours)):
         caption += f" Ours: {listed(ours)}."
-    kept = [each for each in found if each.drifts and max(each.drifts.values()) <= CONSERVED]
+    kept = [each for each in found if each.drifts and all(drift <= CONSERVED for drift in each.drifts.values())]
     if still := [each.line for each in kept if each.error > RIGHT]:
         names = listed([each.name for each in scene.invariants])
         caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."

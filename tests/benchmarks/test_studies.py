@@ -2,11 +2,13 @@ import math
 from contextlib import nullcontext
 from functools import cache
 
+import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, Value
+from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
@@ -15,7 +17,7 @@ from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
-from conservative.references.truth import Disagreement, Truth
+from conservative.references.truth import Disagreement, Truth, reference
 from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
@@ -152,11 +154,51 @@ def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
             raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
         return truth(scene, grid)
 
-    scenes = (SCENE.rename("first"), SCENE.rename("unknown"), SCENE)
-    found = [*studies.rows(Study(name, scenes, (cv.Reduced(),), quick=True, truth=find))]
-    kinds = {(row.scene, row.outcome.kind) for row in found}
+    scenes, shares = (SCENE.rename("first"), SCENE.rename("unknown"), SCENE), []
+    study = Study(name, scenes, (cv.Reduced(),), quick=True, truth=find)
+    found = [*studies.findings(study, lambda share, _: shares.append(share))]
+    kinds = {(row.scene, row.outcome.kind) for row in found if isinstance(row, Measurement)}
+    assert shares == sorted(shares)
     assert {scene for scene, kind in kinds if kind in (OutcomeKind.OK, OutcomeKind.NO_ORDER)} >= {"first", SCENE.name}
     assert (("unknown", OutcomeKind.SKIPPED) in kinds) == ("unknown" in asked)
+
+
+@pytest.mark.parametrize("name", ["paper", "motion"])
+def test_a_function_that_fails_in_a_last_step_beyond_its_record_loses_no_scene(name):
+    def torque(t):
+        if t > 0.205:
+            raise ValueError("beyond the record")
+        return 0.1, 0.0, 0.2
+
+    start = np.eye(3), (0.1, 1.0, 0.2), 0.205
+    recorded = cv.Scene("recorded", cv.RigidBody((1, 2, 2.5)), *start, torque=cv.Torque(torque), dt=0.02)
+    find = remember_truths(lambda scene, grid: (truth if scene is SCENE else reference)(scene, grid))
+    study = Study(name, (recorded, SCENE), (cv.Reduced(),), quick=True, truth=find)
+    rows = [*studies.rows(study)]
+    reasons = [row.outcome.reason for row in rows if row.scene == "recorded" and not row.outcome.ok]
+    assert reasons
+    assert all("beyond the record" in reason for reason in reasons)
+    assert any(row.scene == SCENE.name and row.outcome.ok for row in rows)
+
+
+@pytest.mark.parametrize("name", ["paper", "motion"])
+def test_drifts_are_measured_without_a_reference_solution(name):
+    def find(scene, grid):
+        raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
+
+    measured = {}
+    for source in (find, truth):
+        found = [*studies.rows(Study(name, (SCENE,), (cv.Reduced(),), quick=True, truth=source))]
+        measured[source] = {(row.dt, row.measure, row.quantity): row for row in found if row.method}
+    assert measured[find].keys() == measured[truth].keys()
+    errors_of_samples = {value.measure for value in errors.blanks(SCENE) if not value.quantity} - {Measure.ORTHONORMALITY}
+    for key, row in measured[find].items():
+        if key[1] in errors_of_samples:
+            assert row.outcome.kind is OutcomeKind.SKIPPED
+            assert "one and other differ by 0.5 rad" in row.outcome.reason
+        else:
+            assert row.value == measured[truth][key].value
+            assert row.outcome.ok
 
 
 def test_a_disagreement_is_found_once():

@@ -128,6 +128,14 @@ def test_times_that_are_none_are_outcomes_of_a_run(tmp_path):
     assert str(cv.integrate(BRICK, 0.01, made(), on_failure="return").outcome.kind) == "crashed"
 
 
+@pytest.mark.parametrize("field", ["steps", "evaluations"])
+@pytest.mark.parametrize("text", ["[0, 1, 2]", "2.5"])  # the steps of the request, and no count
+def test_a_count_of_one_run_is_one_whole_number(field, text, tmp_path):
+    made = program_class(Program("wrong", tmp_path / "conservative.toml", " ".join(written(tmp_path, "run", field, text))))
+    with pytest.raises(EngineCrashed, match=f"`{field}`: .*expected a whole number"):
+        cv.integrate(BRICK, 0.01, made())
+
+
 @pytest.mark.parametrize("field", DESCRIPTION)
 def test_every_field_of_a_description_of_another_kind_is_named(field, tmp_path):
     is_right, _ = DESCRIPTION[field]

@@ -116,7 +116,7 @@ def test_a_description_that_cannot_be_used_is_reported(engine, words, folder):
         (["sh -c 'echo hi; sleep 5'"], "an answer that cannot be read from sh, which should speak version 1"),
         ([PLAIN, "--name", "mujoco"], "name: got 'mujoco'; expected letters"),
         ([PLAIN, "--name", "my-engine"], "name: got 'my-engine'; expected letters"),
-        ([""], "name: got ''; expected letters"),
+        ([""], "command: got ''; expected an executable"),
     ],
 )
 def test_a_program_that_cannot_be_used_is_not_registered(arguments, message, folder):

@@ -23,6 +23,7 @@ from conservative.reports.animation.frames import COLOURS, ERROR, FACES, THINNES
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import HEAD
 from conservative.reports.numbers import angle, bound
+from conservative.shapes import MassDistribution
 
 from ..pages import ROOT
 
@@ -272,3 +273,17 @@ def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():
     assert np.abs(np.subtract(shown[2], shown[3])).sum() < 0.3 * sum(shown[3])  # the paper's map, below the outline
     for engine in shown[:2]:  # measured 0.65 and 0.9
         assert np.abs(np.subtract(engine, shown[3])).sum() > 0.5 * sum(shown[3])
+
+
+def test_all_numbers_are_in_the_picture_of_a_free_flight(tmp_path):
+    """Six lines, one of them longer than a panel: none runs into another panel or below the picture."""
+    body = MassDistribution(2.0, (0.1, 0.05, 0.2), (0.5, 0.7, 0.9))
+    scene = cv.Scene("flight", body, np.eye(3), (3, -2, 1), 0.2, body.gravity(9.81), p_WB0=(0, 0, 1), dt=0.02)
+    motions = [cv.integrate(scene, method=method) for method in (cv.Reduced(), Exact())]
+    picture = Animation(motions, ["heyoka:tol=1e-9,frame=non_spinning, dt = 0.002 s", "exact"], 1)
+    assert max(map(len, make_panels(motions, picture.labels, 1)[1][0].sizes)) > 25
+    picture.save(tmp_path / "flight.png")
+    pixels = np.asarray(Image.open(tmp_path / "flight.png"))
+    height, width = pixels.shape[:2]
+    assert (pixels[-5:] == 255).all()
+    assert (pixels[height * 2 // 3 :, width // 2 - 2 : width // 2 + 2] == 255).all()

@@ -124,6 +124,60 @@ def test_guides_have_the_slopes_of_the_fitted_orders():
         assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == texts
 
 
+def test_guides_of_growth_stay_within_the_axes_and_have_their_slopes():
+    t = np.geomspace(1, 1000, 4)
+    part = pd.DataFrame({"t": t, "shown": 1e-15 * t**0.3})  # grows less than the guides
+    found = figures.growth_guides(part, part["shown"].max())
+    slopes = [np.diff(np.log(ends["shown"])) / np.diff(np.log(ends["t"])) for _, ends in found.groupby("text", sort=False)]
+    assert np.concatenate(slopes) == pytest.approx([0.5, 1.0])
+    assert found["t"].between(1, 1000).all()
+    assert found["shown"].between(1e-15, part["shown"].max() * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize(("largest", "tick"), [(9.98e-17, 5e-17), (3e-13, 2e-13), (2e-12, 1e-12), (0.3, 1.0)])
+def test_an_axis_of_drifts_has_a_number_beside_zero(largest, tick):
+    rows = pd.DataFrame({"t": [0.0, 1.0], "drift": [0.0, -largest], "quantity": "energy", "name": "a", "family": "a"})
+    spec = figures.signed_drift(rows).to_dict()
+    values = spec["hconcat"][0]["encoding"]["y"]["axis"]["values"]
+    assert min(values) == -tick  # up to ten times the largest drift
+    assert 0 in values
+
+
+def test_the_exact_motion_has_one_name_and_methods_without_a_balance_no_line():
+    methods = ["precise", "reduced", "scipy"]
+    columns = {
+        "study": "motion",
+        "scene": "s",
+        "t": 0.0,
+        "quantity": "drift of energy balance",
+        "method": methods,
+        "family": methods,
+    }
+    more = {"line": ["precise 256 bits", "reduced", "scipy"], "role": ["truth", "ours", "engine"], "value": [0.0, 1e-9, np.nan]}
+    assert lines.signed_drifts(pd.DataFrame(columns | more))["name"].tolist() == ["exact", "reduced"]
+
+
+def test_an_uncertain_fit_has_neither_a_bold_stretch_nor_a_guide():
+    fits = pd.DataFrame({"name": ["a", "b"], "stderr": [0.1, 19.0]})
+    fits = fits.assign(coarse=1.0, fine=0.1, error_coarse=1.0, error_fine=1e-4)
+    assert set(lines.fit_ends(fits)["name"]) == {"a"}
+
+
+def labels_of_guides(spec):
+    (text,) = [layer for layer in spec["layer"] if layer["mark"]["type"] == "text"]
+    return spec["datasets"][text["data"]["name"]]
+
+
+def test_labels_of_guides_are_beside_their_lines_and_not_on_an_axis():
+    dt = np.geomspace(0.1, 0.001, 5)
+    errors = pd.concat([pd.DataFrame({"name": f"{k}", "family": f"{k}", "dt": dt, "error": dt**k}) for k in (2, 8)])
+    for place in labels_of_guides(figures.convergence(errors, errors.groupby("name").nth([0, -1]), "s").to_dict()):
+        order = int(place["text"].removeprefix("order "))
+        assert place["error"] == pytest.approx(0.01 * (place["dt"] / 0.1) ** order)  # on the line through the largest error
+        assert place["dt"] > 0.0011
+        assert place["error"] > 10 * errors["error"].min()
+
+
 def test_the_cost_of_a_recommendation_is_in_microseconds():
     probe = SimpleNamespace(method=Reduced(), dt=0.25, setting=0.25)
     advice = [SimpleNamespace(reached=reached, best=probe, cost=3e-6, line="reduced") for reached in (True, False)]

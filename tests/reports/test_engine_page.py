@@ -11,6 +11,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports import report
 from conservative.reports.document import html, markdown
+from conservative.reports.document.attempt import failed_parts
 from conservative.reports.document.badge import badge
 from conservative.reports.document.model import Document, Links, Section, Table
 from conservative.reports.run.measure import Measurements
@@ -107,11 +108,34 @@ def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
     links = Links([(page.title, f"{name}.html") for name, page in pages.items()])
     document = Document("", "all", [links], pages=pages)
     report.render(document, tmp_path, png=False)
-    report.render_pages(document, tmp_path)
     written = {"report.md", "index.html", "engine_a.html", "engine_a.md", "engine_a.svg", "engine_b.html", "engine_b.md"}
     assert {path.name for path in tmp_path.iterdir()} == written
     assert "[b 7](engine_b.html), [a 2](engine_a.html)" in (tmp_path / "report.md").read_text(encoding="utf-8")
     assert '<a href="engine_a.html">a 2</a>' in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+OTHERS = "since 1.10, 3 rad in 1.9"
+
+
+@pytest.mark.parametrize(("name", "kept"), [("_since", ""), ("_badge", ""), ("motions", OTHERS), ("render", OTHERS)])
+def test_a_part_of_a_page_that_fails_is_a_sentence_on_it(name, kept, measured, tmp_path, monkeypatch):
+    def fault(*_, **__):
+        raise ZeroDivisionError("planted")
+
+    places = {"motions": (motions, "section"), "render": (markdown, "table")}
+    monkeypatch.setattr(*places.get(name, (engine_page, name)), fault)
+    found = engine_page.pages(measured, {"motions": motions})
+    document = report.render(Document("", "all", [], pages=found), tmp_path, png=False)
+    assert list(document.pages) == ["engine_b", "engine_a"]
+    sentences = failed_parts(document.pages["engine_a"].blocks)
+    assert sentences
+    for sentence in sentences:
+        assert "ZeroDivisionError: planted" in sentence
+        assert "--resume" in sentence
+    text = (tmp_path / "engine_a.md").read_text(encoding="utf-8")
+    assert "planted" in text
+    assert kept in text
+    assert ("planted" in (tmp_path / "engine_a.html").read_text(encoding="utf-8")) == (name != "render")  # of Markdown alone
 
 
 def test_a_badge_counts_a_crash_as_a_failure_and_not_what_an_engine_does_not_take(pages):

@@ -37,11 +37,12 @@ CASES = {  # no step divides the durations
     "free": (replace(FREE, w0=9 * FREE.w0, t_end=1.2345), "mujoco:RK4"),  # 16 rad
     "flight": (replace(FREE, flight=(2.0, COM, 9.81, (0, 0, 0), (1, -2, 3)), t_end=0.5678), "mujoco:RK4"),
     "torque": (replace(FREE, torque=(TIMES, VALUES), frame="world", t_end=1.2345), "scipy:RK45,rtol=1e-6"),
+    "balance": (replace(FREE, torque=(TIMES, VALUES), frame="world", t_end=1.2345), "reduced"),  # it sums work and impulse
     "turning": (replace(FREE, field=HEAVY, turning=(1.5, (0.48, -0.6, 0.64)), t_end=1.2345), "scipy:RK45,rtol=1e-6"),
 }
 
 
-USUAL = ("free", "torque")  # the others take multi-precision, which compiles for seconds
+USUAL = ("free", "torque", "balance")  # the others take multi-precision, which compiles for seconds
 
 
 @pytest.fixture(scope="module", params=[pytest.param(name, marks=[pytest.mark.slow] * (name not in USUAL)) for name in CASES])
@@ -84,6 +85,7 @@ def test_the_first_screen(said):
     for name, drift in drifts.items():
         size = np.linalg.norm(run.drift(name.removesuffix(" drift")), axis=-1) if expected[name].ndim > 1 else expected[name]
         assert drift == pytest.approx(size.max(), rel=1e-6, abs=1e-15)
+        assert found.drifts[name.removesuffix(" drift")] == drift
     (table,) = [block for block in section.blocks if isinstance(block, Table)]
     cell = table.rows[0][table.header.index(next(name for name in table.header if "attitude" in name))]
     assert shown(cell.text, error)
@@ -115,6 +117,9 @@ def test_run_watch_and_notebook(said, tmp_path, monkeypatch):
     name = run_name(measured, run)
     (summary,), _ = run_methods(str(path), [name], DT, None, True, lambda *_: None)
     assert close(summary["error"]["attitude"], error)
+    for name_of_drift, drift in summary["drift"].items():
+        (here,) = [each.drifts for each in tumbling.results(measured) if each.dt == DT and each.method == name]
+        assert np.isnan(drift) or drift == pytest.approx(here[name_of_drift], rel=1e-6, abs=1e-15)
     drawn = []
     monkeypatch.setattr(animation.Animation, "render", lambda self, *_: drawn.append(self) or b"page")
     watched = CliRunner().invoke(

@@ -14,12 +14,15 @@ from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.motion import MOST_FRAMES, TURN
 from conservative.integration.one import read_method
 from conservative.needs import Need
+from conservative.references.truth import Disagreement
 from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
+from conservative.reports.document import latex
 from conservative.reports.document.attempt import failed_parts
 from conservative.reports.document.model import Document, Motion, Paragraph, Table, walk
 from conservative.reports.run import measure
+from conservative.reports.run import plan as run_plan
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -108,6 +111,25 @@ def test_report_and_watch_end_with_a_page(name, tmp_path, monkeypatch):
         assert done.exit_code == 0, done.output[-2000:]
     assert (tmp_path / "report" / "index.html").exists()
     assert (tmp_path / "watch.html").exists()
+
+
+def test_a_scene_whose_reference_solutions_disagree_has_drifts(tmp_path, without_files, monkeypatch):
+    def find(scene, grid):
+        raise Disagreement(scene.name, ("one", "other"), 0.5, 1e-8)
+
+    monkeypatch.setattr(run_plan, "remember_truths", lambda: find)
+    document, _ = made("brick_flip", ["gauss:stages=4", "mujoco:RK4"], tmp_path, ("motion", "paper"))
+    text = (tmp_path / "report.md").read_text()
+    assert "The attitude errors on brick_flip are not known: no reference solution is confirmed by another one." in text
+    tables = [block for block in walk(document.blocks) if isinstance(block, Table) and "drift of energy" in block.header]
+    (first, *_) = tables
+    rows = {str(row[0]): [str(cell) for cell in row] for row in first.rows}
+    for name, grade in (("gauss", "✓"), ("mujoco", "≈")):  # measured 7e-16 and 1.5e-9 in momentum
+        (row,) = [row for full, row in rows.items() if full.startswith(name)]
+        assert row[3].startswith(grade)
+        assert row[4] == "–"
+    assert "differ by 0.5 rad" in text  # among the runs that failed or were skipped
+    assert failed_parts(document.blocks) == []
 
 
 def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_files):
@@ -214,6 +236,15 @@ def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, tmp_pat
     page = (tmp_path / "report" / "index.html").read_text()
     assert page.count("ZeroDivisionError: planted") == 1
     assert "observed order" in page  # the table next to it
+
+
+def test_tables_in_latex_that_fail_leave_the_pages(rows_of_a_report, tmp_path, monkeypatch):
+    monkeypatch.setattr(latex, "render", fault)
+    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--latex"])
+    assert done.exit_code == 1
+    assert "'report.tex' could not be made (ZeroDivisionError: planted)" in done.stderr
+    assert {"index.html", "report.md", "measurements.csv"} <= {path.name for path in (tmp_path / "report").iterdir()}
+    assert "observed order" in (tmp_path / "report" / "index.html").read_text()
 
 
 def test_measurements_are_written_if_no_page_can_be(rows_of_a_report, tmp_path, monkeypatch):

@@ -85,9 +85,21 @@ def test_a_faster_engine_is_the_subject_of_the_sentence():
     )
 
 
-@pytest.mark.parametrize(("lines", "words"), [((OURS,), "Only gauss reaches"), ((ENGINE,), "No measured method reaches 1e-6")])
+SIDES = [  # none says "only": other methods of the same side can reach it as well
+    ((OURS,), "Our fastest general integrator, gauss, reaches 1e-6 rad; no measured engine or solver does."),
+    ((SOLVER,), "The fastest engine or solver, scipy, reaches 1e-6 rad; none of our general integrators does."),
+    ((ENGINE,), "No measured method reaches 1e-6"),
+]
+
+
+@pytest.mark.parametrize(("lines", "words"), SIDES)
 def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
     assert words in told(*lines).sentence
+
+
+def test_a_scene_without_measured_times_says_so():
+    none = points(with_names(frame([*OURS])).iloc[:0])
+    assert summary.of_scene(none, False).sentence.endswith("No time was measured against an error.")
 
 
 def test_the_best_of_a_family_is_its_front():

@@ -9,6 +9,7 @@ from select import select
 
 import pytest
 
+from conservative.reports.cli.launch import show_warning
 from conservative.reports.document.model import Table
 from conservative.reports.document.terminal import fit_columns, print_table
 from conservative.reports.terminal import progress
@@ -111,3 +112,9 @@ def test_a_table_in_a_log_of_continuous_integration_has_at_most_100_columns(monk
     monkeypatch.setenv("CI", "true")
     print_table(Table([f"a column {i}" for i in range(30)], [["some words"] * 30]))
     assert 80 < max(len(line.rstrip()) for line in capsys.readouterr().out.splitlines()) <= 100
+
+
+def test_a_warning_of_several_methods_is_one_line(capsys):
+    for text in ("steps do not resolve it", "steps do not resolve it", "another one"):
+        show_warning(UserWarning(text), UserWarning, "file.py", 1)
+    assert capsys.readouterr().err == "Warning: steps do not resolve it\nWarning: another one\n"

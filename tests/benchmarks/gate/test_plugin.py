@@ -291,6 +291,23 @@ def test_rows_that_are_not_selected_are_not_missing(tmp_path):
         assert (code, set(rows)) == (1, SELECTIONS[words] - GONE), words
 
 
+@pytest.mark.parametrize("option", ["ignore", "ignore_glob", "lf"])
+def test_a_file_that_an_option_leaves_out_is_not_missing_without_a_path(option, tmp_path):
+    options = {"conservative_gate_baseline": "kept.json", option: ["a"]}
+    config = SimpleNamespace(
+        rootpath=tmp_path,
+        getoption=lambda name, default=None: options.get(name, default),
+        args_source="default",
+        getini=lambda _: [],
+    )
+    (tmp_path / "test_a.py").touch()
+    gate = pytest_gate.Gate(config, SUITE)
+    assert gate.is_left_out("test_a.py::test_x")
+    assert not gate.is_left_out("test_b.py::test_x")  # there is no such file
+    del options[option]
+    assert not gate.is_left_out("test_a.py::test_x")
+
+
 INFO = {"scene": "brick", "method": "reduced", "error": "1e-9", "spreads": {"error": 1e-12}}
 ID = "file.py::test_x[1]"
 

@@ -1,11 +1,13 @@
 """Each planted fault is named with its size, and a right file or a noisy one is not accused."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge import diagnose
+from conservative.benchmarks.judge import diagnose, verdict
 from conservative.benchmarks.judge.table import Recording
 from conservative.benchmarks.judge.verdict import judge
 
@@ -100,6 +102,15 @@ def test_random_rows_have_no_diagnosis(name):
     scene = registry.scene(name)
     random = np.random.default_rng(1)
     assert diagnosed(scene, None, np.linalg.norm(scene.w_WB_B0) * random.normal(size=(len(T), 3)), scene.t_end / 6 * T) is None
+
+
+def test_bodies_that_the_search_tries_give_no_warning(monkeypatch):
+    """The search with other bodies takes many seconds until it tries an impossible one."""
+    monkeypatch.setattr(verdict, "diagnose", lambda *_: diagnose.Diagnosis(notes=[str(cv.RigidBody((1, 1, 5)))]))
+    R, w = exact(HEAVY)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", cv.ImpossibleInertia)
+        assert judge(HEAVY, Recording(T, (R, w * (-1, 1, 1)), rows=len(T)))[0]["verdict"] == "wrong"
 
 
 def test_the_search_ends_after_a_number_of_trial_motions(monkeypatch):
