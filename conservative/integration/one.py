@@ -20,7 +20,7 @@ from ..methods.reduced import Reduced
 from ..methods.search import candidates
 from ..methods.units import bound_rate
 from ..outcome import Progress
-from ..potentials.smoothness import find_unresolved
+from ..potentials.smoothness import examine, find_unresolved
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -45,8 +45,12 @@ def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
     if not scene.loads or method.order is None:
         return
-    if grid.dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:3]), stacklevel=4)
+    end = grid.n_steps * grid.dt
+    found = scene.smoothness(grid.last)
+    if grid.dt > found.step and end < scene.t_end:  # it may be smooth as long as the run is
+        found = examine(scene.loads, end)
+    if grid.dt > found.step:
+        warnings.warn(LoadNotResolved(grid.dt, 0.0 if found.noise else found.step, found.interval), stacklevel=4)
     for load in scene.loads:
         if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
             warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)

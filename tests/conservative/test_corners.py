@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from itertools import pairwise
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -180,6 +181,30 @@ def test_a_warning_says_that_steps_do_not_resolve_a_table_that_they_do_not_resol
         for each in said:
             assert each.message.step <= longest * (1 + 1e-12)
             assert each.message.dt == dt
+
+
+@pytest.mark.parametrize(
+    ("of_scene", "t_end", "warns"), [(100.0, 1.0, False), (100.0, 100.0, True), (1.0, 20.0, True), (1.0, 4.0, False)]
+)
+def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t_end, warns):
+    """The torque is fast from 5 s on."""
+    torque = cv.Torque(lambda t: (np.sin(200 * t) if t > 5 else 0.0, 0, 0))
+    scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), of_scene, None, torque=torque)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1, t_end))
+    assert [each.category for each in said] == [cv.LoadNotResolved] * warns
+    for each in said:
+        assert 5 < each.message.interval[1] <= t_end
+        assert 0 < each.message.step < 0.01  # measured: 0.0015 and 0.0049
+
+
+def test_a_warning_of_noise_names_no_step():
+    torque = cv.Torque(lambda t: (crc32(repr(t).encode()) / 2**32, 0, 0))
+    scene = cv.Scene("noise", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 2.0, None, torque=torque)
+    with pytest.warns(cv.LoadNotResolved) as said:
+        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1))
+    assert [each.message.step for each in said] == [0.0]
 
 
 def test_runs_of_one_and_of_many_bodies_warn():
