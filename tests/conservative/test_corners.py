@@ -199,6 +199,13 @@ def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t
         assert 0 < each.message.step < 0.01  # measured: 0.0015 and 0.0049
 
 
+def test_adaptive_steps_see_a_pulse_after_the_end_of_the_scene():
+    torque = cv.Torque(lambda t: (np.exp(-(((t - 1.5) / 0.01) ** 2)), 0, 0))
+    scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (0.01, 0.005, 0.003), 0.2, None, torque=torque)
+    rates = [cv.integrate(each, 0.2, "scipy", t_end=1.6).w_WB_B[-1] for each in (scene, scene.rename("late", t_end=1.6))]
+    assert np.abs(rates[0] - rates[1]).max() < 1e-12  # measured: 0; 0.006 rad/s with steps of the scene's own duration
+
+
 def test_a_warning_of_noise_names_no_step():
     torque = cv.Torque(lambda t: (crc32(repr(t).encode()) / 2**32, 0, 0))
     scene = cv.Scene("noise", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 2.0, None, torque=torque)
