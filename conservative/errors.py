@@ -204,7 +204,7 @@ class AccuracyNotReached(UserWarning):
     """A requested error is not reached.
 
     Attributes: `error`, `estimate` and `rounding`, the effect of round-off alone, rad; `rough`, a time, s, near which a
-    function is not smooth, or None.
+    function or force of the scene is not smooth, or None.
     """
 
     def __init__(self, error: float, estimate: float, rounding: float = math.nan, rough: float | None = None) -> None:
@@ -212,8 +212,8 @@ class AccuracyNotReached(UserWarning):
         causes = []
         if rough is not None:
             causes.append(
-                f"A function of the scene is not smooth: near t = {rough:.6g} s errors do not fall as the order of the method "
-                "says. If it jumps or has a corner at known times, declare them: breaks=(...)"
+                f"A function or force of the scene is not smooth: near t = {rough:.6g} s shorter steps help less than the "
+                "order of the method says. If a function jumps or has a corner at known times, declare them: breaks=(...)"
             )
         if rounding >= error / 2:
             causes.append(f"Rounding the numbers of the scene alone changes this motion by {rounding:.2g} rad")

@@ -29,12 +29,15 @@ def within_round_off(method: Method, scene: Scene, grid: Grid) -> Bounds:
     return bounds_of(scene, grid)
 
 
-def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS) -> Bounds:
+def bounds_of(
+    scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS, n_steps: int | None = None
+) -> Bounds:
     """Return the bounds of a run whose solver may leave a relative error `tol` in a step.
 
-    If `orthonormality` is None, it has the same bound as the invariants.
+    If `orthonormality` is None, it has the same bound as the invariants. `n_steps` is by default the number of steps of the
+    grid, including those that break points add.
     """
-    n_steps = count_most_steps(scene, grid)
+    n_steps = count_most_steps(scene, grid) if n_steps is None else n_steps
     rounding = ROUNDING * EPSILON * (10 + n_steps) * scene.body.condition
     drift = min(LOOSEST, rounding + SOLVER * tol * n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)

@@ -206,6 +206,16 @@ def test_adaptive_steps_see_a_pulse_after_the_end_of_the_scene():
     assert np.abs(rates[0] - rates[1]).max() < 1e-12  # measured: 0; 0.006 rad/s with steps of the scene's own duration
 
 
+def test_adaptive_runs_have_one_sample_after_the_start_and_no_corner_where_a_sample_is_near_a_break():
+    near = 0.5 + 1e-7
+    torque = cv.Torque(lambda t: (np.cos(t) + 0.5 * (t > near), 0.2, 0.1), breaks=(near,))
+    scene = cv.Scene("near", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 1.0, None, torque=torque)
+    for n in (1, 64):
+        found = cv.integrate(scene, 1.0 / n, cv.Projected(1e-8))
+        assert len(found) == n + 1
+        assert found.control.rough is None
+
+
 def test_a_warning_of_noise_names_no_step():
     torque = cv.Torque(lambda t: (crc32(repr(t).encode()) / 2**32, 0, 0))
     scene = cv.Scene("noise", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 2.0, None, torque=torque)
