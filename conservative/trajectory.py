@@ -59,7 +59,7 @@ class Trajectory:
     frame
         Positions (n, 3), m, and velocities (n, 3), m/s, as an engine integrated them in free flight, otherwise None.
     control
-        What the steps of a tolerance show, for methods that provide it, otherwise None.
+        Errors of steps that a tolerance controls, for methods that provide them, otherwise None.
     """
 
     scene: Scene

@@ -28,8 +28,8 @@ from .store import open_store, write_store
 if TYPE_CHECKING:
     from distributed import Client
 _COMPARED = (
-    "such a part cannot be compared with that of the earlier run. To resume runs, give it as numbers or as a table (times, "
-    "values), or as a function that reads numbers and arrays only"
+    "such a part cannot be compared with the same part of the earlier run. To resume runs, give it as numbers or as a table "
+    "(times, values), or as a function that reads numbers and arrays only"
 )
 
 

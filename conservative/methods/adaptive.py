@@ -49,7 +49,7 @@ FIRST_TRIES, BEYOND = 1_000, 10.0
 SAME = 1e-12
 """A sample that is closer to a break point, relative to the time, is at it."""
 ROUGH = 3e-3
-"""A step that is shorter than this share of the median shows a corner or a jump."""
+"""A corner or a jump is shown if the tolerance allows a step of less than this share of the median."""
 
 
 @dataclass
