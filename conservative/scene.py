@@ -34,7 +34,7 @@ from .potentials.load import Damping, OfTime, Torque
 from .potentials.pointwise import EARLIER
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.smoothness import SMOOTH, Smoothness, examine
-from .potentials.turning import Turning
+from .potentials.turning import Turning, static_part
 from .shapes import MassDistribution
 
 if TYPE_CHECKING:
@@ -290,6 +290,14 @@ class Scene(PickledByFields):
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
         return size if self.torque is None else size + self.torque.require(self.t_end, self.R_WB0)
+
+    @cached_property
+    def steepness(self) -> float:
+        """Factor by which the field magnifies the rounding of an attitude: its largest slope over `energy_scale`; 0 for fields
+        without a singularity.
+        """
+        field = static_part(self.potential)
+        return field.steepest() / self.energy_scale if hasattr(field, "steepest") else 0.0
 
     @cached_property
     def magnitudes(self) -> tuple[int, int | None]:

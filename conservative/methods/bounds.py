@@ -12,12 +12,10 @@ import sys
 from ..grid import Grid
 from ..method import Method
 from ..scene import Scene
-from ..trajectory import Bounds
+from ..trajectory import LOOSEST, Bounds
 from .pieces import count_most_steps
 
 EPSILON = sys.float_info.epsilon
-LOOSEST = 1e-3
-"""Upper limit of all bounds, for any tolerance, body and number of steps."""
 ROUNDING, SOLVER = 4.0, 10.0
 """Drift that a step may cause, in units of round-off and of the tolerance."""
 UNIT_QUATERNIONS = 1e-13
