@@ -72,7 +72,8 @@ class Scene(PickledByFields):
     torque, damping
         Loads that act beside the potential. Energy and momenta then obey balances with their work and impulse.
     dt
-        Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end.
+        Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end, and a
+        part of t_end if there are functions of time, which may have no value after it.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
@@ -144,9 +145,10 @@ class Scene(PickledByFields):
             given = (extra_invariants,)
         if not all(isinstance(each, Invariant) for each in given):
             raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
-        if dt is None:
+        step = dt
+        if step is None:
             speed = float(np.linalg.norm(rates))
-            dt = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
+            step = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
         set_fields(
             self,
             name=name,
@@ -155,7 +157,7 @@ class Scene(PickledByFields):
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
-            dt=positive_number("dt", dt, "a finite step above 0, s"),
+            dt=positive_number("dt", step, "a finite step above 0, s"),
             torque=torque,
             damping=damping,
             extra_invariants=given,
@@ -163,6 +165,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
+        if dt is None and self.asks_time:
+            set_fields(self, dt=end / math.ceil(end / step))
         if self.needs:
             require_size(body.inertia)
         self._call_loads()
@@ -248,6 +252,11 @@ class Scene(PickledByFields):
     def calls_python(self) -> bool:
         """True if steps call Python functions, so that one takes as long as the functions need."""
         return bool(self.loads) or not self.needs.isdisjoint((Need.FUNCTION, Need.TIME))
+
+    @property
+    def asks_time(self) -> bool:
+        """True if functions of a user depend on time. They may have no value before the start and after the end."""
+        return Need.TIME in self.needs or any(callable(load.value) for load in self.loads)
 
     @property
     def breaks(self) -> Array:

@@ -12,7 +12,7 @@ from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
 from ..errors import BadInput, LoadNotResolved, RotationNotResolved, Unsupported
-from ..grid import MOST_STEPS, Grid, grid_for
+from ..grid import MOST_STEPS, Grid, count_steps, grid_for
 from ..method import Method, Role
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
@@ -105,7 +105,8 @@ def integrate(
     scene
         The scene.
     dt
-        Step size, s; default: the scene's (`Scene.dt`). For adaptive methods, and with `error`, the sampling interval.
+        Step size, s; default: the scene's (`Scene.dt`), shortened to a part of t_end if there are functions of time. For
+        adaptive methods, and with `error`, the sampling interval.
     method
         A method, or its name, for example `"mujoco@3.6.0:RK4"`. Without a method and a step, both are chosen as for
         `error=1e-6`. With a step alone it is `Reduced()`, the paper's integrator in three unknowns; in fields that depend on
@@ -200,8 +201,12 @@ def read_error(error: float | None, method: object, dt: object) -> float | None:
 
 
 def read_step(scene: Scene, dt: float | None, t_end: float | None) -> float:
-    """Return the step, s: by default the scene's, at most the duration."""
-    return dt if dt is not None else min(scene.dt, read_end(scene, t_end))
+    """Return the step, s: by default the scene's, at most the duration, and a part of it if there are functions of time."""
+    if dt is not None:
+        return dt
+    end = read_end(scene, t_end)
+    step = min(scene.dt, end)
+    return end / count_steps(end, step) if scene.asks_time else step
 
 
 def read_end(scene: Scene, t_end: float | None) -> float:

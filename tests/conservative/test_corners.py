@@ -282,6 +282,25 @@ def test_the_last_sample_is_at_or_after_the_end():
     assert cv.integrate(brick, t_end=end, error=1e-3).t[-1] == pytest.approx(end, rel=1e-15)
 
 
+@pytest.mark.parametrize("t_end", [1.0, 0.77])
+def test_a_recording_that_ends_with_the_run_is_integrated_at_the_default_step(t_end):
+    """The default step follows from the rate, and does not divide the duration."""
+
+    def recorded(t):
+        assert 0 <= t <= t_end
+        return 0.3 * np.cos(4 * t) * np.array((1.0, 0.5, -0.4))
+
+    scene = replace(BASE, w0=np.array((1.7, -2.9, 7.2))).scene().rename("recorded", t_end=t_end)
+    assert t_end / scene.dt % 1 > 0.05
+    made = cv.Scene("made", scene.body, scene.R_WB0, scene.w_WB_B0, t_end, scene.potential, torque=cv.Torque(recorded))
+    assert scene.dt * 0.99 < made.dt < scene.dt
+    kept = scene.rename("recorded", torque=cv.Torque(recorded))  # with the step of a scene without functions
+    for each in (made, kept):
+        assert cv.integrate(each, method="reduced").t[-1] == pytest.approx(t_end, rel=1e-15)
+    assert cv.integrate_many(kept, w_WB_B0=[kept.w_WB_B0] * 2, method="projected", threads=1).ok.all()
+    assert cv.integrate(scene, method="reduced").t[-1] > t_end * 1.0001  # steps of scenes without functions do not change
+
+
 # Samples between steps, and searches
 
 
