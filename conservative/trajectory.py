@@ -345,7 +345,8 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
         limit = drift_limit(result.scene, bounds)
         quantities = [("orthonormality", orthonormality(result.R_WB), bounds.orthonormality)]
         for invariant, size in invariants.kept_sizes(result.scene, conserved).items():
-            quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / size), limit))
+            scale = size + _most_supplied(result, invariant)
+            quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / scale), limit))
         if (energy := invariants.find_energy(result.scene.invariants)) is not None:
             quantities.append((energy.name, sizes(result.drift(energy)), bounds.energy))
     # The appended sample ends the search where all are within the bound.
@@ -357,6 +358,13 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
     if name in {"orthonormality", *conserved}:
         return _cut(result, n, NotConserved(time, name, drift, bound))
     return _cut(result, n, Diverged(time, f"the drift of {name} is {drift:.3g}, the bound {bound:.3g}"))
+
+
+def _most_supplied(result: Trajectory, invariant: Invariant) -> Array | float:
+    """Return the most that loads have supplied to an invariant up to each sample (n,), whose round-off is part of the drift."""
+    if invariant.supplied is None or result.supplied is None:
+        return 0.0
+    return np.asarray(np.maximum.accumulate(sizes(invariant.supplied(result.supplied))))
 
 
 def drift_limit(scene: Scene, bounds: Bounds) -> float:
