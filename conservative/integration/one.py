@@ -35,10 +35,10 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
-def warn_of_steps(scene: Scene, method: Method, grid: Grid) -> None:
-    """Warn if the steps of a grid are too long for a load or for the rotation of a rod; see `integrate`."""
+def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = None) -> None:
+    """Warn if the steps of a grid are too long for a load or for the rotation of a rod, by default the scene's; see `integrate`."""
     warn_of_loads(scene, method, grid)
-    _warn_of_rods(scene, method, grid.dt)
+    _warn_of_rods(rod or scene, method, grid.dt)
 
 
 def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
