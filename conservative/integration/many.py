@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..batch import Batch
@@ -155,7 +156,8 @@ def integrate_many(
 def _find_rod(bodies: Batch) -> Scene:
     """Return the rod that may rotate fastest; the first body if there is none."""
     moments = bodies.scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]
-    if (moments.max(axis=1) <= ROD * moments.min(axis=1)).all():
+    a, b, c = moments.T  # reductions along an axis of three take 25 times as long
+    if (np.maximum(np.maximum(a, b), c) <= ROD * np.minimum(np.minimum(a, b), c)).all():
         return bodies.first
     hardest = (bodies.take(i) for i in pick_hardest(bodies))
     return next((scene for scene in hardest if scene.body.condition > ROD), bodies.first)

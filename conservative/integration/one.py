@@ -36,7 +36,7 @@ def require_support(method: Method, scene: Scene) -> None:
 
 
 def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = None) -> None:
-    """Warn if the steps of a grid are too long for a load or for the rotation of a rod, by default the scene's; see `integrate`."""
+    """Warn if steps are too long for a load or for the rotation of a rod, by default of the scene; see `integrate`."""
     warn_of_loads(scene, method, grid)
     _warn_of_rods(rod or scene, method, grid.dt)
 
