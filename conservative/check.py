@@ -57,7 +57,7 @@ def describe(value: object) -> str:
 def has_masked(value: object) -> bool:
     """Return whether an array, or one in nested lists or tuples, has masked entries. NumPy drops the mask.
 
-    The attribute `mask` of arrays is NumPy's, and that of packages with masked arrays of their own.
+    NumPy and other packages with masked arrays have the attribute `mask`.
     """
     if isinstance(value, list | tuple):
         return any(type(each) is not float and has_masked(each) for each in value)

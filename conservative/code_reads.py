@@ -1,4 +1,4 @@
-"""What the code of a function reads from outside: globals, variables of enclosing functions, imports, and their attributes.
+"""Reads of outside variables by the code of a function: globals, enclosing functions, imports, and their attributes.
 
 `gains.k` and `import gains` inside of a function are read through modules: the value is the attribute `k` as it is now. The
 bytecode is read, because the source of a function is often not available.
@@ -30,7 +30,7 @@ _TWO = re.compile(r"((?:LOAD|STORE)_FAST(?:_BORROW)?)_((?:LOAD|STORE)_FAST(?:_BO
 class Read(NamedTuple):
     """A read of the variable `name`, or of the module `name` if `imported`, and then of `attributes` as long as it is a module.
 
-    `level` is that of a relative import. If `free`, the name is a variable of an enclosing function.
+    `level` is the number of dots of a relative import. If `free`, the name is a variable of an enclosing function.
     """
 
     name: str
@@ -42,7 +42,10 @@ class Read(NamedTuple):
 
 @dataclass(frozen=True)
 class Reads:
-    """The `reads` of a code; its variables that are `bound` by imports; variables of enclosing functions that are `written`."""
+    """The `reads` of a code; its variables that are `bound` by imports; variables of enclosing functions that are `written`.
+
+    `writes_global` is True if it writes to a global variable.
+    """
 
     reads: tuple[Read, ...]
     bound: Mapping[str, Read]

@@ -204,7 +204,7 @@ class AccuracyNotReached(UserWarning):
     """A requested error is not reached.
 
     Attributes: `error`, `estimate` and `rounding`, the effect of round-off alone, rad; `rough`, a time, s, near which a
-    function is not smooth, or None.
+    function or force of the scene is not smooth, or None.
     """
 
     def __init__(self, error: float, estimate: float, rounding: float = math.nan, rough: float | None = None) -> None:
@@ -212,8 +212,8 @@ class AccuracyNotReached(UserWarning):
         causes = []
         if rough is not None:
             causes.append(
-                f"A function of the scene is not smooth: near t = {rough:.6g} s errors do not fall as the order of the method "
-                "says. If it jumps or has a corner at known times, declare them: breaks=(...)"
+                f"A function or force of the scene is not smooth: near t = {rough:.6g} s shorter steps help less than the "
+                "order of the method says. If a function jumps or has a corner at known times, declare them: breaks=(...)"
             )
         if rounding >= error / 2:
             causes.append(f"Rounding the numbers of the scene alone changes this motion by {rounding:.2g} rad")
@@ -252,7 +252,8 @@ class LargeEnsemble(UserWarning):
 class LoadNotResolved(UserWarning):
     """Steps are too long for a function of time or a table.
 
-    Attributes: `dt`, the longest step, `step`, and the `interval`, all s; `corners`, their number in a table, 0 for a function.
+    Attributes: `dt`, the longest step that resolves it, `step` (0 if no step does), and the `interval`, all s; `corners`, their
+    number in a table, 0 for a function.
     """
 
     def __init__(self, dt: float, step: float, interval: tuple[float, float], corners: int = 0) -> None:
@@ -263,11 +264,13 @@ class LoadNotResolved(UserWarning):
                 f"its table has {corners} corners, more than there are steps. Steps are divided at the corners, so samples are "
                 f"not affected, but they do not show the motion in between. Use steps of at most {step:g} s to see it"
             )
-        else:
+        elif step:
             said += (
-                f"its integral differs from that over shorter steps. Use steps of at most {step:g} s, or declare the times at "
-                "which the function is not smooth: breaks=(...)"
+                f"its integral changes with the step. Use steps of at most {step:g} s, or declare the times at which the "
+                "function is not smooth: breaks=(...)"
             )
+        else:
+            said += "it is noise there, which no step resolves. Give it as a table (times, values)"
         super().__init__(said)
 
 

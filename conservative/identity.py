@@ -13,11 +13,12 @@ write to variables outside of themselves, and code that keeps earlier values of 
 from __future__ import annotations
 
 import builtins
+import copy
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property
 from types import CodeType, FunctionType, GetSetDescriptorType, MappingProxyType, MemberDescriptorType, MethodType, ModuleType
 from typing import Any
@@ -51,14 +52,16 @@ _HIDDEN = _names("__globals__ __closure__ __code__ __self__ __func__ f_globals f
 _NOT_OF_BEHAVIOUR = _names("""
     __dict__ __weakref__ __doc__ __module__ __annotations__ __firstlineno__ __static_attributes__ __annotate__
     __annotate_func__ __annotations_cache__ __abstractmethods__ _abc_impl __parameters__ __orig_bases__ __dataclass_fields__
-    __dataclass_params__ __match_args__ __slots__ __slotnames__ __hash__ __repr__ __eq__ __replace__ __qualname__
+    __dataclass_params__ __match_args__ __slots__ __slotnames__ __replace__ __qualname__
 """)
 """Attributes of a class on which the behaviour of its instances does not depend, or that repeat others."""
 _OF_CONSTRUCTION = _names("""
     __init__ __new__ __post_init__ __init_subclass__ __set_name__ __del__ __reduce__ __reduce_ex__ __getstate__ __setstate__
-    __getnewargs__ __copy__ __deepcopy__ __setattr__ __delattr__ __str__ __class_getitem__
+    __getnewargs__ __getnewargs_ex__ __copy__ __deepcopy__ __class_getitem__
 """)
-"""Methods that make or copy an instance, which matter if its class is called."""
+"""Methods that make or copy an instance. They matter if the class is a value, or if any code may make another instance."""
+_MAKERS = type, copy.copy, copy.deepcopy, replace
+"""Functions that can make an instance from another one, without the name of its class."""
 _NUMBERS = frozenset({bool, int, float, complex, str, bytes, type(None), type(...), type(NotImplemented)})
 _OF_KERNELS = f"{_PACKAGE}.potentials.callback"
 """Module of an attribute that kernels add to a value."""
@@ -95,7 +98,11 @@ def identify(value: object) -> Identity:
     """Return the identity of a value as it is now."""
     walk = _Walk()
     try:
-        return Identity(walk.follow(value), "", walk.fixed)
+        text = walk.follow(value)
+        if walk.makes:
+            walk = _Walk(makes=True)
+            text = walk.follow(value)
+        return Identity(text, "", walk.fixed)
     except _NotFollowed as part:
         return equal_to_nothing(str(part))
     except Exception as error:  # a class of a user whose attributes raise an exception; or RecursionError
@@ -139,10 +146,13 @@ def _hash(parts: object) -> str:
 class _Walk:
     """One digest. `path` are the values around the current one: a cycle is a reference to its place there.
 
-    Texts of values that were followed are in `known`, and the values in `kept`, so that their ids stay valid.
+    Texts of values that were followed are in `known`, and the values in `kept`, so that their ids stay valid. `makes` is True
+    if code may make an instance from another one. A second walk then also follows the constructors of the classes of values,
+    which may read what cannot be followed, such as a file.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, makes: bool = False) -> None:
+        self.with_constructors = self.makes = makes
         self.path: list[int] = []
         self.known: dict[int, str] = {}
         self.kept: list[object] = []
@@ -216,6 +226,7 @@ class _Walk:
             yield self.follow(value.__func__)
             yield self.follow(value.__self__)
         elif kind in (staticmethod, classmethod):
+            self.makes |= kind is classmethod
             yield self.follow(value.__func__)
         elif kind is property:
             yield self._all((value.fget, value.fset, value.fdel))
@@ -252,6 +263,7 @@ class _Walk:
             raise _NotFollowed(f"{code.co_name}, which writes to a variable outside of itself")
         if hidden := _HIDDEN.intersection(code.co_names):
             raise _NotFollowed(f"{code.co_name}, which reads .{min(hidden)}")
+        self.makes |= not _OF_CONSTRUCTION.isdisjoint(code.co_names) or "__class__" in code.co_names
         parts: list[Any] = [code.co_code, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars, code.co_flags]
         parts += [code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_exceptiontable]
         for read in reads.reads:
@@ -260,6 +272,7 @@ class _Walk:
                 continue
             if found is MISSING and (read.imported or "." in name):  # not yet imported, or made by the module when it is read
                 raise _NotFollowed(f"{code.co_name}, which reads {name}")
+            self.makes |= any(found is each for each in _MAKERS)
             self.reads += not (found is MISSING or _library_name(found) is not None)
             if isinstance(found, ModuleType) and not self.in_library:
                 raise _NotFollowed(f"{code.co_name}, which passes on the module {name}")
@@ -291,7 +304,7 @@ class _Walk:
     # ------------------------------------------------------------------------------------------------ classes and objects
 
     def _list_of_class(self, value: Any, called: bool) -> Iterator[Any]:
-        """Yield the parts of a class, with its constructors if it is `called`."""
+        """Yield the parts of a class, with its constructors if it may be `called`."""
         yield value.__qualname__
         metaclass = type(value)
         yield metaclass.__qualname__ if metaclass is type else self._follow_class(metaclass, called=True)
@@ -300,15 +313,14 @@ class _Walk:
         if "__dataclass_fields__" in vars(value):
             described = [(each.name, each.init, each.kw_only, each.default, each.default_factory) for each in fields(value)]
             yield [self._all(each) for each in described]
-            made = getattr(vars(value).get("__init__"), "__code__", None)
-            left_out |= {"__init__", "__setattr__", "__delattr__"} if made and made.co_filename == "<string>" else set()
+            left_out |= {name for name, each in vars(value).items() if _is_generated(each)}
         own = ((name, each) for name, each in sorted(vars(value).items()) if name not in left_out)
         slots = MemberDescriptorType, GetSetDescriptorType
         yield [(name, "a slot" if isinstance(each, slots) else self.follow(each)) for name, each in own]
 
     def _follow_class(self, value: Any, called: bool) -> str:
         """Return the text of a class: its name in a library, otherwise its parts."""
-        if called:
+        if called or self.with_constructors:
             return self.follow(value)
         if (name := _library_name(value)) is not None:
             return name
@@ -378,6 +390,12 @@ def _is_in(module: str, name: str, value: object) -> bool:
     for each in name.split("."):
         found = getattr(found, each, None)
     return found is value
+
+
+def _is_generated(method: Any) -> bool:
+    """Return whether `dataclass` made a method, from the fields, which are followed."""
+    code = getattr(getattr(method, "__wrapped__", method), "__code__", None)
+    return code is not None and code.co_qualname.startswith("__create_fn__.")
 
 
 def _keeps_values(kind: type) -> bool:

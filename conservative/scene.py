@@ -35,7 +35,7 @@ from .potentials.load import Damping, OfTime, Torque
 from .potentials.pointwise import EARLIER
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
 from .potentials.smoothness import SMOOTH, Smoothness, examine
-from .potentials.turning import Turning
+from .potentials.turning import Turning, static_part
 from .shapes import MassDistribution
 
 if TYPE_CHECKING:
@@ -72,7 +72,8 @@ class Scene(PickledByFields):
     torque, damping
         Loads that act beside the potential. Energy and momenta then obey balances with their work and impulse.
     dt
-        Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end.
+        Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end, and a
+        part of t_end if there are functions of time, which may have no value after it.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
@@ -143,9 +144,10 @@ class Scene(PickledByFields):
             given = (extra_invariants,)
         if not all(isinstance(each, Invariant) for each in given):
             raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
-        if dt is None:
+        step = dt
+        if step is None:
             speed = float(np.linalg.norm(rates))
-            dt = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
+            step = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
         set_fields(
             self,
             name=name,
@@ -154,7 +156,7 @@ class Scene(PickledByFields):
             w_WB_B0=rates,
             t_end=end,
             potential=potential,
-            dt=positive_number("dt", dt, "a finite step above 0, s"),
+            dt=positive_number("dt", step, "a finite step above 0, s"),
             torque=torque,
             damping=damping,
             extra_invariants=given,
@@ -162,6 +164,8 @@ class Scene(PickledByFields):
             source=printable_text("source", source, "a text"),
             flight=flight,
         )
+        if dt is None and self.asks_time:
+            set_fields(self, dt=end / math.ceil(end / step))
         if self.needs:
             require_size(body.inertia)
         self._call_loads()
@@ -249,6 +253,11 @@ class Scene(PickledByFields):
         return bool(self.loads) or not self.needs.isdisjoint((Need.FUNCTION, Need.TIME))
 
     @property
+    def asks_time(self) -> bool:
+        """True if functions of a user depend on time. They may have no value before the start and after the end."""
+        return Need.TIME in self.needs or any(callable(load.value) for load in self.loads)
+
+    @property
     def breaks(self) -> Array:
         """Times (n,) above 0 at which a load jumps or has a corner, s: of tables, declared, and jumps that a scan found."""
         return self.now().smoothness().breaks
@@ -289,6 +298,14 @@ class Scene(PickledByFields):
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
         return size if self.torque is None else size + self.torque.require(self.t_end, self.R_WB0)
+
+    @cached_property
+    def steepness(self) -> float:
+        """Factor by which the field magnifies the rounding of an attitude: its largest slope over `energy_scale`; 0 for fields
+        without a singularity.
+        """
+        field = static_part(self.potential)
+        return field.steepest() / self.energy_scale if hasattr(field, "steepest") else 0.0
 
     @cached_property
     def magnitudes(self) -> tuple[int, int | None]:

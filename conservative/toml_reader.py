@@ -107,8 +107,10 @@ class TomlTable:
 
     def texts(self, key: str, allowed: str) -> dict[str, str]:
         """Return the texts in the table under `key`; none without such a table."""
-        table = self.table(key, allowed) if key in self else self
-        return {name: table.text(name, allowed) for name in table.values} if key in self else {}
+        if key not in self:
+            return {}
+        table = self.table(key, allowed)
+        return {name: table.text(name, allowed) for name in table.values}
 
     @contextmanager
     def blame(self, **keys: str) -> Iterator[None]:
@@ -204,7 +206,10 @@ def _opens(token: re.Match[str]) -> int:
 
 
 def _statements(source: str) -> Iterator[tuple[int, str]]:
-    """Yield the statements of a valid TOML text, each with its first line. A line break in brackets or a text ends none."""
+    """Yield the statements of a valid TOML text, each with its first line.
+
+    A line break in brackets or in a text does not end a statement.
+    """
     start, line, begin, depth = 1, 1, 0, 0
     for token in _TOKENS.finditer(source + "\n"):
         line, depth = line + token[0].count("\n"), depth + _opens(token)

@@ -59,7 +59,7 @@ class Trajectory:
     frame
         Positions (n, 3), m, and velocities (n, 3), m/s, as an engine integrated them in free flight, otherwise None.
     control
-        What the steps of a tolerance show, for methods that provide it, otherwise None.
+        Errors of steps that a tolerance controls, for methods that provide them, otherwise None.
     """
 
     scene: Scene
@@ -263,12 +263,19 @@ START_ROUNDING = 16.0
 _FLOAT, _ROUND_OFF = np.dtype(np.float64), float(np.finfo(np.float64).eps)
 
 
+LOOSEST = 1e-3
+"""Upper limit of all bounds of our methods, for any tolerance, body, field and number of steps."""
+STEEP = 32.0
+"""Drift that rounding the attitude may cause in a field with a singularity, in units of round-off times `Scene.steepness`
+(measured: up to 1.4)."""
+
+
 class Bounds(NamedTuple):
     """Limits for every sample of a run with the outcome ok, dimensionless.
 
-    `drift` limits the drift of the invariants that a method conserves, relative to their scales. `orthonormality` limits the
-    largest component of |R'R - 1|. `energy` limits the drift of the energy, or of the Jacobi integral in a turning field, for
-    methods that do not conserve it: a run beyond it has diverged.
+    `drift` limits the drift of the invariants that a method conserves, relative to their scales (see `drift_limit`).
+    `orthonormality` limits the largest component of |R'R - 1|. `energy` limits the drift of the energy, or of the Jacobi
+    integral in a turning field, for methods that do not conserve it: a run beyond it has diverged.
     """
 
     drift: float
@@ -335,9 +342,11 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
             return _cut(result, n, result.failure or Diverged(float(result.t[max(n - 1, 0)])))
         if result.failure is not None:
             return result
+        limit = drift_limit(result.scene, bounds)
         quantities = [("orthonormality", orthonormality(result.R_WB), bounds.orthonormality)]
         for invariant, size in invariants.kept_sizes(result.scene, conserved).items():
-            quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / size), bounds.drift))
+            scale = size + _most_supplied(result, invariant)
+            quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / scale), limit))
         if (energy := invariants.find_energy(result.scene.invariants)) is not None:
             quantities.append((energy.name, sizes(result.drift(energy)), bounds.energy))
     # The appended sample ends the search where all are within the bound.
@@ -349,6 +358,18 @@ def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds
     if name in {"orthonormality", *conserved}:
         return _cut(result, n, NotConserved(time, name, drift, bound))
     return _cut(result, n, Diverged(time, f"the drift of {name} is {drift:.3g}, the bound {bound:.3g}"))
+
+
+def _most_supplied(result: Trajectory, invariant: Invariant) -> Array | float:
+    """Return the most that loads have supplied to an invariant up to each sample (n,), whose round-off is part of the drift."""
+    if invariant.supplied is None or result.supplied is None:
+        return 0.0
+    return np.asarray(np.maximum.accumulate(sizes(invariant.supplied(result.supplied))))
+
+
+def drift_limit(scene: Scene, bounds: Bounds) -> float:
+    """Return the limit on the drift of conserved invariants, including the effect of rounding the attitude in a steep field."""
+    return max(bounds.drift, min(LOOSEST, bounds.drift + STEEP * _ROUND_OFF * scene.steepness))
 
 
 def head(result: Trajectory, n: int) -> Trajectory:

@@ -12,7 +12,7 @@ from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
 from ..errors import BadInput, LoadNotResolved, RotationNotResolved, Unsupported
-from ..grid import MOST_STEPS, Grid, grid_for
+from ..grid import MOST_STEPS, Grid, count_steps, grid_for
 from ..method import Method, Role
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
@@ -20,7 +20,7 @@ from ..methods.reduced import Reduced
 from ..methods.search import candidates
 from ..methods.units import bound_rate
 from ..outcome import Progress
-from ..potentials.smoothness import find_unresolved
+from ..potentials.smoothness import examine, find_unresolved
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -35,18 +35,22 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
-def warn_of_steps(scene: Scene, method: Method, grid: Grid) -> None:
-    """Warn if the steps of a grid are too long for a load or for the rotation of a rod; see `integrate`."""
+def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = None) -> None:
+    """Warn if steps are too long for a load or for the rotation of a rod, by default of the scene; see `integrate`."""
     warn_of_loads(scene, method, grid)
-    _warn_of_rods(scene, method, grid.dt)
+    _warn_of_rods(rod or scene, method, grid.dt)
 
 
 def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
     """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
     if not scene.loads or method.order is None:
         return
-    if grid.dt > scene.smoothness().step:
-        warnings.warn(LoadNotResolved(grid.dt, *scene.smoothness()[1:3]), stacklevel=4)
+    end = grid.n_steps * grid.dt
+    found = scene.smoothness(grid.last)
+    if grid.dt > found.step and end < scene.t_end:  # it may be smooth as long as the run is
+        found = examine(scene.loads, end)
+    if grid.dt > found.step:
+        warnings.warn(LoadNotResolved(grid.dt, 0.0 if found.noise else found.step, found.interval), stacklevel=4)
     for load in scene.loads:
         if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
             warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)
@@ -101,7 +105,8 @@ def integrate(
     scene
         The scene.
     dt
-        Step size, s; default: the scene's (`Scene.dt`). For adaptive methods, and with `error`, the sampling interval.
+        Step size, s; default: the scene's (`Scene.dt`), shortened to a part of t_end if there are functions of time. For
+        adaptive methods, and with `error`, the sampling interval.
     method
         A method, or its name, for example `"mujoco@3.6.0:RK4"`. Without a method and a step, both are chosen as for
         `error=1e-6`. With a step alone it is `Reduced()`, the paper's integrator in three unknowns; in fields that depend on
@@ -196,8 +201,12 @@ def read_error(error: float | None, method: object, dt: object) -> float | None:
 
 
 def read_step(scene: Scene, dt: float | None, t_end: float | None) -> float:
-    """Return the step, s: by default the scene's, at most the duration."""
-    return dt if dt is not None else min(scene.dt, read_end(scene, t_end))
+    """Return the step, s: by default the scene's, at most the duration, and a part of it if there are functions of time."""
+    if dt is not None:
+        return dt
+    end = read_end(scene, t_end)
+    step = min(scene.dt, end)
+    return end / count_steps(end, step) if scene.asks_time else step
 
 
 def read_end(scene: Scene, t_end: float | None) -> float:

@@ -62,7 +62,7 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
 
 
 def _adopt(stored: Any, given: Any) -> Iterator[str]:
-    """Replace digests that cannot be compared with those of another record by these, and yield the reasons."""
+    """Replace stored digests that cannot be compared by the given ones, and yield the reasons."""
     if not (isinstance(stored, dict) and isinstance(given, dict)):
         if isinstance(stored, list) and isinstance(given, list):
             for pair in zip(stored, given, strict=False):

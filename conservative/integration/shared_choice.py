@@ -61,7 +61,7 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTim
             lambda method, grid: find_worst(bodies, chosen, method, grid)[0],  # noqa: B023  # called in this round only
         )
         attempts += tuple((each.grid.dt, each.estimate.total) for each in tried)
-        method, grid, found = best_of(tried) if best_of(tried).method != method else tried[-1]
+        method, grid, found = best_of(tried)
         dt, estimate, rough = grid.dt, found.total, find_rough(tried)
         worst, number = find_worst(bodies, verified, method, grid)
         if worst.total <= error or estimate > error:

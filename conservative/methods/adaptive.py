@@ -49,15 +49,16 @@ FIRST_TRIES, BEYOND = 1_000, 10.0
 SAME = 1e-12
 """A sample that is closer to a break point, relative to the time, is at it."""
 ROUGH = 3e-3
-"""A step that is shorter than this share of the median shows a corner or a jump."""
+"""A corner or a jump is shown if the tolerance allows a step of less than this share of the median."""
 
 
 @dataclass
 class Walk:
     """The states of an adaptive run, principal axes.
 
-    `t` are the times of samples (n,), s; `q` (n, 4) and `L` (n, 3 or 7) the states there, of which `good` are known. `h` and
-    `ends` are the length and the end of each accepted step, s; `local` is the sum of their errors, rad.
+    `t` are the times of samples (n,), s; `q` (n, 4) and `L` (n, 3 or 7) the states there, of which `good` are known. `ends` are
+    the ends of accepted steps, s, and `h` the lengths that the tolerance allowed, which are longer if a step ends at a sample
+    or a break point; `local` is the sum of their errors, rad.
     """
 
     t: Array
@@ -73,8 +74,8 @@ class Walk:
 
     @property
     def control(self) -> StepControl:
-        """The sum of local errors, and the time of the shortest step, if it is much shorter than most; of the last one if too
-        many steps are rejected.
+        """The sum of local errors, and a time of `StepControl.rough`: the end of the step for which the tolerance allowed the
+        least, if that is much less than for most; the end of the last one if too many steps are rejected.
         """
         if not self.h:
             return StepControl(self.local, 0.0 if self.erratic else None)
@@ -144,11 +145,12 @@ def walk(  # noqa: PLR0915  # one loop
                 q, L, supply = fine
                 supplied = supplied + supply
                 now = stop_at if step == left else now + step
-                found.h.append(step)
+                found.h.append(max(step, h))
                 found.ends.append(now)
                 found.local += error
                 grown = step * min(GROW, SHARE * (tolerance / max(error, 1e-300)) ** POWER)
-                h = min(longest, max(h if step < h else 0.0, grown))  # a step that ends at a sample says nothing of longer ones
+                # A step that ends at a sample says nothing of longer ones.
+                h = min(longest, max(h if step < h else least, grown))
             if found.good < len(t) and stop >= t[found.good] * (1 - SAME):
                 found.q[found.good], found.L[found.good, :3], found.L[found.good, 3:] = q, L, supplied
                 found.good += 1

@@ -134,7 +134,7 @@ def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
     if samples.at is not None or samples.spacing is None:
         every = 1 if samples.at is not None else samples.every
         return even_grid(t_end, adaptive_spacing(t_end), every, 1)
-    n = math.ceil(t_end / samples.spacing * (1 - 1e-9))
+    n = count_steps(t_end, samples.spacing)
     require_memory("sample_every", n, min(samples.every, n))
     return Grid(samples.spacing, n, min(samples.every, n))
 

@@ -12,12 +12,10 @@ import sys
 from ..grid import Grid
 from ..method import Method
 from ..scene import Scene
-from ..trajectory import Bounds
+from ..trajectory import LOOSEST, Bounds
 from .pieces import count_most_steps
 
 EPSILON = sys.float_info.epsilon
-LOOSEST = 1e-3
-"""Upper limit of all bounds, for any tolerance, body and number of steps."""
 ROUNDING, SOLVER = 4.0, 10.0
 """Drift that a step may cause, in units of round-off and of the tolerance."""
 UNIT_QUATERNIONS = 1e-13
@@ -29,12 +27,15 @@ def within_round_off(method: Method, scene: Scene, grid: Grid) -> Bounds:
     return bounds_of(scene, grid)
 
 
-def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS) -> Bounds:
+def bounds_of(
+    scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS, n_steps: int | None = None
+) -> Bounds:
     """Return the bounds of a run whose solver may leave a relative error `tol` in a step.
 
-    If `orthonormality` is None, it has the same bound as the invariants.
+    If `orthonormality` is None, it has the same bound as the invariants. `n_steps` is by default the number of steps of the
+    grid, including those that break points add.
     """
-    n_steps = count_most_steps(scene, grid)
+    n_steps = count_most_steps(scene, grid) if n_steps is None else n_steps
     rounding = ROUNDING * EPSILON * (10 + n_steps) * scene.body.condition
     drift = min(LOOSEST, rounding + SOLVER * tol * n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)

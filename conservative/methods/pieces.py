@@ -75,7 +75,7 @@ def list_pieces(grid: Grid, breaks: Array) -> list[Piece]:
 
 def count_parts(grid: Grid, inside: int) -> int:
     """Return the number of steps into which each part of a step is divided, with so many break points inside of the run."""
-    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # with fewer points than steps, thrice the work at most
+    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # fewer than four times the steps
 
 
 def count_most_steps(scene: Scene, grid: Grid) -> int:

@@ -82,10 +82,8 @@ class Projected(Method):
         return DORMAND_PRINCE_8.order if self.tolerance is None else None
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        if self.tolerance is not None:
-            n = grid.n_steps + 3 * MOST_TRIES  # in the same time: nothing is asked beyond it
-            grid = Grid(grid.last / n, n, n)
-        return bounds_of(scene, grid)
+        # A try has three steps. Long motions can take more, but round-off grows with the root of their number only.
+        return bounds_of(scene, grid, n_steps=None if self.tolerance is None else grid.n_steps + 3 * MOST_TRIES)
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None

@@ -21,7 +21,7 @@ from ..potentials.field import into_axes
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
-from .coefficients.compositions import BEST, composition_of
+from .coefficients.compositions import BEST, OUTSIDE, composition_of, leaves_step
 from .columns import (
     find_unit_of_time,
     find_units_of_moments,
@@ -66,7 +66,7 @@ class Reduced(Method):
         2, 4, 6, 8 or 10.
     composition
         Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the most accurate one of
-        the order.
+        the order. Those with stages outside of the step do not take a motor that is a function of time.
     tol
         Relative tolerance of the solver in a stage. The default is below round-off, because even a small systematic
         error becomes a drift after 10^8 steps.
@@ -122,6 +122,9 @@ class Reduced(Method):
         return composition_of(self.order, self.composition).stages
 
     def unsupported(self, scene: Scene) -> str | None:
+        motor = scene.body.motor  # asked at the ends of stages, other loads at their midpoints
+        if motor and callable(motor.value) and leaves_step(composition_of(self.order, self.composition).weights):
+            return OUTSIDE
         return frame_unsupported(self.frame, scene)
 
     @in_own_units

@@ -18,6 +18,7 @@ from ..method import Method, Role, Run
 from ..needs import FIELDS, IN_TIME, ROTATION, Need
 from ..scene import Scene
 from .bounds import within_round_off
+from .coefficients.compositions import OUTSIDE, leaves_step
 from .coefficients.splittings import SEQUENCES, Lengths, lengths_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
@@ -42,7 +43,8 @@ class Splitting(Method):
         2, 4, 6, 8 or 10.
     composition
         Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`), or of a sequence of
-        `conservative.methods.coefficients.splittings`; None for the most accurate one of the order.
+        `conservative.methods.coefficients.splittings`; None for the most accurate one of the order. Those with stages outside
+        of the step do not take potentials that are functions of time.
 
     Raises
     ------
@@ -81,6 +83,8 @@ class Splitting(Method):
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
+        if Need.TIME in scene.needs and leaves_step(self.lengths[0]):
+            return OUTSIDE
         if scene.body.rotor_momentum is None:
             return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
         return "its sequence needs exact free rotations, which a rotor has not" if self.composition in SEQUENCES else None

@@ -280,8 +280,8 @@ class Torque(OfTime):
         Three numbers (3,), N m; a function of time, s, that returns them, or of time and the attitude R_WB (3, 3), if it has
         two arguments without a default; or a table: a tuple of times (n,), s, and values (n, 3), linear in between. Two equal
         times are a jump. A table has to cover the run; the part of the last step after its end has its last value. A function
-        is asked until the end of the last step: if it has no values after t_end, take steps that divide t_end, or `error`. A
-        step calls Python if the torque is no constant.
+        is asked until the end of the last step, which is t_end unless a given step does not divide t_end. A step calls Python
+        if the torque is no constant.
     frame
         "body" or "world": the axes of its components.
     breaks

@@ -10,6 +10,7 @@ torque is that of uniform gravity, with A for the vertical and 2 F' b for the mo
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -335,6 +336,11 @@ class PointAttraction(PointPotential):
         """Return which of n bodies' numbers (n, ...), J m and m, might not be taken as they are."""
         zero = [~parameters[name].any(axis=1) for name in ("point_B", "anchor_W") if name in parameters]
         return np.logical_or.reduce([parameters.get("strength", np.ones(1)) == 0, *zero])
+
+    def steepest(self) -> float:
+        """Return the largest change of V by a relative change of positions, J: at the smallest distance; inf if it is 0."""
+        a, b = float(np.linalg.norm(self.anchor_W)), float(np.linalg.norm(self.point_B))
+        return abs(self.strength) * (a + b) / (a - b) ** 2 if a != b else math.inf
 
     def in_units(self, energy: float) -> PointAttraction:
         """Return the field with energies in units of `energy`, a power of two, J."""

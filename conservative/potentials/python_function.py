@@ -17,7 +17,8 @@ from .callback import find_address, moment
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
-_PROBED_TIMES = ((0.0,), (0.7,))
+_LATER = 0.7, 0.07, 0.007, 0.0007
+"""Times, s, at the first of which functions of time are tried that have a value there: a recording may be shorter."""
 _DIFFERENCE = 1e-5
 _AGREEMENT = 1e-4
 _AXIS = "a unit vector (3,), world axes, about which the field is symmetric"
@@ -38,8 +39,7 @@ class FunctionPotential:
     `axis_W` the last D is the part of D that changes R' axis_W. The momentum about the axis is then conserved to round-off as
     well (DERIVATION.md, section 5).
 
-    If the functions depend on time, energy is not conserved, and the only invariant is the momentum about `axis_W`. `Projected`
-    and SciPy support this.
+    If the functions depend on time, energy is not conserved, and the only invariant is the momentum about `axis_W`.
 
     Parameters
     ----------
@@ -89,10 +89,11 @@ class FunctionPotential:
                 raise BadInput(name, describe(function), "a function of a matrix (3, 3)")
         V = energy if isinstance(energy, Energy) else Energy(energy, time_dependent)
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient, time_dependent)
-        for t in _PROBED_TIMES if time_dependent else ((),):
+        times = ((0.0,), *((t,) for t in _LATER if _has_values(V, G, t)))[:2] if time_dependent else ((),)
+        for t in times:
             _check_gradient(V, G, t)
-        axis = None if axis_W is None else _check_axis(axis_W, G)
-        set_fields(self, energy=V, gradient=G, scale=_size(scale, G), axis_W=axis, time_dependent=time_dependent)
+        axis = None if axis_W is None else _check_axis(axis_W, G, times[-1])
+        set_fields(self, energy=V, gradient=G, scale=_size(scale, G, times), axis_W=axis, time_dependent=time_dependent)
 
     def energy_at(self, R_WB: Array, t: Array) -> Array:
         """Return V, (...), in J at attitudes (..., 3, 3) and times (...), s."""
@@ -144,7 +145,20 @@ class FunctionPotential:
         return kernel.FunctionInTime(address, rows, 0.0) if self.time_dependent else kernel.Function(address, rows)
 
 
-def _check_gradient(energy: Energy, gradient: Gradient, t: tuple[float, ...]) -> None:
+Time = tuple[()] | tuple[float]
+"""A time, s, for functions that depend on it."""
+
+
+def _has_values(energy: Energy, gradient: Gradient, t: float) -> bool:
+    """Return whether both functions return a value at a time, s."""
+    try:
+        energy.at(_PROBE, t), gradient.at(_PROBE, t)
+    except PotentialFailed:
+        return False
+    return True
+
+
+def _check_gradient(energy: Energy, gradient: Gradient, t: Time) -> None:
     """Compare the gradient with differences of the energy at one attitude, and at a time if they depend on it."""
     found, differences = _probe("gradient", gradient, _PROBE, *t), np.empty((3, 3))
     for index in np.ndindex(3, 3):
@@ -167,24 +181,23 @@ def _probe(argument: str, function: Energy | Gradient, R: Array, *t: float) -> A
     return finite_array(argument, found, ((), (3, 3)), f"{allowed}, at every attitude")
 
 
-def _check_axis(axis_W: ArrayLike, gradient: Gradient) -> Array:
+def _check_axis(axis_W: ArrayLike, gradient: Gradient, t: Time) -> Array:
     """Return the axis, if it is one: a unit vector (3,) along which the field has no torque."""
     axis = finite_array("axis_W", axis_W, ((3,),), _AXIS)
     if abs(np.linalg.norm(axis) - 1) > ROTATION_TOLERANCE:
         raise BadInput("axis_W", describe(axis.tolist()), _AXIS)
-    found = _probe("gradient", gradient, _PROBE, *(_PROBED_TIMES[-1] if gradient.in_time else ()))
+    found = _probe("gradient", gradient, _PROBE, *t)
     torque, size = abs(moment(np.eye(3), _PROBE, found) @ axis), np.abs(found).max()
     if torque > _AGREEMENT * size:
         raise BadInput("axis_W", f"{axis.tolist()}, about which the field has a torque of {torque:.3g} N m", _AXIS)
     return axis
 
 
-def _size(scale: float | Size | None, gradient: Gradient) -> Size:
-    """Return the size of V that is given, or the largest of a few gradients."""
+def _size(scale: float | Size | None, gradient: Gradient, times: tuple[Time, ...]) -> Size:
+    """Return the size of V that is given, or the largest of a few gradients at some times."""
     if scale is not None:
         value = scale.value if isinstance(scale, Size) else scale
         return Size(positive_number("scale", value, "a finite energy above 0, J"))
     half_turns = from_quaternion(np.eye(4))
-    times = _PROBED_TIMES if gradient.in_time else ((),)
     attitudes = (_PROBE, *half_turns, *(half_turns @ _PROBE))
     return Size(max(float(np.linalg.norm(_probe("gradient", gradient, R, *t))) for R in attitudes for t in times) or 1.0)

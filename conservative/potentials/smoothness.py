@@ -1,9 +1,9 @@
-"""Where functions of time are not smooth, and which steps resolve them.
+"""Times at which functions of time are not smooth, and steps that resolve them.
 
 The functions of a scene are evaluated at `SCANNED` + 1 equally spaced times. Jumps and corners between two of them are found
 by bisection; steps then end there. Elsewhere the integral over blocks of several lengths by Simpson's rule is compared with the
-sum over all times: blocks for which both agree are short enough for a step. What is shorter than t_end / `SCANNED` can be
-missed. If not even two intervals agree, the worst intervals are scanned again, more finely: a function that is not smooth
+sum over all times: blocks for which both agree are short enough for a step. A pulse that is shorter than t_end / `SCANNED` can
+be missed. If not even two intervals agree, the worst intervals are scanned again, more finely: a function that is not smooth
 there, either, is noise, and no step resolves it.
 """
 
@@ -25,15 +25,13 @@ SCANNED = 2**16
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
 ATTITUDE, OTHER = (read_only(rotation_about(axis, angle)) for axis, angle in (((1.0, 2.0, 3.0), 1.0), ((-3.0, 1.0, 2.0), 2.0)))
-"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. What is found belongs to the time if the function is
-not smooth at the `OTHER` attitude either."""
+"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. A corner belongs to the time if the function is not
+smooth at the `OTHER` attitude either."""
 STEEP, MOST_JUMPS = 10.0, 1000
 """An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
 MOST_CORNERS, LEAST_BEND, NARROW, ZOOM = 4096, 1e-10, 1e-11, 8
 """More corners are noise. Second differences of a scan that are smaller, relative to the largest value, are no corners. Corners
 are found to a share of t_end, by intervals that are divided into so many parts."""
-
-
 CLOSER, NARROWER, WORST = 1024, 64, 8
 """Number of parts into which an interval is divided, in so many of the worst blocks, and the ratio of the spacings at which
 second differences are compared: they fall with its square in smooth functions, with its first power at corners, not at all in
@@ -215,10 +213,10 @@ class Unresolved(NamedTuple):
 
 
 def find_unresolved(load: Any, dt: float, n_steps: int) -> Unresolved | None:
-    """Return what n steps dt, s, do not resolve of a table: corners, of which there are more than steps, and which show.
+    """Return the description of a table that n steps dt, s, do not resolve; None if they resolve it.
 
-    They show if Simpson's rule over each step and the integral of the table differ as in `examine`. So they do not in a smooth
-    function that is sampled densely.
+    A table is not resolved if it has more corners than steps, and Simpson's rule over each step differs from the integral of
+    the table, as in `examine`. A smooth function that is sampled densely is resolved.
     """
     if not isinstance(load.value, tuple):
         return None

@@ -113,14 +113,14 @@ class SciPy(Method):
 
         def loop() -> tuple[Array, Counters, str]:
             with np.errstate(all="ignore"):  # a diverging run is reported by its status
-                return solve_pieces(scene, pieces, grid.t, solver)
+                return solve_pieces(scene, pieces, grid.t, solver, grid.last)
 
         def convert(found: tuple[Array, Counters, str]) -> Trajectory:
             y, work, reason = found
             return axes.trajectory(grid, self.label, States(QUATERNION, y[None]), work, *([reason] if reason else []))
 
-        smooth = len(pieces) == 1 and scene.body.motor is None
-        bind = partial(solver.bind, pieces[0][2], initial_state(axes), grid.t, scene.smoothness().step) if smooth else None
+        smooth, longest = len(pieces) == 1 and scene.body.motor is None, scene.smoothness(grid.last).step
+        bind = partial(solver.bind, pieces[0][2], initial_state(axes), grid.t, longest) if smooth else None
         return EngineRun(loop, convert, bind)
 
 
@@ -141,17 +141,20 @@ def list_derivatives(scene: Scene, t_end: float, t_start: float = 0.0, last: flo
     return [(a, b, state_derivative(scene, window)) for (a, b), window in zip(pairwise(ends), windows, strict=False)]
 
 
-def solve_pieces(scene: Scene, pieces: Pieces, t: Array, solver: SolveIvp | Ode) -> tuple[Array, Counters, str]:
+def solve_pieces(
+    scene: Scene, pieces: Pieces, t: Array, solver: SolveIvp | Ode, last: float = 0.0
+) -> tuple[Array, Counters, str]:
     """Return states (n, 7), a quaternion and rates in principal axes, at increasing times t (n,), s, from a solver.
 
-    `pieces` are those of `list_derivatives`: the solver starts again in each. The integrated rates are J^-1 (J w + h): a motor
-    changes h, but not the sum. Return also the steps and evaluations, and the reason if the states end early.
+    `pieces` are those of `list_derivatives`, for the same `last`: the solver starts again in each. The integrated rates are
+    J^-1 (J w + h): a motor changes h, but not the sum. Return also the steps and evaluations, and the reason if the states end
+    early.
     """
     found, steps, evaluations, reason = list[Array](), 0, 0, ""
     wheel = wheel_rates(scene)
     y = initial_state(principal_axes(scene))
     y[4:] += wheel(pieces[0][0])
-    longest = scene.smoothness().step
+    longest = scene.smoothness(last).step
     for a, b, derivative in pieces:
         last = b == pieces[-1][1]
         some = t[(t >= a) & ((t < b) | last)]

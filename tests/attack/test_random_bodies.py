@@ -21,13 +21,13 @@ from conservative.check import LARGEST
 from conservative.errors import NotConserved
 from conservative.grid import Grid
 from conservative.invariants import kept_sizes, sizes
-from conservative.methods.bounds import LOOSEST
 from conservative.methods.units import bound_rate
 from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 from conservative.references.solvers.heyoka import Heyoka
 from conservative.references.solvers.scipy import SciPy
+from conservative.trajectory import LOOSEST, drift_limit
 
 from .effort import tries
 
@@ -122,8 +122,9 @@ def check_conservation(found, method, grid, turn):
         assert not (tame and isinstance(found.failure, NotConserved)), f"false alarm: {found.failure}"
         return
     assert orthonormality(found.R_WB).max() <= min(LOOSEST, bounds.orthonormality)
+    limit = min(LOOSEST, drift_limit(scene, bounds))
     for invariant, size in kept_sizes(scene, method.conserves).items():
-        assert (sizes(found.drift(invariant)) * (invariant.scale / size)).max() <= min(LOOSEST, bounds.drift), invariant.name
+        assert (sizes(found.drift(invariant)) * (invariant.scale / size)).max() <= limit, invariant.name
 
 
 @tries(1500)

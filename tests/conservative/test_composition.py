@@ -92,3 +92,34 @@ def test_the_default_set_is_the_best_of_its_order() -> None:
             run = cv.Reduced(order, rival).run(TOP, 3.0 / n, sample_every=10**9)
             errors[rival] = float(angle_between(reference(), run.R_WB[-1]))
         assert min(errors, key=lambda rival: errors[rival]) == name
+
+
+@pytest.mark.parametrize("name", COMPOSITIONS)
+@pytest.mark.parametrize("part", ["torque", "motor", "field"])
+def test_functions_of_time_are_asked_within_the_run_only(part: str, name: str) -> None:
+    """Other compositions are refused: before, a stage of `forest_ruth_3` ended 0.35 steps after the run."""
+    asked, end = list[float](), 0.3
+
+    def gain(t: float) -> float:
+        asked.append(t)
+        return 1.0 + t
+
+    arm = np.outer((0, 0, 1), (0.1, 0.2, 0.3))
+    field = cv.FunctionPotential(
+        lambda R, t: gain(t) * float(np.sum(arm * R)), lambda R, t: gain(t) * arm, 1.0, time_dependent=True
+    )
+    parts: dict[str, dict[str, object]] = {
+        "torque": {"torque": cv.Torque(lambda t: (gain(t), 0.2, 0.1))},
+        "motor": {"body": cv.RigidBody(TOP.body.inertia, rotor_momentum=lambda t: (gain(t), 0.2, 0.1))},
+        "field": {"potential": field},
+    }
+    method = (cv.Splitting if part == "field" else cv.Reduced)(COMPOSITIONS[name].order, name)
+    scene = TOP.rename("of time", t_end=end, **parts[part])
+    asked.clear()
+    if (reason := method.unsupported(scene)) is None:
+        assert method.run(scene, 0.1).ok
+        assert 0 <= min(asked) < max(asked) <= end
+    else:
+        assert "outside of the step" in reason
+        assert name not in BEST.values()
+        assert method.unsupported(TOP) is None

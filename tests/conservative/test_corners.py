@@ -5,12 +5,14 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from itertools import pairwise
+from zlib import crc32
 
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative import registry
+from conservative.errors import NotConserved
 from conservative.grid import count_steps, grid_for
 from conservative.integration.one import warn_of_loads
 from conservative.invariants import sizes
@@ -182,6 +184,47 @@ def test_a_warning_says_that_steps_do_not_resolve_a_table_that_they_do_not_resol
             assert each.message.dt == dt
 
 
+@pytest.mark.parametrize(
+    ("of_scene", "t_end", "warns"), [(100.0, 1.0, False), (100.0, 100.0, True), (1.0, 20.0, True), (1.0, 4.0, False)]
+)
+def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t_end, warns):
+    """The torque is fast from 5 s on."""
+    torque = cv.Torque(lambda t: (np.sin(200 * t) if t > 5 else 0.0, 0, 0))
+    scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), of_scene, None, torque=torque)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1, t_end))
+    assert [each.category for each in said] == [cv.LoadNotResolved] * warns
+    for each in said:
+        assert 5 < each.message.interval[1] <= t_end
+        assert 0 < each.message.step < 0.01  # measured: 0.0015 and 0.0049
+
+
+def test_adaptive_steps_see_a_pulse_after_the_end_of_the_scene():
+    torque = cv.Torque(lambda t: (np.exp(-(((t - 1.5) / 0.01) ** 2)), 0, 0))
+    scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (0.01, 0.005, 0.003), 0.2, None, torque=torque)
+    rates = [cv.integrate(each, 0.2, "scipy", t_end=1.6).w_WB_B[-1] for each in (scene, scene.rename("late", t_end=1.6))]
+    assert np.abs(rates[0] - rates[1]).max() < 1e-12  # measured: 0; 0.006 rad/s with steps of the scene's own duration
+
+
+def test_adaptive_runs_have_one_sample_after_the_start_and_no_corner_where_a_sample_is_near_a_break():
+    near = 0.5 + 1e-7
+    torque = cv.Torque(lambda t: (np.cos(t) + 0.5 * (t > near), 0.2, 0.1), breaks=(near,))
+    scene = cv.Scene("near", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 1.0, None, torque=torque)
+    for n in (1, 64):
+        found = cv.integrate(scene, 1.0 / n, cv.Projected(1e-8))
+        assert len(found) == n + 1
+        assert found.control.rough is None
+
+
+def test_a_warning_of_noise_names_no_step():
+    torque = cv.Torque(lambda t: (crc32(repr(t).encode()) / 2**32, 0, 0))
+    scene = cv.Scene("noise", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 2.0, None, torque=torque)
+    with pytest.warns(cv.LoadNotResolved) as said:
+        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1))
+    assert [each.message.step for each in said] == [0.0]
+
+
 def test_runs_of_one_and_of_many_bodies_warn():
     scene = made("anywhere", 20).scene()
     with pytest.warns(cv.LoadNotResolved, match="20 corners"):
@@ -207,6 +250,19 @@ def test_a_store_of_a_table_with_many_corners_is_resumed_to_the_same(method, tmp
             part.unlink()
     cv.integrate_many(case.scene(), **options, path=place, resume=True)
     assert {each: each.read_bytes() for each in place.rglob("*") if each.is_file()} == before
+
+
+@pytest.mark.parametrize("method", [cv.Reduced(), cv.Reduced(4)], ids=lambda each: each.name)
+def test_a_body_that_a_load_spins_up_conserves_its_balances_to_the_round_off_of_what_was_supplied(method):
+    t = np.linspace(0, 10, 30)
+    values = 300 * (1 + 0.3 * np.random.default_rng(0).normal(size=(30, 3)))
+    scene = replace(BASE, torque=(t, values), t_end=10.0).scene()
+    grid = grid_for(scene, DT)
+    found = method.solve(scene, grid)
+    assert found.ok  # before, balances were off by 3e-12 and 1e-11 of the scales at the start, and 7e-13 was allowed
+    assert np.abs(found.energy).max() > 1000 * scene.energy_scale  # measured: 5,990
+    wrong = replace(found, w_WB_B=found.w_WB_B * (1 + 1e-11 * np.arange(len(found)) / len(found))[:, None])
+    assert isinstance(method.check(scene, grid, wrong).failure, NotConserved)
 
 
 # Ends of runs
@@ -238,6 +294,25 @@ def test_the_last_sample_is_at_or_after_the_end():
     assert cv.integrate(brick, 0.1, t_end=end).t[-1] == pytest.approx(0.4)
     assert cv.integrate(brick, dt=0.1, t_end=end, error=1e-3).t[-1] == pytest.approx(0.4)
     assert cv.integrate(brick, t_end=end, error=1e-3).t[-1] == pytest.approx(end, rel=1e-15)
+
+
+@pytest.mark.parametrize("t_end", [1.0, 0.77])
+def test_a_recording_that_ends_with_the_run_is_integrated_at_the_default_step(t_end):
+    """The default step follows from the rate, and does not divide the duration."""
+
+    def recorded(t):
+        assert 0 <= t <= t_end
+        return 0.3 * np.cos(4 * t) * np.array((1.0, 0.5, -0.4))
+
+    scene = replace(BASE, w0=np.array((1.7, -2.9, 7.2))).scene().rename("recorded", t_end=t_end)
+    assert t_end / scene.dt % 1 > 0.05
+    made = cv.Scene("made", scene.body, scene.R_WB0, scene.w_WB_B0, t_end, scene.potential, torque=cv.Torque(recorded))
+    assert scene.dt * 0.99 < made.dt < scene.dt
+    kept = scene.rename("recorded", torque=cv.Torque(recorded))  # with the step of a scene without functions
+    for each in (made, kept):
+        assert cv.integrate(each, method="reduced").t[-1] == pytest.approx(t_end, rel=1e-15)
+    assert cv.integrate_many(kept, w_WB_B0=[kept.w_WB_B0] * 2, method="projected", threads=1).ok.all()
+    assert cv.integrate(scene, method="reduced").t[-1] > t_end * 1.0001  # steps of scenes without functions do not change
 
 
 # Samples between steps, and searches

@@ -15,7 +15,7 @@ import sys
 import time
 import weakref
 from collections import defaultdict, deque
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from types import ModuleType, SimpleNamespace
 
 import numba
@@ -204,6 +204,66 @@ def metaclass(k):
     return Own()
 
 
+def compared(k):
+    class Own:
+        def __eq__(self, other):
+            return other == k
+
+        __hash__ = object.__hash__
+
+        def __call__(self, t):
+            return float(self == 1.0) * t
+
+    return Own()
+
+
+def printed(k):
+    class Own:
+        def __str__(self):
+            return repr(k)
+
+        def __call__(self, t):
+            return float(str(self)) * t
+
+    return Own()
+
+
+def assigned(k):
+    class Own:
+        def __setattr__(self, name, value):
+            object.__setattr__(self, name, k * value)
+
+        def __call__(self, t):
+            self.gain = t
+            return self.gain
+
+    return Own()
+
+
+def made_again(how):
+    """Return a maker of objects whose constructor multiplies by k, and whose calls make another one."""
+
+    def make(k):
+        @dataclass
+        class Own:
+            of: float
+
+            def __post_init__(self):
+                self.gain = k * self.of
+
+            __call__ = how
+
+            @classmethod
+            def another(cls, of):
+                return cls(of)
+
+        made = object.__new__(Own)
+        vars(made).update(of=1.0, gain=1.0)
+        return made
+
+    return make
+
+
 def wrapped(k):
     @functools.wraps(lambda t: k * t)
     def torque(t):
@@ -251,6 +311,14 @@ MADE = {
     "a property": property_of,
     "a class with a metaclass": metaclass,
     "a list with an attribute": list_with_attribute,
+    "a class with a comparison": compared,
+    "a class with a text": printed,
+    "a class with assignments": assigned,
+    "an object of the same type": made_again(lambda self, t: type(self)(t).gain),
+    "an object of the same class": made_again(lambda self, t: self.__class__(t).gain),
+    "a copy with another field": made_again(lambda self, t: replace(self, of=t).gain),
+    "a class method": made_again(lambda self, t: self.another(t).gain),
+    "a constructor that is called again": made_again(lambda self, t: self.__post_init__() or self.gain * t),
     "a wrapped function": wrapped,
     "an attribute with a function": hidden,
     "a dictionary with a default": lambda k: defaultdict(float, {0.0: k}).__getitem__,

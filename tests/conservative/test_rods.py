@@ -79,6 +79,14 @@ def test_many_rods_have_the_warning() -> None:
         cv.integrate_many(rod(1e-3).scene(), **cv.spread(rod(1e-3).scene(), 2, rate="1%", seed=1), dt=0.1, method="no_squish")
 
 
+def test_a_rod_among_other_bodies_has_the_warning() -> None:
+    ball = cv.Scene("ball", cv.RigidBody((1, 1, 1)), np.eye(3), (0.3, 0.2, 0), 1.0, cv.UniformGravity(1.0, (0.3, 0.1, 0)))
+    starts = [ball.w_WB_B0, ball.w_WB_B0]
+    with pytest.warns(cv.RotationNotResolved):
+        cv.integrate_many(ball, w_WB_B0=starts, inertia=[(1, 1, 1), (1e-6, 1, 1)], dt=0.01, method="reduced", threads=1)
+    cv.integrate_many(ball, w_WB_B0=starts, inertia=[(1, 1, 1), (1, 1, 1.1)], dt=0.01, method="reduced", threads=1)
+
+
 @pytest.mark.filterwarnings("ignore::conservative.AccuracyNotReached")
 @pytest.mark.parametrize("gravity", [True, False])
 @pytest.mark.parametrize("axis", [0, 2])

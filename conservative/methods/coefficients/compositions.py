@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
+from itertools import accumulate
 from typing import NamedTuple
 
 from ...check import choice, describe
@@ -145,3 +147,11 @@ def composition_of(order: int, name: str | None = None) -> Composition:
     if name is not None and not (isinstance(name, str) and name in allowed):
         raise BadInput("composition", describe(name), f"None or, of order {order}, one of " + ", ".join(allowed))
     return COMPOSITIONS[BEST[order] if name is None else name]
+
+
+OUTSIDE = "stages of its composition are outside of the step, where a function of time may have no value"
+
+
+def leaves_step(weights: Iterable[Fraction]) -> bool:
+    """Return whether stages of such lengths, relative to the step, begin before it or end after it."""
+    return not all(0 <= end < 1 + 1e-12 for end in accumulate(weights))
