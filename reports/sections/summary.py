@@ -64,11 +64,11 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool, measured: boo
         times = f"{_speedup(first, second)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
     elif ours:
-        parts.append(f"Our fastest general integrator, {ours.name}, reaches {goal}; no measured engine or solver does.")
+        parts.append(f"Our fastest general integrator, {ours.name}, reaches {goal}; no timed run of an engine or solver does.")
     elif engine:
-        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; none of our general integrators does.")
+        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; no timed run of our general integrators does.")
     else:
-        parts.append(f"No measured method reaches {goal}." if measured else "No time was measured against an error.")
+        parts.append(f"No timed run reaches {goal}." if measured else "No time was measured against an error.")
     if solution and engine:
         only = ", which solves integrable motions only"
         if engine.time >= solution.time:

@@ -86,9 +86,9 @@ def test_a_faster_engine_is_the_subject_of_the_sentence():
 
 
 SIDES = [  # none says "only": other methods of the same side can reach it as well
-    ((OURS,), "Our fastest general integrator, gauss, reaches 1e-6 rad; no measured engine or solver does."),
-    ((SOLVER,), "The fastest engine or solver, scipy, reaches 1e-6 rad; none of our general integrators does."),
-    ((ENGINE,), "No measured method reaches 1e-6"),
+    ((OURS,), "Our fastest general integrator, gauss, reaches 1e-6 rad; no timed run of an engine or solver does."),
+    ((SOLVER,), "The fastest engine or solver, scipy, reaches 1e-6 rad; no timed run of our general integrators does."),
+    ((ENGINE,), "No timed run reaches 1e-6"),
 ]
 
 
