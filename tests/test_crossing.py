@@ -354,7 +354,18 @@ def study(cell: Cell) -> None:
 
 def report(cell: Cell) -> None:
     found = cell.call(
-        "report", "--scenes", cell.name, "--methods", "reduced,projected,scipy", "--quick", "--out", "page", "--bodies", "0"
+        "report",
+        "--scenes",
+        cell.name,
+        "--methods",
+        "reduced,projected,scipy",
+        "--quick",
+        "--out",
+        "page",
+        "--bodies",
+        "0",
+        "--time-limit",
+        "0.02",
     )
     check_rows(found["rows"])
 

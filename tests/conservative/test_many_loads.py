@@ -178,7 +178,7 @@ def test_an_error_is_reached_with_the_loads_of_each_body(name):
     found = cv.integrate_many(given, *starts(), inertia=inertia, error=1e-7)
     assert found.choice.reached
     for i in range(N):
-        truth = cv.integrate(found.bodies.take(i), found.grid.dt / 8, "projected", sample_every=8 * found.grid.every)
+        truth = cv.integrate(found.bodies.take(i), found.grid.dt / 2, "projected", sample_every=2 * found.grid.every)
         assert angle_between(found[i].R_WB, truth.R_WB).max() < 1e-7  # measured 4e-12
 
 

@@ -5,6 +5,7 @@ import json
 import math
 import re
 import subprocess
+from itertools import product
 
 import mpmath
 import numpy as np
@@ -228,9 +229,15 @@ def test_planted_mistakes_fail_and_are_named(language, mistake, tmp_path):
     assert found.count(AMBIGUOUS.get(mistake, mistake)) >= max(1, max(map(found.count, set(found) - {"unknown"})))
 
 
-@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("language", [needs("C"), *(pytest.param(each, marks=slow) for each in LANGUAGES if each != "C")])
+def all_methods(language):
+    """C runs all methods; the other languages run two in double precision with --all, and the rest with --attack."""
+    for method, (single, precision) in product(METHODS, ((False, "double"), (True, "float"))):
+        usual = not single and method in ("RK 3/8", "Gauss 4")
+        marks = [] if language == "C" else [slow if usual else pytest.mark.attack]
+        yield pytest.param(language, method, single, marks=marks, id=f"{language}-{method}-{precision}")
+
+
+@pytest.mark.parametrize(("language", "method", "single"), [each for language in LANGUAGES for each in all_methods(language)])
 def test_right_programs_pass(language, method, single, tmp_path):
     """Explicit and implicit methods that are not among those of the tolerances, in double and single precision."""
     if missing(language):
