@@ -39,7 +39,7 @@ from .options import (
     codes={1: FAILED_OR_INACCURATE},
     epilog=epilog(
         "conservative sweep my_body.toml --starts 100000 --spread attitude=5deg,rate=2% --picture sweep.svg",
-        "conservative sweep lagrange_top --spread inertia=1% --spread potential.weight=2% --dt 0.001 --json",
+        "conservative sweep lagrange_top --spread inertia=1% --spread potential.weight=2% --json",
         "conservative sweep brick_flip --starts 1000 --spread attitude=any --error 1e-6 --out sweep.zarr",
         "conservative sweep my_body.toml --starts 1e6 --spread rate=any --out big.zarr --scheduler tcp://host:8786",
     ),

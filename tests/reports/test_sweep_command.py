@@ -14,7 +14,7 @@ from conservative.reports.cli.main import main
 from conservative.reports.run import sweep as work
 
 SPREAD = ("--spread", "attitude=5deg,rate=2%", "--seed", "3")
-COMMON = ("brick_flip", "--starts", "1500", *SPREAD, "--dt", "0.1", "--t-end", "1.15", "--samples", "5")
+COMMON = ("brick_flip", "--starts", "1500", *SPREAD, "-m", "taylor", "--dt", "0.1", "--t-end", "1.15", "--samples", "5")
 
 
 def conservative(*arguments):
@@ -25,7 +25,12 @@ def same():
     """The ensemble that the command makes."""
     scene = cv.scenes.brick_flip()
     return cv.integrate_many(
-        scene, **cv.spread(scene, 1500, attitude="5deg", rate="2%", seed=3), dt=0.1, t_end=1.15, sample_every=3
+        scene,
+        **cv.spread(scene, 1500, attitude="5deg", rate="2%", seed=3),
+        dt=0.1,
+        t_end=1.15,
+        sample_every=3,
+        method="taylor",
     )
 
 
