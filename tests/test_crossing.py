@@ -353,21 +353,8 @@ def study(cell: Cell) -> None:
 
 
 def report(cell: Cell) -> None:
-    found = cell.call(
-        "report",
-        "--scenes",
-        cell.name,
-        "--methods",
-        "reduced,projected,scipy",
-        "--quick",
-        "--out",
-        "page",
-        "--bodies",
-        "0",
-        "--time-limit",
-        "0.02",
-    )
-    check_rows(found["rows"])
+    words = ["--methods", "reduced,projected", "--quick", "--out", "page", "--bodies", "0", "--time-limit", "0.02"]
+    check_rows(cell.call("report", "--scenes", cell.name, *words)["rows"])
 
 
 def check_rows(rows: Any) -> None:

@@ -191,7 +191,10 @@ class OfTime(PickledByFields):
         return sum(each.default is each.empty and each.kind <= each.POSITIONAL_OR_KEYWORD for each in parameters) == 2
 
     def at(self, t: float, R_WB: Array | None = None, window: Window = (-math.inf, math.inf)) -> Array:
-        """Return the value at a time, s, and an attitude (3, 3), between two break points. Raise `TorqueFailed` without one."""
+        """Return the value at a time, s, and an attitude (3, 3), between two break points. Raise `TorqueFailed` without one.
+
+        At a matrix that is not finite the value may be NaN: the run has diverged, which is no fault of the function.
+        """
         if isinstance(self.value, np.ndarray):
             return self.value
         inside = t if isinstance(self.value, tuple) or self.origin else t * EARLIER
@@ -206,11 +209,19 @@ class OfTime(PickledByFields):
         try:
             found = self.value(inside, np.eye(3) if R_WB is None else R_WB) if self.of_attitude else self.value(inside)
         except Exception as error:
+            if self._lost(R_WB):
+                return np.full(self.shape, math.nan)
             raise TorqueFailed(t, f"a function that raises {error!r}", self.name, self.one) from error
         value = real_array(found)
         if value is None or value.shape != self.shape or not np.isfinite(value).all() or self.fault(value):
+            if self._lost(R_WB):
+                return np.full(self.shape, math.nan)
             raise TorqueFailed(t, f"a function that returns {describe(found)}", self.name, self.one)
         return value
+
+    def _lost(self, R_WB: Array | None) -> bool:
+        """Return whether a function of the attitude was asked at a matrix that is not finite."""
+        return self.of_attitude and R_WB is not None and not np.isfinite(R_WB).all()
 
     def require(self, t_end: float, R_WB: Array | None = None) -> float:
         """Return the largest magnitude from 0 to t_end, s: of a function at a few times. Raise `BadInput` without a value.

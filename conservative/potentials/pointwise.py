@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,13 +33,16 @@ class _OfAttitude(ABC):
     def at(self, R: Array, *t: float) -> Any:
         """Return the value, J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives no such value.
 
-        A function of attitude and time is not called without the time, whatever its defaults.
+        A function of attitude and time is not called without the time, whatever its defaults. At a matrix that is not finite
+        the value may be NaN: the run has diverged, which is no fault of the function.
         """
         try:
             if len(t) != self.in_time:
                 raise TypeError(f"it is a function of {'attitude and time' if self.in_time else 'the attitude alone'}")
             return self._read(self.function(R.copy(), *(each * EARLIER for each in t)))
         except Exception as error:
+            if not np.isfinite(R).all():
+                return np.full(self.shape, math.nan)[()]
             raise PotentialFailed(error) from error
 
     @abstractmethod

@@ -132,7 +132,7 @@ def add_field(draw: Draw, case: Case, energy: float, theme: str, rate: float) ->
     point, anchor = draw.vector(arm), draw.vector(arm * (1 + draw.between(0.2, 3)))
     far = arm + float(np.linalg.norm(anchor))
     fields: dict[str, tuple[Any, ...]] = {
-        "gravity": (size / arm, point),
+        "gravity": (min(size / arm, 1e30), point),  # N: the largest weight that is taken
         "spring": (size / far**2, point, anchor, 0.0 if draw.chance(0.3) else draw.random.uniform(0, far)),
         "attraction": (size * (far - 2 * arm) * (1 if draw.chance(0.7) else -1), point, anchor),
         "gradient": (math.sqrt(size / float(np.linalg.eigvalsh(case.J)[-1])), case.J, direction),

@@ -1,6 +1,6 @@
 """Random scenes over all that a scene can have, `integrate(error=)` against an independent truth.
 
-A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries 15 scenes, `pytest --attack` 400, and
+A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries 8 scenes, `pytest --attack` 400, and
 ATTACK_EFFORT times as many.
 """
 
@@ -27,7 +27,7 @@ from .random_scenes import THEMES, random_case
 ERRORS = (1e-6, 1e-9, 1e-12)
 LONGEST = PATIENCE  # s of processor time
 SAMPLES = 8
-USUAL, ALL = 15, 400
+USUAL, ALL = 8, 400
 
 
 class TooLong(KeyboardInterrupt):

@@ -661,3 +661,39 @@ def test_a_function_is_never_asked_beyond_the_end(kind, how):
     _ = found.energy, found.momentum_W, [found.drift(each.name) for each in scene.invariants]
     assert max(asked) <= end
     assert max(asked) > end * (1 - 1e-12) or how == "scipy"
+
+
+def stiff(torque=None, potential=None):
+    """A body whose damping is far too large for the steps, so that they diverge."""
+    return bent(None, 1.0).rename("stiff", torque=torque, potential=potential, damping=cv.Damping(np.diag((3e4, 2e4, 1e4))))
+
+
+def checked(R):
+    """Return a matrix, if it is finite."""
+    if not np.isfinite(R).all():
+        raise ValueError("not a matrix")
+    return R
+
+
+ARM = np.array((0.1, 0.2, 0.3))
+LOST = {  # what a function of the attitude gives at NaN is not finite, or an exception
+    "nan": stiff(cv.Torque(lambda t, R: 0.1 * R[0])),
+    "exception": stiff(cv.Torque(lambda t, R: 0.1 * checked(R)[0])),
+    "potential": stiff(
+        None, cv.FunctionPotential(lambda R: checked(R)[2] @ ARM, lambda R: np.outer((0, 0, len(checked(R)) / 3), ARM))
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LOST)
+def test_a_run_that_diverges_is_no_fault_of_a_function_of_the_attitude(kind):
+    with pytest.raises(cv.IntegrationFailed):
+        cv.integrate(LOST[kind], 0.05, "projected")
+
+
+def test_values_where_there_is_no_attitude():
+    nowhere = np.full((3, 3), math.nan)
+    for kind in ("nan", "exception"):
+        assert np.isnan(LOST[kind].torque.at(0.3, nowhere)).all()
+    with pytest.raises(cv.TorqueFailed):
+        cv.Torque(lambda t, R: np.full(3, math.nan)).at(0.3, np.eye(3))
