@@ -66,7 +66,8 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool, measured: boo
     elif ours:
         parts.append(f"Our fastest general integrator, {ours.name}, reaches {goal}; no timed run of an engine or solver does.")
     elif engine:
-        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; no timed run of our general integrators does.")
+        none = "no timed run of our general integrators does"
+        parts.append(f"The fastest engine or solver, {engine.name}, reaches {goal}; {none}.")
     else:
         parts.append(f"No timed run reaches {goal}." if measured else "No time was measured against an error.")
     if solution and engine:
