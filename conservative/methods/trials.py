@@ -249,7 +249,7 @@ def _by_shown_order(
     method: Method, scene: Scene, grid: Grid, fine: Trajectory, coarse: Trajectory
 ) -> tuple[float, float | None, bool]:
     """Return the error, rad, by the order that two halvings of the step show, and `rough` and `ordered` of `Estimate`."""
-    _, _, interval, noise = scene.smoothness(grid.last)
+    breaks, _, interval, noise = scene.smoothness(grid.last)
     noisy = interval[0] if noise else None
     differences, before, longer = [_largest_difference(fine, coarse)], coarse, coarse_grid(grid)
     while len(differences) < HALVINGS and differences[-1] < ASYMPTOTIC and longer.n_steps % 2 == 0:
@@ -264,7 +264,9 @@ def _by_shown_order(
         most = convergence_factor(method) + 1
         factors = [min(most, second / first) if first > 0 else most for first, second in pairwise(seen)]
         if min(factors) >= SHOWN * most and max(factors) <= ALIKE * min(factors):
-            return seen[0] / (min(factors) - 1), noisy, True
+            # Steps are divided at break points. A part of a step that is as long at twice the step has the same error in both
+            # runs, so that their difference bounds the error, and no more: it was 2.8 times the error in a random scene.
+            return seen[0] if len(breaks) else seen[0] / (min(factors) - 1), noisy, True
     # As far as rounding explains the differences, they say nothing about the function; long steps do not show an order, either.
     floor = NOTHING * (1.0 + float(np.linalg.norm(fine.w_WB_B, axis=1).max()) * float(fine.t[-1]))
     shown = len(seen) == HALVINGS and min(seen) > floor and max(seen) < RESOLVED
