@@ -1,6 +1,6 @@
 """Random scenes over all that a scene can have, `integrate(error=)` against an independent truth.
 
-A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries 8 scenes, `pytest --attack` 400, and
+A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries ten scenes, `pytest --attack` 400, and
 ATTACK_EFFORT times as many.
 """
 
@@ -28,6 +28,8 @@ ERRORS = (1e-6, 1e-9, 1e-12)
 LONGEST = PATIENCE  # s of processor time
 SAMPLES = 8
 USUAL, ALL = 8, 400
+FOUND = (350, 394)
+"""Scenes whose runs were ok and up to ten times less accurate than asked, because their steps are divided at corners."""
 
 
 class TooLong(KeyboardInterrupt):
@@ -108,7 +110,7 @@ def check(case):
     assert not complaints, "; ".join(complaints)
 
 
-seeds = [pytest.param(seed, marks=[pytest.mark.attack] * (seed >= USUAL)) for seed in range(count(ALL))]
+seeds = [pytest.param(seed, marks=[pytest.mark.attack] * (seed >= USUAL and seed not in FOUND)) for seed in range(count(ALL))]
 
 
 @pytest.mark.parametrize("seed", seeds)
