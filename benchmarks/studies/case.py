@@ -151,9 +151,8 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
         return Outcome(OutcomeKind.MISSING, str(error))
     if isinstance(error, IntegrationFailed):
         return error.outcome
-    if isinstance(
-        error, BadInput | PotentialFailed | TorqueFailed
-    ):  # a step that the method does not have, a function that fails
+    # The method does not have the step, or a function of the scene fails.
+    if isinstance(error, BadInput | PotentialFailed | TorqueFailed):
         return Outcome(OutcomeKind.UNSUPPORTED, str(error))
     if isinstance(error, MissingEngine) or method.role != Role.ENGINE:
         raise error

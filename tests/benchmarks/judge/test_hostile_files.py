@@ -103,7 +103,7 @@ WORDS = {
     "3 million names": "line 1 has more than 1000000 characters",
     "20,000 columns": "20000 columns",
 }
-"""What the limit of a size says; without the limit another one would be met later, or none."""
+"""Messages of the limits of sizes. Without one of these limits, a file meets a later limit or none."""
 JSON = {
     "digits": '{"t": 0, "w_x": 1, "w_y": 2, "w_z": ' + "9" * 100_000 + "}\n",
     "401 digits": '{"t": 0, "w_x": 1, "w_y": 2, "w_z": 3}\n{"t": 1, "w_x": 1, "w_y": 2, "w_z": ' + "9" * 401 + "}\n",
