@@ -2,8 +2,9 @@
 
 The order of a method holds for the laws of this package. A function or a load of a user may have corners and jumps, at which
 differences of runs are small by chance. Runs at four and eight times the step then show whether differences fall as the
-method's order says, twice in a row. Otherwise the largest difference is the estimate. Adaptive methods have no step: their
-second run has a larger tolerance, and the local errors of all steps count as well.
+method's order says, twice in a row. Otherwise the largest difference is the estimate, and the last one where steps are
+divided at break points. Adaptive methods have no step: their second run has a larger tolerance, and the local errors of all
+steps count as well.
 
 Step doubling (Richardson's extrapolation) cannot show the effect of rounding the scene's own numbers: principal moments of a
 tensor are known only to an ulp of the largest, and chaotic motions or motions near a separatrix amplify that error. A third run
