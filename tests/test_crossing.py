@@ -25,7 +25,7 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.benchmarks.judge.diagnose import Diagnosis
+from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.versions.project import define_scene
 from conservative.needs import Need
 from conservative.programs import Program
@@ -315,7 +315,7 @@ def sweep(cell: Cell) -> None:
 
 def judge(cell: Cell) -> None:
     """The right motion is right, and the motion without the part is wrong; what explains it is left out, because it is slow."""
-    with patch("conservative.benchmarks.judge.verdict.diagnose", return_value=Diagnosis()):
+    with patch("conservative.benchmarks.verification.recordings.verdict.diagnose", return_value=Diagnosis()):
         judge_and_explain(cell)
 
 
@@ -331,7 +331,7 @@ def judge_later(cell: Cell) -> None:
     """A file that begins after t = 0 is judged at its own times."""
     R_WB, w = motion(cell.row.case, T)
     write_motion(cell.folder / "run.csv", R_WB, w, 50)
-    with patch("conservative.benchmarks.judge.verdict.diagnose", return_value=Diagnosis()):
+    with patch("conservative.benchmarks.verification.recordings.verdict.diagnose", return_value=Diagnosis()):
         found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1, 3))
     assert found["right"], found["error"]
 

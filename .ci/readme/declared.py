@@ -188,7 +188,7 @@ def commands() -> str:
 
 def kept_motions() -> list[dict[str, Any]]:
     """Return the motions of references/motions, in the order of the catalogue."""
-    from conservative.benchmarks.motions.motion import load
+    from conservative.benchmarks.verification.motions.motion import load
 
     folder = ROOT / "references" / "motions"
     return [json.loads((folder / f"{motion.name}.json").read_text(encoding="utf-8")) for motion in load()]
@@ -209,7 +209,7 @@ def _factor(x: float) -> str:
 
 def mistakes() -> str:
     """Return a row for each mistake that motions catch."""
-    from conservative.benchmarks.motions.programs import MISTAKES
+    from conservative.benchmarks.verification.motions.programs import MISTAKES
 
     rows, kept = [], kept_motions()
     for name, mistake in MISTAKES.items():

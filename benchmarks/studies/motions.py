@@ -18,9 +18,9 @@ from conservative.scene import Scene
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..motions import files
-from ..motions.motion import load
-from ..motions.programs import ANGLES, PARTS
+from ..verification.motions import files
+from ..verification.motions.motion import load
+from ..verification.motions.programs import ANGLES, PARTS
 from .case import Case
 from .declaration import Declaration, Named
 from .study import Progress, Study

@@ -20,8 +20,8 @@ from conservative.scene import Scene
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..twins.compare import BODIES, Twins, count_twins, twins_of
-from ..twins.pairs import PAIRS, Pair
+from ..verification.pairs.differences import BODIES, Twins, count_twins, twins_of
+from ..verification.pairs.pairs import PAIRS, Pair
 from .case import Case
 from .declaration import Declaration, Named
 from .selection import Missing

@@ -8,14 +8,14 @@ from itertools import chain
 import numpy as np
 
 from conservative.attitude import angle_between, to_quaternion
+from conservative.benchmarks.verification.protocol import FREE, GRIDS, HEAVY, examine
 from conservative.grid import Grid
-from conservative.references.environments.conformance import FREE, GRIDS, HEAVY, examine
 from conservative.references.samples import QUATERNION, States
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..judge.compared import SIGMAS, Compared
-from ..judge.diagnose import SEARCHES
+from ..verification.compare import SIGMAS, Compared
+from ..verification.explain import SEARCHES
 
 ALLOWED = 3.0
 """Error that an explanation may leave, in units of the difference between the runs with the two shortest steps."""

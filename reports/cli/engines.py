@@ -103,7 +103,7 @@ def check(ctx: click.Context, command: str, as_json: bool) -> None:
     Mistakes are named, with what to change; the exit code is then 1.
     """
     require_extra("conservative engines", "environments")
-    from conservative.references.environments.conformance import check
+    from conservative.benchmarks.verification.protocol import check
     from conservative.references.environments.programs import find_program, read_program
 
     if (program := find_program(command)) is None:

@@ -41,7 +41,7 @@ def importers(
     a valid file, or accepts a body that cannot exist.
     """
     require_extra("conservative importers", "report")
-    from conservative.references.importers.compare import compare_files
+    from conservative.benchmarks.verification.bodies.loaded import compare_files
 
     from ..sections.importers import build
     from ..terminal.progress import progress

@@ -79,7 +79,7 @@ def judge(
     if picture is not None:
         require_extra("conservative judge --picture", "report")
     from conservative import registry
-    from conservative.benchmarks.judge import table, verdict
+    from conservative.benchmarks.verification.recordings import table, verdict
 
     from ..sections.judge import build
     from ..terminal.progress import show_waiting

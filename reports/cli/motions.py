@@ -23,7 +23,7 @@ def motions(out: Path, force: bool, as_json: bool) -> None:
     The files are those of references/motions, to the last digit. Solutions are computed again in multi-precision and tolerances
     measured again, which takes a minute.
     """
-    from conservative.benchmarks.motions import files
+    from conservative.benchmarks.verification.motions import files
 
     from ..document import json
 

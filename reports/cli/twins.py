@@ -52,7 +52,7 @@ def twins(
     require_extra("conservative twins", "report")
     from conservative.benchmarks.studies.selection import methods as select_methods
     from conservative.benchmarks.studies.twins import compare_methods, select_pairs
-    from conservative.benchmarks.twins.script import MARK, script_name, script_of
+    from conservative.benchmarks.verification.pairs.script import MARK, script_name, script_of
     from conservative.files import make_folder, write_text
 
     from ..run.provenance import provenance

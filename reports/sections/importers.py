@@ -10,7 +10,7 @@ import numpy as np
 from ..document.model import Check, Document, Emphasis, Item, Items, Paragraph, Table, filled
 
 if TYPE_CHECKING:
-    from conservative.references.importers.compare import FileAnswer
+    from conservative.benchmarks.verification.bodies.loaded import FileAnswer
 
 
 GOOD = ("right", "undecided", "")
@@ -65,8 +65,8 @@ def _readings(answer: FileAnswer) -> list[str]:
 
 
 def _body(part: dict[str, Any] | str) -> str:
-    from conservative.references.importers.compare import describe
-    from conservative.references.importers.pieces import Piece
+    from conservative.benchmarks.verification.bodies.loaded import describe
+    from conservative.references.model_files.pieces import Piece
 
     if isinstance(part, str):
         return part[:120]

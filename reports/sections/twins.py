@@ -12,9 +12,9 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.study import Progress
 from conservative.benchmarks.studies.twins import STUDY, compare_methods
-from conservative.benchmarks.twins.compare import Twins
-from conservative.benchmarks.twins.pairs import PAIRS, Pair
-from conservative.benchmarks.twins.script import script_of
+from conservative.benchmarks.verification.pairs.differences import Twins
+from conservative.benchmarks.verification.pairs.pairs import PAIRS, Pair
+from conservative.benchmarks.verification.pairs.script import script_of
 from conservative.method import Method
 from conservative.outcome import OutcomeKind
 

@@ -25,7 +25,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from conservative.benchmarks.judge.table import Options
+from conservative.benchmarks.verification.recordings.table import Options
 
 from ..independent import Case, inverse_of, is_table
 from .random_scenes import Draw

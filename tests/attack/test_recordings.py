@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from conservative.benchmarks.judge import verdict
-from conservative.benchmarks.judge.table import read
+from conservative.benchmarks.verification.recordings import verdict
+from conservative.benchmarks.verification.recordings.table import read
 
 from . import recordings
 from .effort import SEED, count

@@ -14,9 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import registry
-from conservative.errors import BadInput
-from conservative.references.importers import readers
-from conservative.references.importers.compare import (
+from conservative.benchmarks.verification.bodies.loaded import (
     CATALOGUE,
     Program,
     accelerations,
@@ -24,10 +22,12 @@ from conservative.references.importers.compare import (
     judge_body,
     judge_refusal,
 )
-from conservative.references.importers.pieces import Piece, distance, weigh
-from conservative.references.importers.readers import Model, read_files, read_here
-from conservative.references.importers.robots import Body
-from conservative.references.importers.usd import reference_usd
+from conservative.errors import BadInput
+from conservative.references.model_files import readers
+from conservative.references.model_files.pieces import Piece, distance, weigh
+from conservative.references.model_files.readers import Model, read_files, read_here
+from conservative.references.model_files.robots import Body
+from conservative.references.model_files.usd import reference_usd
 from conservative.reports.cli.main import main
 
 pytest.importorskip("lxml")

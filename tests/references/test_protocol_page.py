@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from conservative.references.environments import conformance
-from conservative.references.environments.conformance import check
+from conservative.benchmarks.verification import protocol as conformance
+from conservative.benchmarks.verification.protocol import check
 from conservative.references.environments.programs import read_program
 from conservative.references.worker import program
 from conservative.references.worker.client import close_workers

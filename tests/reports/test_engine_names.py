@@ -33,11 +33,11 @@ NEEDS = {"gate": "against", "track": "versions"}
 TABLES = ("recommend", "report", "study", "twins")
 """Commands that show all settings of a name."""
 CAPTURED = {
-    "engines check": ("references.environments.conformance.check",),
+    "engines check": ("benchmarks.verification.protocol.check",),
     "engines install": ("references.environments.lock.resolve",),
     "engines remove": ("references.environments.install.drop", "references.environments.install.register"),
     "gate": (),
-    "importers": ("references.importers.compare.Program.check",),
+    "importers": ("benchmarks.verification.bodies.loaded.Program.check",),
     "recommend": ("benchmarks.recommendation.recommend.recommend",),
     "report": ("reports.report.write",),
     "run": ("reports.run.single_run.Planned",),
@@ -116,7 +116,9 @@ def ask(monkeypatch, name, command, parameter, text):
 
     for place in CAPTURED[name]:
         monkeypatch.setattr(f"conservative.{place}", capture)
-    monkeypatch.setattr("conservative.references.importers.compare.read_files", lambda *_: [SimpleNamespace(kind="", label="")])
+    monkeypatch.setattr(
+        "conservative.benchmarks.verification.bodies.loaded.read_files", lambda *_: [SimpleNamespace(kind="", label="")]
+    )
     others = [each for each in command.params if each is not parameter and (each.required or each.name == NEEDS.get(name))]
     words = name.split()
     for each in sorted([parameter, *others], key=command.params.index):

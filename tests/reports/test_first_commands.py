@@ -127,7 +127,7 @@ def test_every_command_of_the_block_is_checked():
 def test_a_command_of_readme_ends_well_and_shows_a_right_motion(name, folder):
     if name == "judge":
         invoke(*COMMANDS["run"])
-    shutil.copy(ROOT / "references/importers/models/fixed_child.urdf", "my_body.urdf")
+    shutil.copy(ROOT / "references/model_files/models/fixed_child.urdf", "my_body.urdf")
     program = (ROOT / "tests/references/programs/engine.py").read_text(encoding="utf-8")
     (folder / "my_engine").write_text(f"#!{sys.executable} -I\n{program}")
     (folder / "my_engine").chmod(0o755)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import conservative as cv
 from conservative.reports.cli.main import main
 
-from ..benchmarks.judge.made import exact, stepped
+from ..benchmarks.verification.made import exact, stepped
 
 # The brick of NASA's check case 2, slug ft^2: the motion of a free body depends on the ratios of its moments only.
 TOML = """t_end = 30

@@ -23,15 +23,25 @@ from conservative.attitude import Array, hat
 from conservative.check import choice
 from conservative.errors import BadInput
 from conservative.programs import list_programs
-
-from ..engine import version
-from ..environments.environment import find_environment, list_environments
-from ..worker.calls import python_worker
-from ..worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
-from . import loaders
-from .loaders import LOADERS
-from .pieces import QUANTITIES, Link, Piece, differing, distance, errors, join_links, list_numbers, make_pose, steiner
-from .readers import DIGITS, Model, read_files
+from conservative.references.engine import version
+from conservative.references.environments.environment import find_environment, list_environments
+from conservative.references.model_files import loaders
+from conservative.references.model_files.loaders import LOADERS
+from conservative.references.model_files.pieces import (
+    QUANTITIES,
+    Link,
+    Piece,
+    differing,
+    distance,
+    errors,
+    join_links,
+    list_numbers,
+    make_pose,
+    steiner,
+)
+from conservative.references.model_files.readers import DIGITS, Model, read_files
+from conservative.references.worker.calls import python_worker
+from conservative.references.worker.client import EngineCrashed, EngineError, EngineTimeout, time_limit
 
 LOCAL = {"mujoco": ("mujoco", "MuJoCo"), "pinocchio": ("pin", "Pinocchio")}
 """Engines that run in this interpreter if no version is named: package and name."""
@@ -52,7 +62,7 @@ CASES = 24
 RATE = 3.0
 """Number of cases, half of them without force and torque, and their typical rate, rad/s."""
 Mistake = Callable[[list[Link]], list[Link]]
-CATALOGUE = Path(__file__).parent / "models"
+CATALOGUE = Path(loaders.__file__).parent / "models"
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +351,7 @@ class Program:
             self.worker, self._adapter = environment.start_worker(memory=MEMORY), str(method.adapter.__file__)
         elif self.engine in LOCAL and not wanted:
             self.label = f"{self.engine} {version(*LOCAL[self.engine])}"
-            self.worker, self._adapter = python_worker(memory=MEMORY), f"{__package__}.loaders"
+            self.worker, self._adapter = python_worker(memory=MEMORY), loaders.__name__
         else:
             environment = find_environment(self.engine, wanted)
             self.label = f"{self.engine} {environment.version}"

@@ -14,9 +14,8 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 from conservative import deferred_imports
-from conservative.errors import BadInput
-from conservative.references.importers import compare, loaders
-from conservative.references.importers.compare import (
+from conservative.benchmarks.verification.bodies import loaded as compare
+from conservative.benchmarks.verification.bodies.loaded import (
     CATALOGUE,
     MISTAKES,
     accelerations,
@@ -25,12 +24,14 @@ from conservative.references.importers.compare import (
     identify,
     make_cases,
 )
-from conservative.references.importers.pieces import Piece, join_links, weigh
-from conservative.references.importers.readers import read_here
+from conservative.errors import BadInput
+from conservative.references.model_files import loaders
+from conservative.references.model_files.pieces import Piece, join_links, weigh
+from conservative.references.model_files.readers import read_here
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
-from ..environments import PATIENCE
+from ...environments import PATIENCE
 
 GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
 TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
@@ -244,7 +245,7 @@ def test_unknown_files_and_engines_are_named():
 
 # ------------------------------------------------------------------------------------------------------------ programs of users
 
-LOADER = [sys.executable, "-I", Path(__file__).parent / "programs" / "loader.py"]
+LOADER = [sys.executable, "-I", Path(__file__).parents[2] / "references" / "programs" / "loader.py"]
 GREETING = {"protocol": 1, "program": "p", "version": "1", "framing": "lines"}
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 
-from .compared import HOPELESS, LINEAR, Compared, Solution, differ, linearise
+from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise
 from .explanation import Explanation, attempt
-from .mistakes import STEPS, Step
-from .motion import Equations, truth
+from .mistakes.catalogue import STEPS, Step
+from .solution import Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
 STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows

@@ -14,7 +14,7 @@ from conservative.references.engines import shared
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.registry import read_name
 
-from .compare import Twins
+from .differences import Twins
 from .pairs import PAIRS, Description
 
 MARK = "conservative twins: "

@@ -7,9 +7,10 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge import diagnose, verdict
-from conservative.benchmarks.judge.table import Recording
-from conservative.benchmarks.judge.verdict import judge
+from conservative.benchmarks.verification import explain as diagnose
+from conservative.benchmarks.verification.recordings import verdict
+from conservative.benchmarks.verification.recordings.table import Recording
+from conservative.benchmarks.verification.recordings.verdict import judge
 
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
 

@@ -15,13 +15,13 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion
-from conservative.benchmarks.judge.motion import Equations
 from conservative.benchmarks.measures.measurement import frame
-from conservative.benchmarks.motions import files, programs
-from conservative.benchmarks.motions.motion import SAMPLE, load
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.study import Study
+from conservative.benchmarks.verification.motions import files, programs
+from conservative.benchmarks.verification.motions.motion import SAMPLE, load
+from conservative.benchmarks.verification.solution import Equations
 from conservative.grid import Grid
 from conservative.potentials.turning import Turning
 from conservative.references import precise
@@ -30,7 +30,7 @@ from conservative.reports.cli.main import main
 from conservative.reports.rows.names import with_names
 from conservative.reports.sections.motions import section
 
-from ..benchmarks.generic_study import Broken
+from ..generic_study import Broken
 from .motions_engines.methods import METHODS
 from .motions_engines.run import LANGUAGES, MOTIONS, missing, run
 

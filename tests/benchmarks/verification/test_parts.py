@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge import table as table_of_file
-from conservative.benchmarks.judge.table import Recording
-from conservative.benchmarks.judge.verdict import judge
+from conservative.benchmarks.verification.recordings import table as table_of_file
+from conservative.benchmarks.verification.recordings.table import Recording
+from conservative.benchmarks.verification.recordings.verdict import judge
 from conservative.errors import BadInput
 from conservative.flight import rotation_only
 from conservative.grid import Grid

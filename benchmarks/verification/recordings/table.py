@@ -23,7 +23,7 @@ from conservative.check import LARGEST, SMALLEST
 from conservative.errors import BadInput, MissingEngine
 from conservative.files import open_file
 
-from .motion import States
+from ..solution import States
 
 ROWS, CHUNK = 2000, 50_000  # rows that are kept for fits, evenly chosen: this to twice as many; rows that are read at a time
 LOOKED = 200  # lines among which the header and the first row of numbers are

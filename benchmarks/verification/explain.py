@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array
 from conservative.needs import Need
 
-from . import mistakes
-from .compared import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
+from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
 from .explanation import PROVEN, Explanation, attempt, explain
-from .mistakes import ATTITUDES, BARE, QUATERNION, READINGS
-from .motion import Equations, closed, truth
-from .steps import PARTS, STEPS_AT_MOST, find_steps
+from .find_steps import PARTS, STEPS_AT_MOST, find_steps
+from .mistakes import catalogue as mistakes
+from .mistakes.catalogue import ATTITUDES, BARE, QUATERNION, READINGS
+from .solution import Equations, closed, truth
 
 FEWEST, MOST = 100, 2500  # rows that are explained
 EFFORT = 30_000  # stretches, after which the search ends: about a minute; the tests of this package take up to 4,344

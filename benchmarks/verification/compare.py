@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array, to_quaternion
 from conservative.scene import Scene
 
-from .motion import ANGLE, Equations, States, closed, truth
+from .solution import ANGLE, Equations, States, closed, truth
 
 FLOOR = 1e-9  # errors that round-off makes in double precision
 SIGMAS = 7.0  # of noise, that the largest error may have

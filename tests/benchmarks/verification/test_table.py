@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from conservative.benchmarks.judge.table import ROWS, Options, read
+from conservative.benchmarks.verification.recordings.table import ROWS, Options, read
 from conservative.errors import BadInput
 
 from .made import FREE, T, exact

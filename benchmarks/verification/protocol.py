@@ -22,15 +22,14 @@ from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.programs import Program
+from conservative.references.engine import principal_axes
+from conservative.references.environments.environment import worker_of
+from conservative.references.environments.plain_numbers import describe, read_states
+from conservative.references.environments.programs import UnusableProgram, program_class
+from conservative.references.samples import States, to_body_axes
+from conservative.references.worker.client import EndlessAnswer, EngineTimeout, Worker, time_limit
+from conservative.references.worker.program import WARM_UP
 from conservative.scene import Scene
-
-from ..engine import principal_axes
-from ..samples import States, to_body_axes
-from ..worker.client import EndlessAnswer, EngineTimeout, Worker, time_limit
-from ..worker.program import WARM_UP
-from .environment import worker_of
-from .plain_numbers import describe, read_states
-from .programs import UnusableProgram, program_class
 
 J, R0, W0 = np.array((2.1, 3.3, 4.2)), rotation_about((1, -1, 0.3), 1.1), np.array((0.9, -1.1, 0.7))
 WEIGHT, COM = 3.1, np.array((0.3, -0.2, 0.5))

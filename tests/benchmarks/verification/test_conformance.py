@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from conservative.references.environments import conformance
-from conservative.references.environments.conformance import check
+from conservative.benchmarks.verification import protocol as conformance
+from conservative.benchmarks.verification.protocol import check
 from conservative.references.environments.programs import program_class, read_program
 from conservative.references.worker import client
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
-from ..environments import PATIENCE
+from ...environments import PATIENCE
 
-PLANTED = Path(__file__).parent / "programs" / "planted.py"
+PLANTED = Path(__file__).parents[2] / "references" / "programs" / "planted.py"
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.judge import verdict as verdicts
-from conservative.benchmarks.judge.diagnose import Diagnosis
-from conservative.benchmarks.judge.table import CHUNK, Options, Recording, read
-from conservative.benchmarks.judge.verdict import judge
+from conservative.benchmarks.verification.explain import Diagnosis
+from conservative.benchmarks.verification.recordings import verdict as verdicts
+from conservative.benchmarks.verification.recordings.table import CHUNK, Options, Recording, read
+from conservative.benchmarks.verification.recordings.verdict import judge
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
 

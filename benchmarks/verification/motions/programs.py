@@ -1,6 +1,6 @@
 """Correct methods and mistaken programs on many motions at once: tolerances, and the factors by which mistakes exceed them.
 
-Mistakes and methods are those of `judge` (`benchmarks.judge.mistakes`), with others here that only a program can have.
+Mistakes and methods are those of `judge` (`benchmarks.verification.mistakes`), with others here that only a program can have.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from ..judge.mistakes import EQUATIONS, READINGS, SCENES, STEPS, TURNED, Reading, Step, with_inertia
-from ..judge.motion import Equations
+from ..mistakes.catalogue import EQUATIONS, READINGS, SCENES, STEPS, TURNED, Reading, Step, with_inertia
+from ..solution import Equations
 from .motion import Motion
 
 ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)  # declared orders; |w| h, and steps in 0.1 rad

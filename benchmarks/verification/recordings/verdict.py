@@ -19,10 +19,10 @@ from conservative.needs import IN_TIME
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .compared import FLOOR, HOPELESS, NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
-from .diagnose import Diagnosis, diagnose, fit_moments
-from .explanation import Explanation
-from .motion import closed, truth
+from ..compare import FLOOR, HOPELESS, NUMERICAL, SIGMAS, Compared, estimate_noise, exact, linearise, take_rows
+from ..explain import Diagnosis, diagnose, fit_moments
+from ..explanation import Explanation
+from ..solution import closed, truth
 from .table import Recording
 
 ACCURATE = 1e-6  # errors that a good solver may leave

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import conservative as cv
 
-from ...environments import PATIENCE
+from ....environments import PATIENCE
 
 MOTIONS = Path(cv.__file__).parents[1] / "references" / "motions"
 HERE = Path(__file__).parent

@@ -11,7 +11,7 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .compared import HOPELESS, Compared, Solution
+from .compare import HOPELESS, Compared, Solution
 
 HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
 

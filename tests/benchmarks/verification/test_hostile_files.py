@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import to_quaternion
-from conservative.benchmarks.judge import table, verdict
+from conservative.benchmarks.verification.recordings import table, verdict
 
 from ...environments import PATIENCE
 from .made import FREE, T, exact
@@ -139,7 +139,7 @@ def test_files_that_are_no_tables(tmp_path):
     code = """
 import sys
 from pathlib import Path
-from conservative.benchmarks.judge.table import Options, read
+from conservative.benchmarks.verification.recordings.table import Options, read
 from conservative.errors import BadInput
 for path in sys.argv[1:]:
     try:

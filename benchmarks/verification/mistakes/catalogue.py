@@ -31,7 +31,7 @@ from conservative.potentials.load import FRAMES
 from conservative.potentials.turning import Turning, static_part
 from conservative.scene import Scene
 
-from .motion import Equations, States, cross
+from ..solution import Equations, States, cross
 
 Reading = Callable[[Array | None, Array | None], States]
 Slope = Any

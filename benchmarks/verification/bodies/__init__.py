@@ -1,0 +1,1 @@
+"""Bodies that engines load from model files."""

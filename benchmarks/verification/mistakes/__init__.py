@@ -1,0 +1,1 @@
+"""Mistakes of simulators and their files, each once."""
