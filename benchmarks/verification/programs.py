@@ -36,7 +36,7 @@ from .explanation import Explanation
 from .finding import Finding, Verdict, Verification
 from .motions import files
 from .motions.motion import Motion, load
-from .motions.programs import ANGLES, ORDERS, PARTS
+from .motions.programs import ORDERS, PARTS
 
 PATIENCE = 30.0
 """Time in s that a program may take to start, and for each answer. A program that takes longer does not answer."""
@@ -133,14 +133,9 @@ def _case(scene: Scene, t: Array, R: Array, w: Array, scale: float, allowed: Arr
     return Compared(scene, t, (R, w), 0.0, scale, allowed, allowed / SIGMAS, rounded=tuple(allowed.tolist()))
 
 
-def tolerance(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
-    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s.
-
-    Those of order 2 hold for order 3, and for an engine that chooses its steps.
-    """
-    kept, of = files.read(motion.name), {1: 1, 2: 2, 3: 2, None: 2}.get(order, 4)
-    (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (of, ANGLES[-1]))
-    return np.array([row["attitude"], row["rates"]]) + single * kept["single"], float(kept["scale"]["rates"])
+def _limits(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
+    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s."""
+    return np.array(files.tolerance(motion, order, single)), float(files.read(motion.name)["scale"]["rates"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +170,7 @@ def run_motions(
     for every in load():
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
-        allowed, scale = tolerance(motion, order, single)
+        allowed, scale = _limits(motion, order, single)
         if reason := unsupported(motion.scene):
             reasons[motion.name] = reason
             continue
@@ -313,7 +308,7 @@ def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> d
         return {}
     found = {}
     for each in failing:
-        allowed, _ = tolerance(each.motion, lower, answers.single)
+        allowed, _ = _limits(each.motion, lower, answers.single)
         if (each.error <= allowed).all():
             found[each.motion.name] = f"within the tolerance of order {lower}"
     return found
