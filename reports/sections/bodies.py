@@ -52,8 +52,8 @@ def _bodies(verification: Verification) -> Sequence[Any]:
 
 def _item(finding: Finding, marked: bool = False) -> Item:
     """Return the reason of a verdict, the mistakes first."""
-    causes = " Or: ".join(f"{cause.sentence}." for cause in finding.causes)
-    text = " ".join(filter(None, [causes, finding.detail]))
+    causes = ". Or: ".join(cause.sentence for cause in finding.causes)
+    text = "; ".join(filter(None, [causes, finding.detail]))
     return Item(f"{finding.case}: {text}", f"{finding.subject} {finding.verdict}", marked)
 
 

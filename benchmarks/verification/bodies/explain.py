@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
+
+import numpy as np
 
 from conservative.references.model_files.pieces import Link, Piece, distance, join_links
 
@@ -18,34 +21,39 @@ ROUND_OFF = 1e-8
 def find_causes(links: list[Link], seen: Piece, tolerance: float) -> tuple[Cause, ...]:
     """Return the mistakes that turn the links of a file into the body that an engine has: all that explain it equally well.
 
-    Single mistakes are tried first, then pairs, then those with fitted numbers. Errors are relative, as those of `distance`.
+    Single mistakes are tried first, then pairs, then those with fitted numbers. Errors are relative to the body of the file, or
+    to that with the mistake if its inertia is larger: an engine in single precision has a large inertia with a large error.
     """
     wanted = join_links(links)
-    of = distance(wanted, seen)
     for count in (1, 2):
         found = [
-            Cause(tuple(each.key for each in mistakes), ". ".join(each.sentence for each in mistakes), left, of)
+            cause
             for mistakes in combinations(BODIES, count)
-            if (left := _left(links, mistakes, seen, tolerance)) < tolerance
+            if (cause := _try(links, mistakes, seen, tolerance)) and cause.left < tolerance
         ]
         if found:
-            return _best(found)
+            allowed = max(EQUAL * min(each.left for each in found), ROUND_OFF)
+            return tuple(each for each in found if each.left <= allowed)
     for mistake in FITTED:
         numbers, part = mistake.fit(wanted, seen)
-        if (left := distance(part, seen, wanted)) < tolerance:
-            return (Cause((mistake.key,), mistake.state(numbers), left, of, numbers),)
+        cause = _compare((mistake.key,), mistake.state(numbers), wanted, part, seen)
+        if cause.left < tolerance:
+            return (replace(cause, numbers=numbers),)
     return ()
 
 
-def _left(links: list[Link], mistakes: tuple[BodyMistake, ...], seen: Piece, tolerance: float) -> float:
-    """Return the error that mistakes leave; infinity if they do not change the body, or leave no mass."""
+def _try(links: list[Link], mistakes: tuple[BodyMistake, ...], seen: Piece, tolerance: float) -> Cause | None:
+    """Return the explanation by mistakes; None if they do not change the body, or leave no mass."""
     changed = links
     for mistake in mistakes:
         changed = mistake.change(changed)
     wanted, part = join_links(links), join_links(changed)
-    return distance(part, seen, wanted) if part.mass and distance(wanted, part) > tolerance else float("inf")
+    if not part.mass or distance(wanted, part) <= tolerance:
+        return None
+    sentences = ". ".join(each.sentence for each in mistakes)
+    return _compare(tuple(each.key for each in mistakes), sentences, wanted, part, seen)
 
 
-def _best(causes: list[Cause]) -> tuple[Cause, ...]:
-    allowed = max(EQUAL * min(each.left for each in causes), ROUND_OFF)
-    return tuple(each for each in causes if each.left <= allowed)
+def _compare(keys: tuple[str, ...], sentence: str, wanted: Piece, part: Piece, seen: Piece) -> Cause:
+    scale = part if np.linalg.norm(part.inertia) > np.linalg.norm(wanted.inertia) else wanted
+    return Cause(keys, sentence, distance(part, seen, scale), distance(wanted, seen, scale))

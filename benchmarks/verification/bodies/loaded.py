@@ -183,7 +183,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     error = max(0.0, *far.values())
     doubt = model.doubt(engine, differs) or (DIGITS if wanted.excess and prints and not flaw else "")
     has = f"it has {describe(body)}" if body else f"{seen.value}"
-    changes = f"(file and engine): {', '.join(differing(wanted, body, tolerance))}" if body else ""
+    changes = f"in file and engine: {', '.join(differing(wanted, body, tolerance))}" if body else ""
     printed = f" (it prints: {prints})" if prints else ""
     if not differs and not (flaw or model.disagree or model.invalid):
         return Opinion(Verdict.RIGHT, error=error)
@@ -193,13 +193,13 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
         return Opinion(Verdict.UNDECIDED, f"{doubt}; {has}{printed}")
     if flaw:
         impossible = body and body.flaw
-        text = f"{flaw}, and it changes the body {changes}" if body and not impossible else f"{flaw}; {has}"
+        text = f"{flaw}, and it changes the body; {changes}" if body and not impossible else f"{flaw}; {has}"
         if prints and not (differs and impossible):
             return Opinion(Verdict.RIGHT, f"{text}{printed}")
         warning = "" if prints else " without a warning"
         return Opinion(Verdict.WRONG, f"it accepts an impossible body{warning}: {text}{printed}")
     causes = find_causes(model.links, body, tolerance) if body else ()
-    text = has if body is None else f"it differs {changes}" if causes else f"no known mistake explains the difference {changes}"
+    text = has if body is None else changes if causes else f"no known mistake explains the difference; {changes}"
     if model.lonely:
         return Opinion(Verdict.UNDECIDED, f"{model.lonely}; {text}{printed}", causes)
     return Opinion(Verdict.WRONG, f"{text}{printed}", causes, error)
