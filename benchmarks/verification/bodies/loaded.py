@@ -86,12 +86,14 @@ class Loaded(NamedTuple):
 class LoadedBody:
     """The details of a finding: a body by the readers of its file, the reference reader first, and in an engine.
 
-    A reading is a dictionary of mass, kg, centre of mass, m, and inertia, kg m^2, or why a reader has none.
+    A reading is a dictionary of mass, kg, centre of mass, m, and inertia, kg m^2, or why a reader has none. `flaw` says why no
+    body is like that of the file.
     """
 
     subject: str
     case: str
     readings: dict[str, Any]
+    flaw: str = ""
     seen: dict[str, Any] | None = None
 
 
@@ -279,7 +281,7 @@ class Program:
             detail=opinion.detail,
             **(measured if np.isfinite(opinion.error) else {}),
         )
-        return finding, LoadedBody(self.label, model.label, model.readings(), seen)
+        return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen)
 
     def _verify(self, model: Model) -> tuple[Loaded, Opinion]:
         loaded = self._measure(model)

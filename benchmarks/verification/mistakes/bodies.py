@@ -239,7 +239,7 @@ FITTED: tuple[FittedBodyMistake, ...] = (
     FittedBodyMistake("moments raised", "Small principal moments are raised to {smallest_moment} kg m^2", _fit_raised),
     FittedBodyMistake("equal moments", "The moment about all axes is {moment} kg m^2", _fit_equal),
     FittedBodyMistake(
-        "factors of mass and inertia",
+        "factors",
         "The mass is multiplied by {mass_factor}, the centre of mass by {centre_factor}, the inertia by {inertia_factor}",
         _fit_factors,
     ),
