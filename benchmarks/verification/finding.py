@@ -156,4 +156,5 @@ class Verification:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        return f"{self.subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")
+        subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
+        return f"{subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")

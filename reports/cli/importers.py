@@ -41,13 +41,25 @@ def importers(
     a valid file, or accepts a body that cannot exist.
     """
     require_extra("conservative importers", "report")
-    from conservative.benchmarks.verification.bodies.loaded import compare_files
+    from conservative.benchmarks.verification.bodies.loaded import verify_files
+    from conservative.benchmarks.verification.finding import Verdict
 
-    from ..sections.importers import build
+    from ..document.model import Check, Document
+    from ..sections.bodies import body_blocks
     from ..terminal.progress import progress
 
     with output_files(None, (), **outputs) as write:
         with progress() as step:
-            document = build(compare_files(files, split_names("engines", engines), step, search))
-        document = write(document)
+            verifications = verify_files(files, split_names("engines", engines), step, search)
+        findings = [finding for each in verifications for finding in each.findings]
+        wrong = {id(each): each.detail for each in findings if each.verdict is Verdict.WRONG}
+        checks = [
+            Check(each.subject, each.case, failure=wrong.get(id(each), ""))
+            for each in findings
+            if each.verdict is not Verdict.NOT_TESTED
+        ]
+        failures = [f"{each.subject}, {each.case}: {each.detail}" for each in findings if id(each) in wrong]
+        blocks = body_blocks(verifications)
+        data = {"right": not wrong, "verifications": verifications}
+        document = write(Document("conservative importers", "Importers", blocks, data=data, checks=checks, failures=failures))
     show(document, as_json, silent=True)
