@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,6 +26,9 @@ from .options import (
     picture_option,
     show,
 )
+
+if TYPE_CHECKING:
+    from conservative.benchmarks.verification.finding import Verification
 
 FILES = {"judge.md": "# Judged: ", "judge.json": '{\n  "judged": ', "judge.csv": "t,quantity,value", "judge.svg": SVG_MARK}
 """The files of `--out`, and how each begins."""
@@ -79,6 +83,7 @@ def judge(
     if picture is not None:
         require_extra("conservative judge --picture", "report")
     from conservative import registry
+    from conservative.benchmarks.verification.finding import Verdict
     from conservative.benchmarks.verification.recordings import table, verdict
 
     from ..sections.judge import build
@@ -88,27 +93,31 @@ def judge(
     files = [name for name in FILES if drawn or not name.endswith("svg")]
     with output_files(out, files, picture=picture) as write, show_waiting(f"judging {run.name}", line=True) as step:
         recording = table.read(run, table.Options(world=rates == "world", **reading))
-        summary, rows = verdict.judge(registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what))
-        document = build(summary, run.name)
+        found = verdict.verify_recording(
+            registry.scene(body), recording, start == "row", error, lambda what: step(0.0, what), run.name
+        )
+        document = build(found)
 
         def draw(path: Path | None = None) -> bytes:
-            return drawing(summary, rows, run.name, path)
+            return drawing(found, path)
 
-        document = write(document, csv=lambda: table_text(rows), svg=draw, picture=lambda: draw(picture))
+        document = write(document, csv=lambda: table_text(found), svg=draw, picture=lambda: draw(picture))
     show(document, as_json, silent=True)
-    if summary["verdict"] == "undecided":
-        raise click.exceptions.Exit(3)
+    if found.verdict is Verdict.UNDECIDED:
+        raise click.exceptions.Exit(found.exit_code)
 
 
-def table_text(rows: list[dict[str, Any]]) -> str:
+def table_text(found: Verification) -> str:
     """Return rows of t, quantity and value as CSV."""
+    rows = found.details.rows()
     return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in rows)
 
 
-def drawing(summary: dict[str, Any], rows: list[dict[str, Any]], name: str, path: Path | None) -> bytes:
+def drawing(found: Verification, path: Path | None) -> bytes:
     """Return errors and drifts over time beside what is allowed, as a picture in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures
 
-    return picture_file(figures.judged(pd.DataFrame(rows), name, summary["limits"]), path)
+    limits = {each.name: each.allowed for each in found.details.quantities if math.isfinite(each.allowed)}
+    return picture_file(figures.judged(pd.DataFrame(found.details.rows()), found.subject, limits), path)

@@ -2,63 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
+
+from conservative.benchmarks.verification.finding import Verdict, Verification
+from conservative.benchmarks.verification.recordings.verdict import Details, Unit
 
 from ..document.cells import bound
 from ..document.model import Document, Emphasis, Items, Paragraph, Table, filled
 
-WORDS = {"right": "is right", "wrong": "is WRONG", "undecided": "is UNDECIDED"}
 LISTED = 12
-"""Hypotheses that the table lists."""
+"""Mistakes that the table lists."""
 
 
-def build(summary: Mapping[str, Any], name: str) -> Document:
-    """Return the document of `verdict.judge` on the file `name`."""
+def build(verification: Verification) -> Document:
+    """Return the document of the verification of a recording."""
+    name, wrong = verification.subject, verification.verdict is Verdict.WRONG
+    blocks = [Paragraph(f"{verification.sentence}.", Emphasis.LEAD), *recording_blocks(verification)]
+    failures = [f"{verification.sentence}."] if wrong else []
+    return Document("conservative judge", f"Judged: {name}", blocks, data=as_data(verification), failures=failures)
 
-    def amount(errors: Sequence[float]) -> str:
-        units = zip(errors, summary["units"], strict=True)
-        return " and ".join(f"{bound(error * size)} {unit}" for error, (unit, size) in units if size)
 
-    verdict = f"{name} {WORDS[summary['verdict']]}: its largest error is {amount(summary['error'])}"
-    verdict += f"; {amount(summary['allowed'])} {'is' if sum(size > 0 for _, size in summary['units']) == 1 else 'are'} allowed"
-    verdict += {"error": " by --error.", "digits": " by its digits.", "noise": " by its noise."}[summary["by"]]
-    sentences = [verdict, *([f"{summary['shape']}."] if summary["shape"] else [])]
-    if summary["by"] == "noise" and max(summary["noise"]) > 0:
-        sentence = f"The noise of an axis is {amount(summary['noise'])}"
-        if max(summary["first row"]) > 0:
-            sentence += (
-                f"; from the first row alone the motion is off by {amount(summary['first row'])}, so its start is fitted"
-            )
+def as_data(verification: Verification) -> dict[str, Any]:
+    """Return the verification of a recording for JSON, without its series."""
+    details = verification.details
+    assert isinstance(details, Details)
+    (finding,) = verification.findings
+    shown = {name: value for name, value in vars(details).items() if name not in ("times", "series")}
+    return {
+        "judged": verification.subject,
+        "verdict": verification.verdict,
+        "right": verification.verdict is Verdict.RIGHT,
+        "reason": verification.reason,
+        "undecided": finding.detail if verification.verdict is Verdict.UNDECIDED else "",
+        "causes": finding.causes,
+        "notes": verification.notes,
+        **shown,
+    }
+
+
+def recording_blocks(verification: Verification) -> list[Any]:
+    """Return the blocks on a recording that follow the sentence of its verdict: noise, mistakes, quantities, columns."""
+    details = verification.details
+    assert isinstance(details, Details)
+    (finding,) = verification.findings
+    sentences = []
+    if finding.by == "noise" and max(details.noise) > 0:
+        sentence = f"The noise of an axis is {_amount(details.noise, details.units)}"
+        if max(details.first_row) > 0:
+            sentence += f"; from the first row alone the motion is off by {_amount(details.first_row, details.units)}"
+            sentence += ", so its start is fitted"
         sentences.append(f"{sentence}.")
-    if summary["undecided"]:
-        sentences.append(f"{summary['undecided']}.")
-    proven = [summary["diagnosis"]] if summary["diagnosis"] else summary["equally good"]
+    proven, candidates = details.explaining, details.candidates
     left = [
-        "" if not max(each.plain) else f" This leaves {amount(each.left)} of an error of {amount(each.plain)}."
-        for each in proven
+        f"{each.sentence}: leaves {_amount(each.left, details.units)} of {_amount(each.plain, details.units)}"
+        for each in (proven if len(proven) > 1 else candidates)
     ]
-    reasons = [f"{each.sentence}.{more}" for each, more in zip(proven, left, strict=True)]
-    candidates = [f"{each.sentence}: leaves {amount(each.left)} of {amount(each.plain)}" for each in summary["candidates"]]
     heading = "These explain the file equally well:" if len(proven) > 1 else ""
-    unproven = (
-        ("No known mistake explains the error" + (": none of these candidates is proven." if candidates else "."))
-        if summary["verdict"] == "wrong" and not proven
-        else ""
-    )
-    compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in summary["compared"].items())
-    rows = summary["rows"]
-    used = [f"Compared: {compared} ({rows['compared']:,} of {rows['in file']:,} rows)."] if compared else []
-    unused = [f"Not used: {column}, {reason}." for column, reason in summary["not used"].items()]
-    quantities = [[each["quantity"], bound(each["largest"]), bound(each["final"])] for each in summary["quantities"]]
-    blocks = filled(
-        Paragraph(" ".join(sentences), Emphasis.LEAD),
-        Paragraph(heading or unproven) if heading or unproven else None,
-        *(Paragraph(reason) for reason in reasons),
-        Items.of(candidates if unproven else []),
+    if verification.verdict is Verdict.WRONG and not proven:
+        heading = "No known mistake explains the error" + (": none of these candidates is proven." if candidates else ".")
+    compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in details.used.items())
+    used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
+    unused = [f"Not used: {column}, {reason}." for column, reason in details.unused.items()]
+    quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
+    tried = [[each.name, _amount(each.left, details.units)] for each in details.tried[:LISTED]]
+    return filled(
+        Paragraph(" ".join(sentences)) if sentences else None,
+        Paragraph(heading) if heading else None,
+        Items.of(left if heading else []),
         Table(["quantity", "largest", "at the end"], quantities),
-        Table(["hypothesis", "error that is left"], [[each.name, amount(each.left)] for each in summary["tried"][:LISTED]]),
-        Items.of([*used, *unused, *summary["notes"]]),
+        Table(["mistake", "error that is left"], tried),
+        Items.of([*used, *unused, *verification.notes]),
     )
-    failures = [verdict] if summary["verdict"] == "wrong" else []
-    return Document("conservative judge", f"Judged: {name}", blocks, data={"judged": name, **summary}, failures=failures)
+
+
+def _amount(errors: Sequence[float], units: Sequence[Unit]) -> str:
+    return " and ".join(f"{bound(error * size)} {unit}" for error, (unit, size) in zip(errors, units, strict=True) if size)
