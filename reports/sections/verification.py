@@ -1,0 +1,215 @@
+"""Findings: the verdict on each subject in one sentence, the mistakes that explain what is wrong, and all cases."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification, join_verdicts
+
+from ..document.cells import DASH, bound, listed
+from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
+
+SIGNS = {
+    Verdict.WRONG: ("✗", Grade.BAD),
+    Verdict.UNDECIDED: ("?", Grade.FAIR),
+    Verdict.RIGHT: ("✓", Grade.GOOD),
+    Verdict.NOT_TESTED: (DASH, Grade.NONE),
+}
+"""Symbol and grade of each verdict; what decides comes first."""
+LISTED = 4
+"""Cases that an item of a list names."""
+TERMS = (
+    "Right: the error is at most what is allowed. Undecided: the data does not decide. Not tested: the subject does not have "
+    "what the case needs. A mistake explains an error if it leaves at most what is allowed."
+)
+"""Explanation of the tables."""
+OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {}
+"""Blocks that a kind of subject has in addition, by `Verification.kind`."""
+
+
+def build(verifications: Sequence[Verification], made: Mapping[str, str] | None = None) -> Document:
+    """Return the document of verifications, which were made with the versions in `made`.
+
+    Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
+    """
+    order = sorted(verifications, key=lambda each: list(SIGNS).index(each.verdict))
+    lead: list[Block] = [Paragraph(_sentence(order), Emphasis.LEAD)]
+    if several := len(order) > 1:
+        lead.append(Items([Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in order]))
+
+    def blocks(make: Callable[[Verification], list[Block]]) -> list[Block]:
+        parts = [(each.subject, make(each)) for each in order]
+        return [*lead, *(filled(*(Section(*part) for part in parts)) if several else parts[0][1])]
+
+    return Document(
+        "conservative verify",
+        f"Verified: {', '.join(each.subject for each in verifications)}",
+        [*blocks(details), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary),
+        data={
+            "verified": [each.subject for each in verifications],
+            "verdict": join_verdicts(each.verdict for each in verifications),
+            "made": dict(made or {}),
+            "subjects": [content(each) for each in verifications],
+        },
+        checks=[_check(each.subject, finding) for each in verifications for finding in each.findings],
+        failures=[f"{each.sentence}." for each in order if each.verdict is Verdict.WRONG],
+    )
+
+
+def exit_code(verifications: Iterable[Verification]) -> int:
+    """Return the exit code of a command: that of a wrong subject before that of an undecided one, and of a right one."""
+    codes = {each.exit_code for each in verifications}
+    return next(EXIT_CODES[verdict] for verdict in SIGNS if EXIT_CODES[verdict] in codes)
+
+
+def content(verification: Verification) -> dict[str, Any]:
+    """Return a verification for JSON: its fields, its verdict and its sentence."""
+    return {"sentence": verification.sentence, "verdict": verification.verdict, **vars(verification)}
+
+
+def rows(verifications: Iterable[Verification]) -> list[dict[str, Any]]:
+    """Return the findings as the rows of a table, with the causes as texts."""
+    return [
+        {
+            **{name: value for name, value in vars(each).items() if name not in ("causes", "detail")},
+            "mistakes": "; ".join(cause.key for cause in each.causes),
+            "detail": explanation(each),
+        }
+        for verification in verifications
+        for each in verification.findings
+    ]
+
+
+def summary(verification: Verification) -> list[Block]:
+    """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
+    own = OWN[verification.kind](verification) if verification.kind in OWN else ()
+    return filled(
+        mistakes(verification.findings), _open(verification.findings), _counts(verification), *own, Items.of(verification.notes)
+    )
+
+
+def details(verification: Verification) -> list[Block]:
+    """Return the blocks of `summary`, and a table of the cases of each check."""
+    tables = [_cases(check, list(some)) for check, some in groupby(verification.findings, lambda each: each.check)]
+    return filled(*summary(verification), *tables)
+
+
+def section(findings: Sequence[Finding]) -> Section:
+    """Return the section of a report or of the page of an engine: a row for each subject and check, and the mistakes."""
+    body = [
+        [subject, check, *_numbers(some), _named(some)]
+        for (subject, check), some in _grouped(findings, lambda each: (each.subject, each.check))
+    ]
+    table = Table(["engine", "check", *SIGNS, "mistakes, and the cases that each explains"], body, "Verification")
+    return Section("Verification", [Paragraph(TERMS), table], "verification")
+
+
+def mistakes(findings: Iterable[Finding]) -> Items:
+    """Return the wrong cases by what explains them, the explanation of the most cases first."""
+    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    groups = sorted(_grouped(wrong, lambda each: (each.check, _named_by(each))), key=lambda group: -len(group[1]))
+    return Items([Item(explanation(some[0]), f"{check}: {_cases_of(some)}".removesuffix(": "), True) for (check, _), some in groups])
+
+
+def explanation(finding: Finding) -> str:
+    """Return the mistakes that explain a finding, or else its detail."""
+    causes = [_cause(each, finding.unit) for each in finding.causes]
+    if len(causes) > 1:
+        return f"{len(causes)} mistakes explain it equally well: {'; '.join(causes)}"
+    if causes:
+        return "; ".join(filter(None, (causes[0], finding.detail)))
+    unknown = "no known mistake explains it" if finding.verdict is Verdict.WRONG and not math.isnan(finding.error) else ""
+    return finding.detail or unknown
+
+
+def _cause(cause: Cause, unit: str) -> str:
+    left = "" if math.isnan(cause.left) else f" (leaves {bound(cause.left)} of {_amount(cause.of, unit)})"
+    return f"{cause.sentence}{left}" + (f": {cause.remedy}" if cause.remedy else "")
+
+
+def _amount(error: float, unit: str) -> str:
+    return DASH if math.isnan(error) else f"{bound(error)} {unit}".rstrip()
+
+
+def _sentence(verifications: Sequence[Verification]) -> str:
+    if len(verifications) == 1:
+        return f"{verifications[0].sentence}."
+    counts = Counter(each.verdict for each in verifications)
+    return f"Of {len(verifications)} subjects {listed([f'{counts[verdict]} {verdict}' for verdict in SIGNS if counts[verdict]])}."
+
+
+def _grouped(findings: Iterable[Finding], key: Callable[[Finding], tuple[str, str]]) -> list[tuple[tuple[str, str], list[Finding]]]:
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for each in findings:
+        groups.setdefault(key(each), []).append(each)
+    return list(groups.items())
+
+
+def _named_by(finding: Finding) -> str:
+    """Return the key of what explains a finding; a finding without a mistake is explained by its detail."""
+    return "; ".join(cause.key for cause in finding.causes) or finding.detail
+
+
+def _cases_of(findings: Sequence[Finding]) -> str:
+    names = [each.case for each in findings if each.case]
+    more = f" and {len(names) - LISTED} more" * (len(names) > LISTED)
+    return ", ".join(names[:LISTED]) + more
+
+
+def _open(findings: Iterable[Finding]) -> Items:
+    undecided = [each for each in findings if each.verdict is Verdict.UNDECIDED]
+    groups = _grouped(undecided, lambda each: (each.check, explanation(each)))
+    return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
+
+
+def _numbers(findings: Sequence[Finding]) -> list[str]:
+    return [str(sum(each.verdict is verdict for each in findings)) for verdict in SIGNS]
+
+
+def _named(findings: Sequence[Finding]) -> str:
+    """Return the three mistakes that explain the most of some findings, with their numbers of cases."""
+    found = Counter(_named_by(each) for each in findings if each.verdict is Verdict.WRONG and each.causes)
+    return ", ".join(f"{name} ({count})" for name, count in found.most_common(3)) or DASH
+
+
+def _counts(verification: Verification) -> Table | None:
+    """Return the number of cases by check and verdict; None of a subject with one case."""
+    groups = _grouped(verification.findings, lambda each: (each.check, ""))
+    body = [[check, *_numbers(some)] for (check, _), some in groups]
+    return Table(["check", *SIGNS], body, "Cases") if len(verification.findings) > 1 else None
+
+
+def _cases(check: str, findings: Sequence[Finding]) -> Table:
+    body = [
+        [
+            each.case or each.subject,
+            _verdict(each.verdict),
+            Cell(_amount(each.error, each.unit), value=each.error),
+            Cell(_amount(each.allowed, each.unit), value=each.allowed),
+            each.by or DASH,
+            explanation(each) or DASH,
+        ]
+        for each in findings
+    ]
+    return Table(["case", "verdict", "error", "allowed", "allowed by", "explanation"], body, check.capitalize())
+
+
+def _verdict(verdict: Verdict) -> Cell:
+    sign, grade = SIGNS[verdict]
+    return Cell(f"{sign} {verdict}", grade)
+
+
+def _check(subject: str, finding: Finding) -> Check:
+    """Return a finding as a test case. A case that is undecided or not tested is skipped, which says why."""
+    why = explanation(finding)
+    name = f"{finding.check}: {finding.case}".removesuffix(": ")
+    if finding.verdict is Verdict.WRONG:
+        return Check(subject, name, failure=why or str(finding.verdict))
+    if finding.verdict is Verdict.RIGHT:
+        return Check(subject, name, output=why)
+    return Check(subject, name, skipped=f"{finding.verdict}: {why}".removesuffix(": "))
