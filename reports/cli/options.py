@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
@@ -44,6 +45,15 @@ EXIT_CODES = {
 """Exit codes of every command; see `Command`."""
 
 
+class OldName(click.ClickException):
+    """A name of the last release, and the arguments that take its place."""
+
+    exit_code = 2
+
+    def __init__(self, old: str, new: str) -> None:
+        super().__init__(f"{old} is now {new.split()[0]}. Run: conservative {new}")
+
+
 class Command(click.Command):
     """A command that takes the old names of options, and whose help lists its own exit codes.
 
@@ -76,10 +86,22 @@ def write_codes(formatter: click.HelpFormatter, codes: Mapping[int, str]) -> Non
         formatter.write_dl([(str(code), codes[code]) for code in sorted(codes)])
 
 
+OLD_COMMANDS: Mapping[str, str] = MappingProxyType(dict.fromkeys(("judge", "twins", "importers", "engines check"), "verify"))
+"""Commands of the last release by their names, and the command that takes the same arguments now."""
+
+
 class Group(click.Group):
-    """A group of commands. Its help lists the exit codes that all of them have."""
+    """A group of commands. Its help lists the exit codes that all of them have. An old name is answered with the new one."""
 
     command_class = Command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        root = ctx.find_root()
+        old = ctx.command_path.removeprefix(str(root.info_name)).strip()
+        old = f"{old} {args[0]}".strip()
+        if (new := OLD_COMMANDS.get(old)) is not None and not ctx.resilient_parsing:
+            raise OldName(old, shlex.join([new, *args[1:]]))
+        return super().resolve_command(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         super().format_epilog(ctx, formatter)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,7 @@ from .options import (
 
 if TYPE_CHECKING:
     from conservative.benchmarks.verification.finding import Verification
+    from conservative.benchmarks.verification.verify import Kind
 
 FILES = {
     "verify.md": "# Verified: ",
@@ -42,15 +43,8 @@ FILES = {
     "errors.svg": SVG_MARK,
 }
 """The files of `--out`, and how each begins. Only a recording has errors over time."""
-RECORDING, RUNS, MODEL = ("recording", "recordings"), ("engine", "program", "method"), ("model file",)
-"""Kinds of subjects that have options in common."""
-USED_BY = {
-    **dict.fromkeys(("body", "columns", "quaternion", "euler", "rates", "units", "start", "error", "first", "last"), RECORDING),
-    **dict.fromkeys(("picture",), RECORDING),
-    **dict.fromkeys(("pairs", "scripts"), RUNS),
-    **dict.fromkeys(("engines", "search"), MODEL),
-}
-"""Kinds of subjects that use an option; others use none of these."""
+LISTS = ("only", "pairs", "engines")
+"""Options that take names between commas."""
 
 
 @click.command(
@@ -131,3 +125,70 @@ def verify(
 
     The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided.
     """
+    if picture is not None:
+        require_extra("conservative verify --picture", "report")
+    from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
+    from conservative.benchmarks.verification.verify import Kind, expand, verify
+
+    from ..run.provenance import provenance
+    from ..sections import verification as section
+    from ..terminal.progress import progress
+
+    names = [name for text in subjects for name in split_subject(text)]
+    if not names and not given["engines"]:
+        raise click.UsageError("Missing argument 'SUBJECT...'.")
+    kinds = {each.kind for each in expand(names)} or {Kind.MODEL}
+    options = used({"picture": picture, "scripts": scripts, **given}, kinds)
+    only_files = kinds <= {Kind.RECORDING} and len(names) <= 2
+    drawn = only_files and find_spec("pandas") is not None and find_spec("altair") is not None
+    left_out = [] if drawn else ["errors.svg"] if only_files else ["errors.svg", "errors.csv"]
+    outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
+    title = f"verifying {', '.join(names)}"
+    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
+        found = verify(names or [str(CATALOGUE)], tell=step, **options)
+        made = {
+            "csv": lambda: section.findings_text(found),
+            "errors.csv": lambda: section.errors_text(found),
+            "errors.svg": lambda: draw(found),
+            "picture": lambda: draw(found, picture),
+        }
+        document = write(section.build(found, provenance().facts), **made)
+        if scripts is not None:
+            write_scripts(found, scripts)
+    show(document, as_json, silent=True)
+    ctx.exit(section.exit_code(found))
+
+
+def split_subject(text: str) -> list[str]:
+    """Return the subjects in an argument: a file or a command line is one, names of engines can be separated by commas."""
+    return [text] if Path(text).exists() or " " in text or "," not in text else split_names("subjects", (text,))
+
+
+def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
+    """Return the options on the command line as `verify` takes them. Raise `BadInput` for one that no subject uses."""
+    from conservative.benchmarks.verification.verify import USED_BY, Kind
+
+    ctx, options = click.get_current_context(), dict[str, Any]()
+    users_of = USED_BY | {"scripts": USED_BY["pairs"], "only": tuple(Kind)}
+    for name, value in given.items():
+        if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
+            continue
+        users = users_of.get(name, (Kind.RECORDING,))
+        if not set(kinds) & set(users):
+            raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
+        if name == "rates":
+            options["world"] = value == "world"
+        elif name not in ("picture", "scripts"):
+            options[name] = split_names(name, value) if name in LISTS else value
+    return options
+
+
+def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
+    """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
+    from ..charts import figures
+
+    return picture_file(figures.recorded(found[0]), path)
+
+
+def write_scripts(found: Sequence[Verification], folder: Path) -> None:
+    """Write a script of each pair that differs into a folder."""
