@@ -197,7 +197,7 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
     from .programs import verify_program
 
     checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
-    return verify_program(find_program(text) or read_program(text, "program"), checks, pairs, tell)
+    return verify_program(text, find_program(text) or read_program(text, "program"), checks, pairs, tell)
 
 
 def _verify_recordings(
