@@ -99,9 +99,7 @@ def _refuse_engine(command: str) -> None:
         select_engines([command])
     except BadInput:
         return
-    raise BadInput(
-        "command", repr(command), f"a program. To verify this engine, run: conservative verify {command}"
-    )
+    raise BadInput("command", repr(command), f"a program. To verify this engine, run: conservative verify {command}")
 
 
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))

@@ -26,7 +26,6 @@ from .options import (
     output_files,
     picture_file,
     picture_option,
-    require_replaceable,
     show,
     split_names,
 )
@@ -185,9 +184,13 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
 
 def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
     """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
-    from ..charts import figures
+    import pandas as pd
 
-    return picture_file(figures.recorded(found[0]), path)
+    from ..charts import figures
+    from ..sections.verification import errors
+
+    (verification,) = found
+    return picture_file(figures.recorded(pd.DataFrame(errors(verification)), verification.subject, limits(verification)), path)
 
 
 def write_scripts(found: Sequence[Verification], folder: Path) -> None:

@@ -217,7 +217,7 @@ Block = Paragraph | Items | Links | Facts | Table | Figure | Motion | Section
 
 @dataclass(frozen=True)
 class Check:
-    """A test case for continuous integration: group, name, output, and why it failed or was skipped (both empty if it passed)."""
+    """A test case for continuous integration: group, name, output, and why it failed or was skipped, empty if it was not."""
 
     group: str
     name: str

@@ -6,13 +6,14 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeVar
 
 from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification, join_verdicts
 
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
 
+Key = TypeVar("Key")
 SIGNS = {
     Verdict.WRONG: ("✗", Grade.BAD),
     Verdict.UNDECIDED: ("?", Grade.FAIR),
@@ -99,21 +100,12 @@ def details(verification: Verification) -> list[Block]:
     return filled(*summary(verification), *tables)
 
 
-def section(findings: Sequence[Finding]) -> Section:
-    """Return the section of a report or of the page of an engine: a row for each subject and check, and the mistakes."""
-    body = [
-        [subject, check, *_numbers(some), _named(some)]
-        for (subject, check), some in _grouped(findings, lambda each: (each.subject, each.check))
-    ]
-    table = Table(["engine", "check", *SIGNS, "mistakes, and the cases that each explains"], body, "Verification")
-    return Section("Verification", [Paragraph(TERMS), table], "verification")
-
-
 def mistakes(findings: Iterable[Finding]) -> Items:
     """Return the wrong cases by what explains them, the explanation of the most cases first."""
     wrong = [each for each in findings if each.verdict is Verdict.WRONG]
-    groups = sorted(_grouped(wrong, lambda each: (each.check, _named_by(each))), key=lambda group: -len(group[1]))
-    return Items([Item(explanation(some[0]), f"{check}: {_cases_of(some)}".removesuffix(": "), True) for (check, _), some in groups])
+    groups = sorted(grouped(wrong, lambda each: (each.check, named_by(each))), key=lambda group: -len(group[1]))
+    items = [Item(explanation(some[0]), f"{check}: {_cases_of(some)}".removesuffix(": "), True) for (check, _), some in groups]
+    return Items(items)
 
 
 def explanation(finding: Finding) -> str:
@@ -140,17 +132,19 @@ def _sentence(verifications: Sequence[Verification]) -> str:
     if len(verifications) == 1:
         return f"{verifications[0].sentence}."
     counts = Counter(each.verdict for each in verifications)
-    return f"Of {len(verifications)} subjects {listed([f'{counts[verdict]} {verdict}' for verdict in SIGNS if counts[verdict]])}."
+    words = [f"{counts[verdict]} {verdict}" for verdict in SIGNS if counts[verdict]]
+    return f"Of {len(verifications)} subjects, {listed(words)}."
 
 
-def _grouped(findings: Iterable[Finding], key: Callable[[Finding], tuple[str, str]]) -> list[tuple[tuple[str, str], list[Finding]]]:
-    groups: dict[tuple[str, str], list[Finding]] = {}
+def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
+    """Return findings by their keys, in their order."""
+    groups: dict[Key, list[Finding]] = {}
     for each in findings:
         groups.setdefault(key(each), []).append(each)
     return list(groups.items())
 
 
-def _named_by(finding: Finding) -> str:
+def named_by(finding: Finding) -> str:
     """Return the key of what explains a finding; a finding without a mistake is explained by its detail."""
     return "; ".join(cause.key for cause in finding.causes) or finding.detail
 
@@ -163,24 +157,18 @@ def _cases_of(findings: Sequence[Finding]) -> str:
 
 def _open(findings: Iterable[Finding]) -> Items:
     undecided = [each for each in findings if each.verdict is Verdict.UNDECIDED]
-    groups = _grouped(undecided, lambda each: (each.check, explanation(each)))
+    groups = grouped(undecided, lambda each: (each.check, explanation(each)))
     return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
 
 
-def _numbers(findings: Sequence[Finding]) -> list[str]:
+def numbers(findings: Sequence[Finding]) -> list[str]:
+    """Return the numbers of findings with each verdict, in the order of `SIGNS`."""
     return [str(sum(each.verdict is verdict for each in findings)) for verdict in SIGNS]
-
-
-def _named(findings: Sequence[Finding]) -> str:
-    """Return the three mistakes that explain the most of some findings, with their numbers of cases."""
-    found = Counter(_named_by(each) for each in findings if each.verdict is Verdict.WRONG and each.causes)
-    return ", ".join(f"{name} ({count})" for name, count in found.most_common(3)) or DASH
 
 
 def _counts(verification: Verification) -> Table | None:
     """Return the number of cases by check and verdict; None of a subject with one case."""
-    groups = _grouped(verification.findings, lambda each: (each.check, ""))
-    body = [[check, *_numbers(some)] for (check, _), some in groups]
+    body = [[check, *numbers(some)] for check, some in grouped(verification.findings, lambda each: each.check)]
     return Table(["check", *SIGNS], body, "Cases") if len(verification.findings) > 1 else None
 
 
