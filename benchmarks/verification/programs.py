@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,7 +36,7 @@ from .explanation import Explanation
 from .finding import Finding, Verdict, Verification
 from .motions import files
 from .motions.motion import Motion, load
-from .motions.programs import ANGLES, ORDERS, PARTS
+from .motions.programs import ORDERS, PARTS
 
 PATIENCE = 30.0
 """Time in s that a program may take to start, and for each answer. A program that takes longer does not answer."""
@@ -132,14 +133,9 @@ def _case(scene: Scene, t: Array, R: Array, w: Array, scale: float, allowed: Arr
     return Compared(scene, t, (R, w), 0.0, scale, allowed, allowed / SIGMAS, rounded=tuple(allowed.tolist()))
 
 
-def tolerance(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
-    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s.
-
-    Those of order 2 hold for order 3, and for an engine that chooses its steps.
-    """
-    kept, of = files.read(motion.name), {1: 1, 2: 2, 3: 2, None: 2}.get(order, 4)
-    (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (of, ANGLES[-1]))
-    return np.array([row["attitude"], row["rates"]]) + single * kept["single"], float(kept["scale"]["rates"])
+def _limits(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
+    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s."""
+    return np.array(files.tolerance(motion, order, single)), float(files.read(motion.name)["scale"]["rates"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +170,7 @@ def run_motions(
     for every in load():
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
-        allowed, scale = tolerance(motion, order, single)
+        allowed, scale = _limits(motion, order, single)
         if reason := unsupported(motion.scene):
             reasons[motion.name] = reason
             continue
@@ -185,10 +181,13 @@ def run_motions(
     return Answers(solve, ran, reasons, order, single)
 
 
-def falls(answers: Answers, ran: Ran) -> float:
-    """Return the exponent with which the error falls from the step to half of it; nan if it does not end."""
-    again = run_motion(answers.solve, ran.motion, ran.allowed, ran.case.scale, 2 * FINE)
-    return float(np.log2((ran.error / ran.allowed).max() / max((again.error / again.allowed).max(), 1e-300)))
+def _falls(answers: Answers, ran: Ran) -> float:
+    """Return the exponent with which the error falls from the step to half of it; 0 if it is below the declared order."""
+    with suppress(Unsupported):
+        again = run_motion(answers.solve, ran.motion, ran.allowed, ran.case.scale, 2 * FINE)
+        slope = float(np.log2(ran.ratio / max(again.ratio, 1e-300)))
+        return slope if math.isfinite(slope) and slope >= (answers.order or 2) - SLOPE else 0.0
+    return 0.0
 
 
 def measure_order(answers: Answers) -> float:
@@ -267,16 +266,16 @@ def _explained(one: Explanation, rest: Any, source: Ran) -> list[str]:
 
 def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], float]:
     """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
-    near = {
-        each.motion.name: slope
-        for each in answers.failing
-        if each.ratio <= NEAR and (slope := falls(answers, each)) >= (answers.order or 2) - SLOPE
-    }
+    near = {each.motion.name: slope for each in answers.failing if each.ratio <= NEAR and (slope := _falls(answers, each))}
     failing = [each for each in answers.failing if each.motion.name not in near]
     named = explain_motions(failing)
     explained = {name: each for each in named for name in each.motions}
+    # What converges as it declares, and is no known mistake, has a large error constant.
+    rest = [each for each in failing if each.motion.name not in explained and not each.ended]
+    near |= {each.motion.name: slope for each in rest if (slope := _falls(answers, each))}
+    failing = [each for each in failing if each.motion.name not in near]
     order, lower = math.nan, dict[str, str]()
-    if len(explained) < max(1, len(failing) / 2):
+    if failing and len(explained) < len(failing) / 2:
         order = measure_order(answers)
         lower = _of_lower_order(answers, failing, order)
     findings = []
@@ -285,7 +284,7 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
         k = int(np.argmax(each.error / each.allowed))
         value = float(each.error[k]), float(each.allowed[k]), ("rad", "of the largest rate")[k], "order"
         if each not in failing:
-            detail = f"{100 * (each.ratio - 1):.0f} % above the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
+            detail = f"{_above(each.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
             findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=detail))
         elif name in lower:
             findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=lower[name]))
@@ -298,6 +297,10 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     return findings, named, order
 
 
+def _above(ratio: float) -> str:
+    return f"{100 * (ratio - 1):.0f} % above" if ratio < 2 else f"{ratio:.2g} times"
+
+
 def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> dict[str, str]:
     """Return the failing motions that are right for a lower order than the declared one, each with that sentence."""
     lower = max((each for each in ORDERS if each < (answers.order or 2) and abs(order - each) < SLOPE), default=None)
@@ -305,7 +308,7 @@ def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> d
         return {}
     found = {}
     for each in failing:
-        allowed, _ = tolerance(each.motion, lower, answers.single)
+        allowed, _ = _limits(each.motion, lower, answers.single)
         if (each.error <= allowed).all():
             found[each.motion.name] = f"within the tolerance of order {lower}"
     return found
@@ -397,6 +400,19 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
         for each in named
     ]
     return "; ".join([*reasons, ", ".join(parts)])
+
+
+def find_cause(solve: Solve, order: int | None = None, single: bool = False, principal: bool = True) -> str:
+    """Return the sentences of the mistakes in the exact motions of a function that integrates scenes; "" if all are right."""
+    answers = run_motions(solve, order, single, principal)
+    findings, named, _ = motion_findings("", answers)
+    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    if wrong and not named:
+        return next((each.detail for each in wrong if each.detail), UNKNOWN)
+    return "; ".join(" or ".join(one.cause.sentence for one in each.explanations) for each in named)
+
+
+UNKNOWN = "no known mistake explains its motion"
 
 
 def verify_program(
