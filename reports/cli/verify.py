@@ -187,10 +187,11 @@ def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
     import pandas as pd
 
     from ..charts import figures
-    from ..sections.verification import errors
 
-    (verification,) = found
-    return picture_file(figures.recorded(pd.DataFrame(errors(verification)), verification.subject, limits(verification)), path)
+    (recording,) = found
+    return picture_file(
+        figures.recorded(pd.DataFrame(recording.details.rows), recording.subject, recording.details.limits), path
+    )
 
 
 def write_scripts(found: Sequence[Verification], folder: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,6 +30,8 @@ TERMS = (
     "what the case needs. A mistake explains an error if it leaves at most what is allowed."
 )
 """Explanation of the tables."""
+COLUMNS = ("subject", "check", "case", "verdict", "error", "allowed", "unit", "by", "mistakes", "explanation")
+"""Columns of findings as CSV."""
 OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {}
 """Blocks that a kind of subject has in addition, by `Verification.kind`."""
 
@@ -42,15 +46,15 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     if several := len(order) > 1:
         lead.append(Items([Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in order]))
 
-    def blocks(make: Callable[[Verification], list[Block]]) -> list[Block]:
-        parts = [(each.subject, make(each)) for each in order]
+    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
+        parts = [(each.subject, make(each)) for each in shown]
         return [*lead, *(filled(*(Section(*part) for part in parts)) if several else parts[0][1])]
 
     return Document(
         "conservative verify",
         f"Verified: {', '.join(each.subject for each in verifications)}",
-        [*blocks(details), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary),
+        [*blocks(details, order), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary, [each for each in order if not several or each.verdict is not Verdict.RIGHT]),
         data={
             "verified": [each.subject for each in verifications],
             "verdict": join_verdicts(each.verdict for each in verifications),
@@ -73,17 +77,24 @@ def content(verification: Verification) -> dict[str, Any]:
     return {"sentence": verification.sentence, "verdict": verification.verdict, **vars(verification)}
 
 
-def rows(verifications: Iterable[Verification]) -> list[dict[str, Any]]:
-    """Return the findings as the rows of a table, with the causes as texts."""
-    return [
-        {
-            **{name: value for name, value in vars(each).items() if name not in ("causes", "detail")},
-            "mistakes": "; ".join(cause.key for cause in each.causes),
-            "detail": explanation(each),
-        }
-        for verification in verifications
-        for each in verification.findings
-    ]
+def findings_text(verifications: Iterable[Verification]) -> str:
+    """Return the findings as CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for verification in verifications:
+        for each in verification.findings:
+            mistakes = "; ".join(cause.key for cause in each.causes)
+            plain = [getattr(each, name) for name in COLUMNS[:-2]]
+            writer.writerow([*plain, mistakes, explanation(each)])
+    return stream.getvalue()
+
+
+def errors_text(verifications: Sequence[Verification]) -> str:
+    """Return errors and drifts of a recording over time as CSV: t, quantity and value."""
+    (recording,) = verifications
+    rows: Any = recording.details
+    return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in rows.rows)
 
 
 def summary(verification: Verification) -> list[Block]:
@@ -132,8 +143,12 @@ def _sentence(verifications: Sequence[Verification]) -> str:
     if len(verifications) == 1:
         return f"{verifications[0].sentence}."
     counts = Counter(each.verdict for each in verifications)
-    words = [f"{counts[verdict]} {verdict}" for verdict in SIGNS if counts[verdict]]
-    return f"Of {len(verifications)} subjects, {listed(words)}."
+    words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
+    return (
+        f"All {len(verifications)} {words[0].partition(' ')[2]}."
+        if len(counts) == 1
+        else f"Of {len(verifications)} subjects, {listed(words)}."
+    )
 
 
 def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
