@@ -142,7 +142,7 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
     """
     path = find_unfinished(out)
     process = {"command": source.command, "start": source.date, "commit": source.commit}
-    names = (*plan.names, *[VERIFICATION] * bool(plan.engines))
+    names = (*plan.names, *[VERIFICATION] * plan.verified)
     fresh = Checkpoint(path_for(out), names, terms(plan, source), process)
     if not resume:
         return fresh
