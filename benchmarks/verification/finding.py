@@ -156,4 +156,6 @@ class Verification:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
+        if self.kind == "recordings":  # the reason says which one is wrong
+            return f"{self.verdict}: {self.reason}"
         return f"{self.subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")

@@ -32,8 +32,10 @@ TERMS = (
 """Explanation of the tables."""
 COLUMNS = ("subject", "check", "case", "verdict", "error", "allowed", "unit", "by", "mistakes", "explanation")
 """Columns of findings as CSV."""
-OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {}
-"""Blocks that a kind of subject has in addition, by `Verification.kind`."""
+OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {"recording": recording_blocks, "recordings": two_blocks}
+"""Blocks of kinds of subjects that have other data than cases, by `Verification.kind`."""
+MODEL = "model file"
+"""The kind of subjects that are shown together, in a table of files and engines."""
 
 
 def build(verifications: Sequence[Verification], made: Mapping[str, str] | None = None) -> Document:
@@ -42,19 +44,20 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
     """
     order = sorted(verifications, key=lambda each: list(SIGNS).index(each.verdict))
-    lead: list[Block] = [Paragraph(_sentence(order), Emphasis.LEAD)]
-    if several := len(order) > 1:
-        lead.append(Items([Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in order]))
+    models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
+    listed_alone = [*others, *(models if len(models) == 1 else ())]
+    sentences = [Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in listed_alone]
+    lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
-        parts = [(each.subject, make(each)) for each in shown]
-        return [*lead, *(filled(*(Section(*part) for part in parts)) if several else parts[0][1])]
+        parts = [*([("Model files", body_blocks(models))] if models else []), *((each.subject, make(each)) for each in shown)]
+        return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
 
     return Document(
         "conservative verify",
         f"Verified: {', '.join(each.subject for each in verifications)}",
-        [*blocks(details, order), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary, [each for each in order if not several or each.verdict is not Verdict.RIGHT]),
+        [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary, [each for each in others if len(order) == 1 or each.verdict is not Verdict.RIGHT]),
         data={
             "verified": [each.subject for each in verifications],
             "verdict": join_verdicts(each.verdict for each in verifications),
@@ -99,15 +102,16 @@ def errors_text(verifications: Sequence[Verification]) -> str:
 
 def summary(verification: Verification) -> list[Block]:
     """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
-    own = OWN[verification.kind](verification) if verification.kind in OWN else ()
-    return filled(
-        mistakes(verification.findings), _open(verification.findings), _counts(verification), *own, Items.of(verification.notes)
-    )
+    if verification.kind in OWN:
+        return list(OWN[verification.kind](verification))
+    findings = verification.findings
+    return filled(mistakes(findings), _open(findings), _counts(verification), Items.of(verification.notes))
 
 
 def details(verification: Verification) -> list[Block]:
     """Return the blocks of `summary`, and a table of the cases of each check."""
-    tables = [_cases(check, list(some)) for check, some in groupby(verification.findings, lambda each: each.check)]
+    every = () if verification.kind in OWN else verification.findings
+    tables = [_cases(check, list(some)) for check, some in groupby(every, lambda each: each.check)]
     return filled(*summary(verification), *tables)
 
 
