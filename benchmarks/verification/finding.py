@@ -158,4 +158,5 @@ class Verification:
         """The verdict in one sentence."""
         if self.kind == "recordings":  # the reason says which one is wrong
             return f"{self.verdict}: {self.reason}"
-        return f"{self.subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")
+        subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
+        return f"{subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -189,9 +190,9 @@ def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
     from ..charts import figures
 
     (recording,) = found
-    return picture_file(
-        figures.recorded(pd.DataFrame(recording.details.rows), recording.subject, recording.details.limits), path
-    )
+    details: Any = recording.details
+    limits = {each.name: each.allowed for each in details.quantities if math.isfinite(each.allowed)}
+    return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 
 def write_scripts(found: Sequence[Verification], folder: Path) -> None:

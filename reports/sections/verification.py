@@ -14,6 +14,8 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
+from .bodies import body_blocks
+from .recording import recording_blocks, two_blocks
 
 Key = TypeVar("Key")
 SIGNS = {
@@ -96,8 +98,8 @@ def findings_text(verifications: Iterable[Verification]) -> str:
 def errors_text(verifications: Sequence[Verification]) -> str:
     """Return errors and drifts of a recording over time as CSV: t, quantity and value."""
     (recording,) = verifications
-    rows: Any = recording.details
-    return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in rows.rows)
+    details: Any = recording.details
+    return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in details.rows())
 
 
 def summary(verification: Verification) -> list[Block]:
