@@ -139,7 +139,7 @@ def mujoco_moments(given):
 
 
 def way_of(given):
-    """Return how a body is described, see the pairs of `conservative twins`; "" is the usual way."""
+    """Return how a body is described, see the pairs of `conservative verify`; "" is the usual way."""
     return getattr(given, "way", "")
 
 

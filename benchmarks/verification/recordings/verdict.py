@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,8 +103,8 @@ class Details:
     candidates: Sequence[Explanation]
     tried: Sequence[Explanation]
     quantities: Sequence[Quantity]
-    times: Array
-    series: Mapping[str, Array]
+    times: Array = field(repr=False)
+    series: Mapping[str, Array] = field(repr=False)
 
     def show(self, errors: Sequence[float]) -> str:
         """Return errors of attitudes and rates, as far as the recording has them, in their units."""
