@@ -56,7 +56,7 @@ RESOLVED = {"f64": 1e-11, "f32": 1e-4}
 """Smallest errors, rad, that show an order, above round-off in each precision."""
 ROUNDS = 5
 """Largest number of motions that are searched for mistakes."""
-KINDS = ("reading", "time", "scene", "equation", "habit", "attitude")
+KINDS = ("readings", "times", "scenes", "equations", "habits", "attitudes")
 """Kinds of mistakes that a program can have; those of files and of steps are others."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
