@@ -11,26 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from conservative.check import choice
 from conservative.errors import BadInput, MissingEngine
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..verification.pairs.differences import BODIES, Twins, count_twins, twins_of
-from ..verification.pairs.pairs import PAIRS, Pair
+from ..verification.finding import Verdict
+from ..verification.pairs.verify import BODIES, PairFinding, Relation, count_pairs, verify_pairs
 from .case import Case
 from .declaration import Declaration, Named
 from .selection import Missing
 from .study import Progress, Study
-
-PATIENCE = 300.0
-"""Time in s that each run may take: kernels of an engine may be compiled in it."""
-KINDS = {"crashed": OutcomeKind.CRASHED, "lost": OutcomeKind.DIVERGED}
-"""Outcomes of rows without a value; others are unsupported."""
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -38,23 +31,15 @@ def scenes() -> tuple[Scene, ...]:
     return tuple(replace(one.scene, name=name.replace(" ", "_")) for name, one in BODIES.items())
 
 
-def select_pairs(names: Sequence[str]) -> tuple[Pair, ...]:
-    """Return pairs by name, by default all. Raise `BadInput`."""
-    for name in names:
-        choice("pairs", name, tuple(pair.name for pair in PAIRS))
-    return tuple(pair for pair in PAIRS if not names or pair.name in names)
-
-
 def compare_methods(
-    methods: Sequence[Method], progress: Progress, pairs: Sequence[Pair] = PAIRS
-) -> Iterator[tuple[Method, Twins]]:
-    """Yield the result of every pair in every method. Raise `MissingEngine`."""
-    done, total = 0, count_twins(pairs) * len(methods)
-    with time_limit(PATIENCE):
-        for method in methods:
-            for twins in twins_of(method, lambda what: progress(done / total, what), pairs):  # noqa: B023  # called at once
-                yield method, twins
-                done += 1
+    methods: Sequence[Method], progress: Progress, names: Sequence[str] = ()
+) -> Iterator[tuple[Method, PairFinding]]:
+    """Yield the finding on every pair in every method. Raise `MissingEngine`."""
+    done, total = 0, count_pairs(names) * len(methods)
+    for method in methods:
+        for found in verify_pairs(method, names, lambda what: progress(done / total, what)):  # noqa: B023  # called at once
+            yield method, found
+            done += 1
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -68,9 +53,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         try:
             if isinstance(method, Missing):
                 raise method.error
-            for _, twins in compare_methods((method,), progress):
-                if case := cases.get(twins.body):
-                    yield replace(case, way=twins.pair).row(Value(Measure.ALLOWED, _ratio(twins)), *_outcome(twins))
+            for _, found in compare_methods((method,), progress):
+                if case := cases.get(found.body):
+                    yield replace(case, way=found.pair).row(Value(Measure.ALLOWED, _ratio(found)), *_outcome(found))
         except MissingEngine as error:
             if not study.skip_missing:
                 raise
@@ -78,17 +63,16 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 yield case.row(Value(Measure.ALLOWED, np.nan), Outcome(OutcomeKind.MISSING, str(error)))
 
 
-def _ratio(twins: Twins) -> float:
-    if twins.outcome == "same limit":  # which rounding need not explain
+def _ratio(found: PairFinding) -> float:
+    if found.relation is Relation.SAME_LIMIT:  # which rounding need not explain
         return np.nan
-    return 0.0 if twins.outcome == "same bits" else twins.factor
+    return 0.0 if found.relation is Relation.SAME_BITS else found.factor
 
 
-def _outcome(twins: Twins) -> tuple[Outcome, str]:
-    detail = "; ".join(filter(None, (twins.outcome, twins.threshold, twins.detail)))
-    if np.isnan(twins.difference):
-        return Outcome(KINDS.get(twins.outcome, OutcomeKind.UNSUPPORTED), twins.detail), twins.outcome
-    return OK, detail
+def _outcome(found: PairFinding) -> tuple[Outcome, str]:
+    if found.verdict is Verdict.NOT_TESTED:
+        return Outcome(OutcomeKind.UNSUPPORTED, found.detail), found.relation.value
+    return OK, found.detail
 
 
 STUDY = Declaration(findings, named=Named.ONLY, apart=True, scenes=scenes, options=("methods",))

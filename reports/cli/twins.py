@@ -51,8 +51,9 @@ def twins(
     """
     require_extra("conservative twins", "report")
     from conservative.benchmarks.studies.selection import methods as select_methods
-    from conservative.benchmarks.studies.twins import compare_methods, select_pairs
-    from conservative.benchmarks.verification.pairs.script import MARK, script_name, script_of
+    from conservative.benchmarks.studies.twins import compare_methods
+    from conservative.benchmarks.verification.pairs.script import MARK, script_name
+    from conservative.benchmarks.verification.pairs.verify import select_pairs
     from conservative.files import make_folder, write_text
 
     from ..run.provenance import provenance
@@ -67,11 +68,11 @@ def twins(
     with output_files(None, (), **outputs) as write:
         made = provenance().facts
         with progress() as step:
-            results = list(compare_methods(methods, step, chosen))
+            results = list(compare_methods(methods, step, [pair.name for pair in chosen]))
         document = build(results, made)
         document = write(document)
-        for method, found in results:
-            if scripts and (text := script_of(method, found)):
+        for _, found in results:
+            if scripts and found.script:
                 make_folder(scripts, "scripts")
-                write_text(scripts / script_name(method, found.pair), text, "scripts")
+                write_text(scripts / found.script_file, found.script, "scripts")
     show(document, as_json, silent=True)
