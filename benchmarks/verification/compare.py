@@ -1,4 +1,7 @@
-"""Rows of a recorded motion beside the motion of a scene: errors, noise, and fits of initial states and other numbers."""
+"""Samples of a motion beside the exact motion: errors, what is allowed and by what, noise, and fits of initial states.
+
+Attitude errors are in rad, errors of rates relative to the largest rate. Nothing here knows files.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,9 @@ from conservative.scene import Scene
 from .solution import ANGLE, Equations, States, closed, truth
 
 FLOOR = 1e-9  # errors that round-off makes in double precision
+UNITS_OF_DIGITS = 6.0  # of what digits round, that the largest error may have
 SIGMAS = 7.0  # of noise, that the largest error may have
+ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
@@ -25,6 +30,36 @@ LINEAR = 0.3  # rad, differences of motions that are taken as small
 PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
 Solution = Callable[[Array, Array, Array, int], tuple[Array, Array]]
 """From initial attitudes (B, 3, 3), rates (B, 3), other numbers (B, k) and n to the first rows (B, n, 3, 3), (B, n, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Allowed:
+    """Errors that samples may have, of attitudes, rad, and of rates, relative to the largest rate, and what allows them.
+
+    `errors` (2,) are the largest, and `by` says for each of the two what allows it: "digits", "noise", or another word for
+    a given error. `noise` (2,) is the deviation of one axis, by which fits weigh samples. `rounded` (2,) are the errors that
+    digits make; a given error alone decides, so it stands there too.
+    """
+
+    errors: Array
+    by: tuple[str, str]
+    noise: Array
+    rounded: Array
+
+
+def allow(rounded: Any = (0.0, 0.0), noise: Any = (0.0, 0.0), error: float | None = None, by: str = "error") -> Allowed:
+    """Return the errors that are allowed: a given error alone, or else what the digits and the noise of samples make.
+
+    `rounded` (2,) are the errors that digits make, and `noise` (2,) is the standard deviation of one axis, both of attitudes,
+    rad, and of rates, relative to the largest. `by` says what a given error comes from.
+    """
+    rounded, noise = np.asarray(rounded, float), np.asarray(noise, float)
+    weight = np.maximum(np.maximum(noise, rounded), ROUND_OFF)
+    if error is not None:
+        return Allowed(np.full(2, error), (by, by), weight, np.full(2, error))
+    digits, scattered = np.maximum(FLOOR, UNITS_OF_DIGITS * rounded), SIGMAS * noise
+    words = ["noise" if a > b else "digits" for a, b in zip(scattered, digits, strict=True)]
+    return Allowed(np.maximum(digits, scattered), (words[0], words[1]), weight, rounded)
 
 
 def take_rows(data: States, rows: Any) -> States:
@@ -92,7 +127,9 @@ class Compared:
         """Return the rows with rates relative to another scale, rad/s. Round-off in double precision is relative to a row."""
         factors = np.array([1.0, self.scale / scale])
         allowed = np.where(self.allowed <= FLOOR, FLOOR, self.allowed * factors)
-        return replace(self, scale=scale, allowed=allowed, noise=np.where(self.noise <= 1e-13, 1e-13, self.noise * factors))
+        return replace(
+            self, scale=scale, allowed=allowed, noise=np.where(self.noise <= ROUND_OFF, ROUND_OFF, self.noise * factors)
+        )
 
     @cached_property
     def exact(self) -> tuple[Array, Array]:

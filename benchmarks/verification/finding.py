@@ -156,4 +156,7 @@ class Verification:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        return f"{self.subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")
+        if self.kind == "recordings":  # the reason says which one is wrong
+            return f"{self.verdict}: {self.reason}"
+        subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
+        return f"{subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")

@@ -136,7 +136,7 @@ class Equations:
         (Clenshaw & Norton 1963; Bai & Junkins 2011). A stretch is halved until its series ends in round-off. The motion ends at
         a singularity, and where a load has no value.
         """
-        y, smooth = self.pack(start, R, w), self.scene.smoothness()
+        y, smooth = self.pack(start, R, w), self.scene.smoothness(end)
         made = Flow(self, [start], [], y)
         breaks = [each for each in smooth.breaks.tolist() if start < each < end]
         size = max(float(np.abs(y[4:]).max()), 1e-3 / max(end - start, 1e-300))
