@@ -329,6 +329,8 @@ STEPS: dict[int, dict[str, Next]] = {
 """The steps by their order."""
 GROWS = {"explicit Euler", "semi-implicit Euler", "semi-implicit Euler with an implicit torque", "implicit Euler"}
 """Steps that change the norm of an attitude in order 1: they are not right without normalisation."""
+
+
 @dataclass(frozen=True)
 class Design:
     """A right program."""
@@ -346,8 +348,13 @@ class Design:
         words = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
         return ", ".join([*words, *["single"] * self.single])
 
-    def run(self, motions: Sequence[Motion], parts: int) -> Iterator[tuple[Array, Array]]:
-        """Yield attitudes (samples, 3, 3) and rates (samples, 3) of each motion, by steps of 0.1 rad over `parts`."""
+    def run(
+        self, motions: Sequence[Motion], parts: int, after: Callable[[Array], Array] | None = None
+    ) -> Iterator[tuple[Array, Array]]:
+        """Yield attitudes (samples, 3, 3) and rates (samples, 3) of each motion, by steps of 0.1 rad over `parts`.
+
+        `after` is a habit: it changes rates (3, motions), rad/s, after each step. The variable of rotation is then the rates.
+        """
         f, step = Bodies(motions, self.attitude, self.variable, self.single), STEPS[self.order][self.step]
         ends = [[n * each.steps * parts for n in range(1, each.samples + 1)] for each in motions]
         y, past, states = f.start, list[Array](), list[Array]()
@@ -357,6 +364,8 @@ class Design:
                 states.append(y)
                 new = step(f, h * y.dtype.type(n), y, h, past)
                 past, y = [y], f.normalise(new) if self.normalised else new
+                if after is not None:
+                    y[f.n :] = after(y[f.n :] / f.unit) * f.unit
             states.append(y)
             R = np.array([f.R(f.normalise(each)) for each in states], dtype=float)
             w = np.array([f.rates(f.R(each), each[f.n :]) for each in states], dtype=float) / f.unit
@@ -364,13 +373,16 @@ class Design:
             yield R[rows, :, :, i], w[rows, :, i]
 
 
-def designs(order: int, single: bool = False) -> list[Design]:
-    """Return the right programs of an order."""
+def designs(order: int, single: bool = False, every: bool = False) -> list[Design]:
+    """Return the right programs of an order. Only with `every`, those without normalisation are among them.
+
+    Without normalisation errors are those with it, within one per cent, above order 1.
+    """
     return [
         Design(order, step, attitude, variable, normalised, single)
         for step in STEPS[order]
         for attitude in ATTITUDES
         for variable in VARIABLES
-        for normalised in (True, False)
+        for normalised in (True, False)[: 1 + every]
         if (normalised or step not in GROWS) and not ("world" in variable and "splitting" in step)
     ]
