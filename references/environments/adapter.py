@@ -62,7 +62,7 @@ class EngineData(Distribution):
     formats
         Formats of model files that its program loads: "urdf", "mjcf", "sdf" or "usd" (see `load` in PROTOCOL.md).
     ways
-        Ways, beside the usual one, in which `prepare` can be told about a body: its number `way`, see the pairs of `conservative verify`.
+        Ways, beside the usual one, in which `prepare` can be told about a body: its number `way`, see `conservative verify`.
         Two of them are in the numbers themselves: "frame", axes that are not principal, and "offset", a free body whose origin
         is not its centre of mass.
     rate_limit

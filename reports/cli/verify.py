@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -137,11 +138,13 @@ def verify(
     names = [name for text in subjects for name in split_subject(text)]
     if not names and not given["engines"]:
         raise click.UsageError("Missing argument 'SUBJECT...'.")
-    kinds = {each.kind for each in expand(names)} or {Kind.MODEL}
+    every = [each.kind for each in expand(names)] or [Kind.MODEL]
+    kinds, alone = set(every), every == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **given}, kinds)
-    only_files = kinds <= {Kind.RECORDING} and len(names) <= 2
-    drawn = only_files and find_spec("pandas") is not None and find_spec("altair") is not None
-    left_out = [] if drawn else ["errors.svg"] if only_files else ["errors.svg", "errors.csv"]
+    if picture is not None and not alone:
+        raise BadInput("picture", f"{len(every)} subjects", "one recording")
+    drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
+    left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
@@ -152,10 +155,11 @@ def verify(
             "errors.svg": lambda: draw(found),
             "picture": lambda: draw(found, picture),
         }
-        document = write(section.build(found, provenance().facts), **made)
+        document = section.build(found, provenance().facts)
+        written = write(document, **made)
         if scripts is not None:
             write_scripts(found, scripts)
-    show(document, as_json, silent=True)
+    show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
     ctx.exit(section.exit_code(found))
 
 
@@ -175,7 +179,9 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
             continue
         users = users_of.get(name, (Kind.RECORDING,))
         if not set(kinds) & set(users):
-            raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
+            flag = next(each.opts[0] for each in ctx.command.params if each.name == name)
+            got = f"{flag}, which none of the subjects uses ({', '.join(sorted(kinds))})"
+            raise BadInput(flag.lstrip("-"), got, f"a subject of the kind {', '.join(users)}")
         if name == "rates":
             options["world"] = value == "world"
         elif name not in ("picture", "scripts"):
