@@ -128,17 +128,19 @@ def verify(
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")
-    from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
     from conservative.benchmarks.verification.verify import Kind, expand, verify
 
-    from ..run.provenance import provenance
     from ..sections import verification as section
     from ..terminal.progress import progress
 
     names = [name for text in subjects for name in split_subject(text)]
-    if not names and not given["engines"]:
-        raise click.UsageError("Missing argument 'SUBJECT...'.")
-    every = [each.kind for each in expand(names)] or [Kind.MODEL]
+    if not names:
+        if not given["engines"]:
+            raise click.UsageError("Missing argument 'SUBJECT...'.")
+        from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
+
+        names = [str(CATALOGUE)]
+    every = [each.kind for each in expand(names)]
     kinds, alone = set(every), every == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **given}, kinds)
     if picture is not None and not alone:
@@ -148,14 +150,14 @@ def verify(
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        found = verify(names or [str(CATALOGUE)], tell=step, **options)
+        found = verify(names, tell=step, **options)
         made = {
             "csv": lambda: section.findings_text(found),
             "errors.csv": lambda: section.errors_text(found),
             "errors.svg": lambda: draw(found),
             "picture": lambda: draw(found, picture),
         }
-        document = section.build(found, provenance().facts)
+        document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
         written = write(document, **made)
         if scripts is not None:
             write_scripts(found, scripts)
@@ -187,6 +189,13 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
         elif name not in ("picture", "scripts"):
             options[name] = split_names(name, value) if name in LISTS else value
     return options
+
+
+def facts() -> dict[str, str]:
+    """Return the machine and the versions that runs were made with; a recording has none."""
+    from ..run.provenance import provenance  # here: numba takes a second
+
+    return provenance().facts
 
 
 def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
