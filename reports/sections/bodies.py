@@ -24,7 +24,7 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
         for kinds in (set(Verdict) - {Verdict.NOT_TESTED}, {Verdict.RIGHT}, {Verdict.WRONG}, {Verdict.UNDECIDED})
     )
     count = f"{len(cases)} {'body' if len(cases) == 1 else 'bodies'}"
-    lead = f"{len(right)} of {len(tested)} loaded bodies of {len(engines)} engines are right, for {count} of model files."
+    lead = f"{len(right)} of {len(tested)} answers of {len(engines)} engines are right, for {count}."
     lead += f" {len(undecided)} are undecided." * bool(undecided)
     rows = [[case, *(str(verdicts[case, engine]) for engine in engines)] for case in cases]
     details: dict[tuple[str, str], Any] = {(body.case, body.subject): body for each in verifications for body in _bodies(each)}

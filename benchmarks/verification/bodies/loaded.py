@@ -157,7 +157,7 @@ def _join(file: str, models: list[Model], found: dict[str, list[tuple[Finding, L
     tested = [each for each in findings if each.verdict is not Verdict.NOT_TESTED]
     right = sum(each.verdict is Verdict.RIGHT for each in tested)
     wrong = dict.fromkeys(each.subject for each in tested if each.verdict is Verdict.WRONG)
-    reason = f"{right} of {len(tested)} loaded bodies are right" if tested else "no engine loads files of this format"
+    reason = f"{right} of {len(tested)} answers of engines are right" if tested else "no engine loads files of this format"
     reason += f"; wrong in {', '.join(wrong)}" * bool(wrong)
     details = tuple(body for _, body in pairs)
     return Verification(file, "model file", tuple(findings), reason, tuple(dict.fromkeys(notes)), details)
