@@ -28,6 +28,7 @@ from .options import (
     output_files,
     picture_file,
     picture_option,
+    require_replaceable,
     show,
     split_names,
 )
@@ -159,9 +160,9 @@ def verify(
         }
         document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
         written = write(document, **made)
-        if scripts is not None:
-            write_scripts(found, scripts)
     show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
+    if scripts is not None:  # after the result, which a script that cannot be written must not cost
+        write_scripts(found, scripts, ctx.meta["force"])
     ctx.exit(section.exit_code(found))
 
 
@@ -210,5 +211,17 @@ def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 
-def write_scripts(found: Sequence[Verification], folder: Path) -> None:
+def write_scripts(found: Sequence[Verification], folder: Path, force: bool) -> None:
     """Write a script of each pair that differs into a folder."""
+    from conservative.benchmarks.verification.pairs import PairFinding
+    from conservative.benchmarks.verification.pairs.script import MARK
+    from conservative.files import make_folder, write_text
+
+    findings = [finding for each in found for finding in each.findings]
+    scripts = {each.script_file: each.script for each in findings if isinstance(each, PairFinding) and each.script}
+    for name in scripts:
+        require_replaceable(folder / name, MARK, "scripts", force)
+    if scripts:
+        make_folder(folder, "scripts")
+    for name, text in scripts.items():
+        write_text(folder / name, text, "scripts")
