@@ -24,6 +24,7 @@ UNITS_OF_DIGITS = 6.0  # of what digits round, that the largest error may have
 SIGMAS = 7.0  # of noise, that the largest error may have
 ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
+TINY = 1e-11  # of noise, which is round-off
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
 LINEAR = 0.3  # rad, differences of motions that are taken as small
@@ -303,5 +304,5 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
             d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
             found.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
         noise[i] = min(found)
-        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < 1e-11
+        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < TINY
     return noise, resolved

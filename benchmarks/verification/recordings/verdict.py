@@ -277,7 +277,8 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
         )
     if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
         d = case.differences(*case.exact)
-        if abs(float((d[1:] * d[:-1]).sum() / (d * d).sum())) < 0.3:
+        lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
+        if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
             return "What is left looks like noise, but the rows are too far apart to tell. More rows a turn, or --error, decide"
     return ""
 
