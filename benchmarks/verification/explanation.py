@@ -138,12 +138,17 @@ def explain(
 
 
 def attempt(
-    case: Compared, trial: Trial, start: Sequence[float] | None = None, small: float = 1e-6, most: int = 8
+    case: Compared,
+    trial: Trial,
+    start: Sequence[float] | None = None,
+    small: float = 1e-6,
+    most: int = 8,
+    known: Mapping[str, float] = MappingProxyType({}),
 ) -> Explanation | None:
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
     `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
-    iterations. None if the mistakes cannot be applied.
+    iterations. `known` are other numbers of the sentence, which `build` has. None if the mistakes cannot be applied.
     """
     motion = trial.build(case)
     if motion is None:
@@ -159,4 +164,4 @@ def attempt(
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
         _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
     names = (each.name for each in trial.numbers)
-    return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)))
+    return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

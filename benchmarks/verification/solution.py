@@ -36,11 +36,11 @@ class Equations:
     """The equations of motion of a scene, J w' = (J w + h) x w - h' + T and q' = q w / 2, and changes of them.
 
     A state (7, ...) is a quaternion, scalar first, body to world, and u = w, rad/s, body axes; with a motor u = w + r J^-1 h,
-    where r is `reaction`.
-    `gyroscopic`, `field`, `reaction` and `turn`, numbers or (B,), scale the first term, the torque of the potential, -h', and q'.
-    `damping` (B,) is an additional one, 1/s. `spinning` (3, 3) is the inertia of the gyroscopic term. `fixed` (3, 3) is a tensor,
-    kg m^2, whose components are kept in world axes, so that it does not turn with the body. With `half_turned` the inertia in
-    world axes is R J instead of R J R'. With `left` q' = w q / 2. `tolerance` is the error of solutions in a stretch.
+    where r is `reaction`. `gyroscopic`, `field`, `reaction` and `turn` scale the first term, the torque of the potential, -h',
+    and q'; `damping` is an additional one, 1/s. Each but `reaction` is a number, or (B,). `spinning` (3, 3) is the inertia of
+    the gyroscopic term. `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn
+    with the body. With `half_turned` the inertia in world axes is R J instead of R J R'. With `left` q' = w q / 2. `tolerance`
+    is the error of solutions in a stretch.
     """
 
     scene: Scene

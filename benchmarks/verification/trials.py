@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -87,7 +87,9 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
     def equations(p: Array) -> Equations | None:
         return equations_of(moved, case.scene, dict(zip((number.name for number in numbers), p, strict=True)), tolerance)
 
-    if not own and equations(np.array([number.start for number in numbers])) is None:
+    probe = np.array([number.start + 0.5 for number in numbers])  # at the start the scene does not change
+    if any(each.numbers and each.change(case.scene, *(number.start + 0.5 for number in each.numbers)) is None
+           for each in mistakes if isinstance(each, SceneMistake)) or equations(probe) is None:  # fmt: skip
         return None
     plain = exact(case) if not moved and time is None else None
     flows: list[Any] = []  # of a start that is not fitted: other times of the same motion
@@ -149,7 +151,7 @@ def _at_times(
     return out[0][0], out[1][1]
 
 
-def by_rule(rule: Rule, parts: int, w: Array | None = None) -> Trial:
+def by_rule(rule: Rule, parts: int) -> Trial:
     """Return the trial of a rule that integrates attitudes from exact rates, with so many steps between two rows."""
 
     def build(case: Compared) -> Solution | None:
@@ -170,7 +172,7 @@ def by_rule(rule: Rule, parts: int, w: Array | None = None) -> Trial:
 
         return motion
 
-    return Trial((rule,), build, rule.numbers)
+    return Trial((rule,), build)
 
 
 def by_habit(habit: Habit, step: float | None) -> Trial:
@@ -229,8 +231,3 @@ def _with_habit(
 def remark_on_damping(scene: Scene) -> str:
     """Return the end of a sentence on damping."""
     return ", in addition to the damping of the scene" * (Need.DAMPING in scene.needs)
-
-
-def with_scene(case: Compared, scene: Scene) -> Compared:
-    """Return the case of another scene with the same start."""
-    return replace(case, scene=scene)

@@ -91,7 +91,7 @@ EQUATIONS = (
     ),
     EquationsMistake(
         "factor one half",
-        "The factor 1/2 of q' is forgotten: attitudes turn by 2 times the rates",
+        "The attitudes turn by 2.00 times the rates, as without the factor 1/2 of q'",
         lambda scene: Equations(scene, turn=2.0),
         remedy="q' = q w / 2",
     ),

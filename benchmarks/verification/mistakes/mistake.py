@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 
 class Number(NamedTuple):
-    """A number of a mistake that is fitted: its name, its value without the mistake, and its unit "1", "s", "1/s" or "rad/s"."""
+    """A fitted number: its name, its value without the mistake, and its unit, "1", "s", "1/s" or "rad/s"."""
 
     name: str
     start: float = 0.0

@@ -1,4 +1,4 @@
-"""Scenes: the motion is right for another scene, in which a part is missing, reversed or of another size, or the start is misread."""
+"""Scenes: the motion is right for another scene. A part is missing, reversed or of another size, or the start is misread."""
 
 from __future__ import annotations
 
@@ -140,14 +140,17 @@ PARTS = tuple(
     for name, change in WITHOUT.items()
 )  # fmt: skip
 FACTOR = (Number("factor", 1.0),)
-SIZES = tuple(
-    SceneMistake(f"size of {name}", f"{text} is {{factor:.5g}} times the scene's", change, numbers=FACTOR)
-    for name, text, change in (
-        ("the rotor", "The wheel's momentum", _rotor),
-        ("the torque", "The torque", _torque),
-        ("the damping", "The damping", _damping),
-    )
-) + (SceneMistake("rate of the orbit", "The rate of the orbit is {factor:.8g} times the scene's", _orbit, numbers=FACTOR),)
+SIZES = (
+    *(
+        SceneMistake(f"size of {name}", f"{text} is {{factor:.5g}} times the scene's", change, numbers=FACTOR)
+        for name, text, change in (
+            ("the rotor", "The wheel's momentum", _rotor),
+            ("the torque", "The torque", _torque),
+            ("the damping", "The damping", _damping),
+        )
+    ),
+    SceneMistake("rate of the orbit", "The rate of the orbit is {factor:.8g} times the scene's", _orbit, numbers=FACTOR),
+)
 SCENES = (
     *PARTS,
     *SIZES,

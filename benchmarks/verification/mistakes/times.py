@@ -127,9 +127,10 @@ TIMES = (
 DROPPED = RowTimes(
     "dropped rows",
     "Rows are missing: {rows:.0f}, the first before {at:.6g} s, and the times are those of a file without gaps",
-    numbers=(Number("rows"), Number("at", unit="s")),
 )
 JITTERED = RowTimes(
-    "jittered times", "The time stamps are jittered by {jitter:.3g} s (root of the mean square)", numbers=(Number("jitter"),) * 3
+    "jittered times",
+    "The time stamps are jittered by {jitter:.3g} s (root of the mean square)",
+    numbers=(Number("jitter"),) * 3,
 )
 ROW_TIMES = (DROPPED, JITTERED)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, from_quaternion, hat, to_quaternion
-from conservative.errors import BadInput, ImpossibleInertia, shorten
+from conservative.errors import BadInput, shorten
 from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
 from conservative.needs import IN_TIME
@@ -64,8 +63,7 @@ def judge(
     elif not found.passed:
         tell("explain")
         whole = replace(found.case, growth=found.parts[0].growth)
-        with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # of bodies that the search tries
-            explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
+        explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     right, undecided = found.passed and shaped, ""
     if right:
         undecided = found.undecided
@@ -191,7 +189,7 @@ def _single_rows(found: _Comparison) -> Explanation:
     unit = ("rad", "of the largest rate")[int(np.argmax(found.worst.max(axis=1)))]
     text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
     values = {"row": float(number), "time": at, "error": size}
-    return Explanation("single rows", text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
+    return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
