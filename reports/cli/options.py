@@ -313,10 +313,10 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
     Yields
     ------
     Callable
-        Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
-        given to it as functions without arguments, such as `csv=...`, which return a text or bytes. They are called last, and
-        a file that cannot be made leaves the others: it keeps its content, and the returned document has the failure. A disk
-        that becomes full leaves the others, too: `NotWritten` is raised after them.
+        Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have,
+        and files with other content, are functions without arguments, such as `csv=...`, which return a text or bytes. They are
+        called last, and a file that cannot be made leaves the others: it keeps its content, and the returned document has the
+        failure. A disk that becomes full leaves the others, too: `NotWritten` is raised after them.
     """
     from conservative.files import make_folder, text_file
 
@@ -336,9 +336,10 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
 
         def write(document: Document, **others: Callable[[], str | bytes]) -> Document:
             failures, unwritten = list(document.failures), list[NotWritten]()
-            for name in sorted(opened, key=lambda name: name.rpartition(".")[2] in others):
-                (context, stream), kind = opened[name], name.rpartition(".")[2]
-                make = others.get(kind) or partial(text, document, kind)
+            made_by = {name: others.get(name) or others.get(name.rpartition(".")[2]) for name in opened}
+            for name in sorted(opened, key=lambda name: made_by[name] is not None):
+                context, stream = opened[name]
+                make = made_by[name] or partial(text, document, name.rpartition(".")[2])
                 try:
                     with suppress(_NotMade), context:  # on the disk before the next one is drawn
                         made = attempt(f"The file {str(places[name][0])!r}", make)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,7 @@ from .options import (
     output_files,
     picture_file,
     picture_option,
+    require_replaceable,
     show,
     split_names,
 )
@@ -127,35 +129,40 @@ def verify(
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")
-    from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
     from conservative.benchmarks.verification.verify import Kind, expand, verify
 
-    from ..run.provenance import provenance
     from ..sections import verification as section
     from ..terminal.progress import progress
 
     names = [name for text in subjects for name in split_subject(text)]
-    if not names and not given["engines"]:
-        raise click.UsageError("Missing argument 'SUBJECT...'.")
-    kinds = {each.kind for each in expand(names)} or {Kind.MODEL}
+    if not names:
+        if not given["engines"]:
+            raise click.UsageError("Missing argument 'SUBJECT...'.")
+        from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
+
+        names = [str(CATALOGUE)]
+    every = [each.kind for each in expand(names)]
+    kinds, alone = set(every), every == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **given}, kinds)
-    only_files = kinds <= {Kind.RECORDING} and len(names) <= 2
-    drawn = only_files and find_spec("pandas") is not None and find_spec("altair") is not None
-    left_out = [] if drawn else ["errors.svg"] if only_files else ["errors.svg", "errors.csv"]
+    if picture is not None and not alone:
+        raise BadInput("picture", f"{len(every)} subjects", "one recording")
+    drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
+    left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        found = verify(names or [str(CATALOGUE)], tell=step, **options)
+        found = verify(names, tell=step, **options)
         made = {
             "csv": lambda: section.findings_text(found),
             "errors.csv": lambda: section.errors_text(found),
             "errors.svg": lambda: draw(found),
             "picture": lambda: draw(found, picture),
         }
-        document = write(section.build(found, provenance().facts), **made)
-        if scripts is not None:
-            write_scripts(found, scripts)
-    show(document, as_json, silent=True)
+        document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
+        written = write(document, **made)
+    show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
+    if scripts is not None:  # after the result, which a script that cannot be written must not cost
+        write_scripts(found, scripts, ctx.meta["force"])
     ctx.exit(section.exit_code(found))
 
 
@@ -175,12 +182,21 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
             continue
         users = users_of.get(name, (Kind.RECORDING,))
         if not set(kinds) & set(users):
-            raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
+            flag = next(each.opts[0] for each in ctx.command.params if each.name == name)
+            got = f"{flag}, which none of the subjects uses ({', '.join(sorted(kinds))})"
+            raise BadInput(flag.lstrip("-"), got, f"a subject of the kind {', '.join(users)}")
         if name == "rates":
             options["world"] = value == "world"
         elif name not in ("picture", "scripts"):
             options[name] = split_names(name, value) if name in LISTS else value
     return options
+
+
+def facts() -> dict[str, str]:
+    """Return the machine and the versions that runs were made with; a recording has none."""
+    from ..run.provenance import provenance  # here: numba takes a second
+
+    return provenance().facts
 
 
 def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
@@ -195,5 +211,17 @@ def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 
-def write_scripts(found: Sequence[Verification], folder: Path) -> None:
+def write_scripts(found: Sequence[Verification], folder: Path, force: bool) -> None:
     """Write a script of each pair that differs into a folder."""
+    from conservative.benchmarks.verification.pairs import PairFinding
+    from conservative.benchmarks.verification.pairs.script import MARK
+    from conservative.files import make_folder, write_text
+
+    findings = [finding for each in found for finding in each.findings]
+    scripts = {each.script_file: each.script for each in findings if isinstance(each, PairFinding) and each.script}
+    for name in scripts:
+        require_replaceable(folder / name, MARK, "scripts", force)
+    if scripts:
+        make_folder(folder, "scripts")
+    for name, text in scripts.items():
+        write_text(folder / name, text, "scripts")

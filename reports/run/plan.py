@@ -48,9 +48,9 @@ seconds after the installation, mostly to compile kernels, and a further method 
 class Plan:
     """The plan of a report: what is compared, and the studies in the order of measurement.
 
-    Engines have studies and a section of their own, and are verified if `verified`. `named` are the methods that the user named.
-    `bodies` is the number of random bodies in each field, `seed` their seed. `arguments` are the texts from which commands make
-    the scenes, such as their files, by the names of the scenes.
+    Engines have studies and a section of their own, and are verified if `verified`. `named` are the methods that the user
+    named. `bodies` is the number of random bodies in each field, `seed` their seed. `arguments` are the texts from which
+    commands make the scenes, such as their files, by the names of the scenes.
     """
 
     scenes: tuple[Scene, ...]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from conservative.benchmarks.studies.case import names_of
@@ -52,7 +52,7 @@ def from_plain(values: Iterable[Mapping[str, Any]]) -> tuple[Verified, ...]:
 
 def _plain(finding: Finding) -> dict[str, Any]:
     causes = [{**vars(cause), "keys": list(cause.keys), "numbers": dict(cause.numbers)} for cause in finding.causes]
-    return {**vars(finding), "causes": causes}
+    return {**{each.name: getattr(finding, each.name) for each in fields(Finding)}, "causes": causes}
 
 
 def _finding(values: Mapping[str, Any]) -> Finding:

@@ -37,7 +37,10 @@ def recording_blocks(verification: Verification) -> list[Block]:
         heading = "No known mistake explains the error" + (": none of these candidates is proven." if candidates else ".")
     compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in details.used.items())
     used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
-    unused = [f"Not used: {column}, {reason}." for column, reason in details.unused.items()]
+    reasons = sorted(set(details.unused.values()), key=list(details.unused.values()).index)
+    unused = [
+        f"Not used: {', '.join(name for name, why in details.unused.items() if why == each)}: {each}." for each in reasons
+    ]
     quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
     tried = [[each.name, _amount(each.left, details.units)] for each in details.tried[:LISTED]]
     return filled(

@@ -7,7 +7,6 @@ import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
 from typing import Any, TypeVar
 
 from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification, join_verdicts
@@ -15,6 +14,7 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
 from .bodies import body_blocks
+from .pairs import pair_blocks
 from .recording import recording_blocks, two_blocks
 
 Key = TypeVar("Key")
@@ -106,15 +106,25 @@ def summary(verification: Verification) -> list[Block]:
     """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
-    findings = verification.findings
-    return filled(mistakes(findings), _open(findings), _counts(verification), Items.of(verification.notes))
+    pairs, others = _pairs(verification)
+    differ = pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
+    return filled(mistakes(others), _open(others), _counts(verification), *differ, Items.of(verification.notes))
 
 
 def details(verification: Verification) -> list[Block]:
-    """Return the blocks of `summary`, and a table of the cases of each check."""
-    every = () if verification.kind in OWN else verification.findings
-    tables = [_cases(check, list(some)) for check, some in groupby(every, lambda each: each.check)]
-    return filled(*summary(verification), *tables)
+    """Return the blocks of `summary`, and tables of the cases of each check."""
+    if verification.kind in OWN:
+        return summary(verification)
+    pairs, others = _pairs(verification)
+    tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
+    right = pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
+    return filled(*summary(verification), *tables, *right)
+
+
+def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
+    """Return the findings on pairs, which have tables of their own, and the others."""
+    pairs = [each for each in verification.findings if each.check == "pairs"]
+    return pairs, [each for each in verification.findings if each.check != "pairs"]
 
 
 def mistakes(findings: Iterable[Finding]) -> Items:
