@@ -41,13 +41,14 @@ NOT_OF_PROGRAMS = {"order wxyz", "body rates", "rates in radians"}
 EXACT = Design(4, "RK4", "quaternion", "rates", True)
 BOTH = ("no gyroscopic term", "damping", 0.05)
 """Two mistakes that many engines have at once, as installed."""
+_BOTH = f"{BOTH[0]} + {BOTH[1]} {BOTH[2]:g}"
 Found = tuple[Array, Array]
 
 
-def names() -> dict[str, Mistake]:
-    """Return the mistakes by the names in the files: a key, and a number if the signature depends on it."""
-    found = {name: mistake for name, mistake, _ in _all()}
-    return found | {f"{BOTH[0]} + {BOTH[1]} {BOTH[2]:g}": BY_KEY[BOTH[0]]}
+def names() -> dict[str, tuple[Mistake, tuple[float, ...]]]:
+    """Return the mistakes and their numbers by the names in the files: a key, and a number if the signature depends on it."""
+    found = {name: (mistake, numbers) for name, mistake, numbers in _all()}
+    return found | {_BOTH: (BY_KEY[BOTH[0]], ())}
 
 
 def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
@@ -73,7 +74,7 @@ def signatures(motions: Sequence[Motion]) -> list[dict[str, Found]]:
             if (one := _with(motion, mistake, numbers)) is not None:
                 made[name] = one
     for motion, made in zip(motions, out, strict=True):
-        made[f"{BOTH[0]} + {BOTH[1]} {BOTH[2]:g}"] = _solve(Equations(motion.scene, gyroscopic=0.0, damping=BOTH[2]), motion.t)
+        made[_BOTH] = _solve(Equations(motion.scene, gyroscopic=0.0, damping=BOTH[2]), motion.t)
     return out
 
 
