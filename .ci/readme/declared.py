@@ -5,11 +5,9 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import json
-import math
 import os
 import re
 import tomllib
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
@@ -220,13 +218,11 @@ def mistakes() -> str:
     from conservative.benchmarks.verification.motions.signatures import names
 
     rows, kept = [], kept_motions()
-    for name, (mistake, numbers) in names().items():
+    for name, sentence in names().items():
         rows_of = [(motion, each) for motion in kept for each in motion["catches"] if each["mistake"] == name]
         if rows_of:
             best = [max(_over(order, *each) for each in rows_of) for order in (1, 2, 4)]
-            named = {number.name: value for number, value in zip(mistake.numbers, numbers, strict=False)}
-            sentence = mistake.sentence.format_map(defaultdict(lambda: math.nan, named))
-            rows.append([name, sentence.partition(", with a step of")[0], str(len(rows_of)), *map(_factor, best)])
+            rows.append([name, sentence, str(len(rows_of)), *map(_factor, best)])
     return table(["mistake", "what the program does", "motions", "order 1", "order 2", "order 4"], rows)
 
 

@@ -99,7 +99,7 @@ def test_motion(path):
 
 
 def summary():
-    """Return the mistakes that explain most of the failing motions, and the order of the program if it is lower than declared."""
+    """Return the mistakes that explain most of the failing motions, and the order if it is lower than declared."""
     lines, rest = [f"{len(failing)} of {len(tested)} motions failed"], dict(failing)
     for _ in range(3):
         votes = {}

@@ -31,11 +31,10 @@ VALUES: dict[str, tuple[float, ...]] = {
     "rate limit": (7.0, 47.0, 100.0),
     "dead band": (0.001, 0.01),
     "size of the rotor": (0.98,),
-    "sleep": (0.0,),
-    "stale rates": (0.0,),
-    "attitude by normalisation": (0.0,),
 }
-"""Typical numbers of mistakes, SI units; those of a time or a step are not used. Others with numbers have no signature."""
+"""Typical numbers of mistakes, SI units. Others with numbers have no signature."""
+OWN = {"sleep": 0.0, "stale rates": 0.01, "attitude by normalisation": 0.01}
+"""Mistakes whose number is the first step or the step of the program, and an example of it, s."""
 NOT_OF_PROGRAMS = {"order wxyz", "body rates", "rates in radians"}
 """Readings of files by other conventions than PROTOCOL.md has."""
 EXACT = Design(4, "RK4", "quaternion", "rates", True)
@@ -45,10 +44,13 @@ _BOTH = f"{BOTH[0]} + {BOTH[1]} {BOTH[2]:g}"
 Found = tuple[Array, Array]
 
 
-def names() -> dict[str, tuple[Mistake, tuple[float, ...]]]:
-    """Return the mistakes and their numbers by the names in the files: a key, and a number if the signature depends on it."""
-    found = {name: (mistake, numbers) for name, mistake, numbers in _all()}
-    return found | {_BOTH: (BY_KEY[BOTH[0]], ())}
+def names() -> dict[str, str]:
+    """Return the sentences of mistakes by the names in the files: a key, and a number if the signature depends on it."""
+    found = {
+        name: mistake.sentence.format(**{number.name: value for number, value in zip(mistake.numbers, numbers, strict=True)})
+        for name, mistake, numbers in _all()
+    }
+    return found | {_BOTH: f"{found[BOTH[0]]}. {found[f'{BOTH[1]} {BOTH[2]:g}']}"}
 
 
 def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
@@ -56,10 +58,10 @@ def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
         of_program = isinstance(mistake, Reading | Time | SceneMistake | EquationsMistake | Habit | Standstill | Rule)
         if not of_program or key in NOT_OF_PROGRAMS or (isinstance(mistake, Time) and not mistake.of_step):
             continue
-        if not mistake.numbers:
-            yield key, mistake, ()
+        if key in OWN or not mistake.numbers:
+            yield key, mistake, (OWN[key],) if key in OWN else ()
         for value in VALUES.get(key, ()):
-            yield f"{key} {value:g}" if value else key, mistake, (value,)
+            yield f"{key} {value:g}", mistake, (value,)
 
 
 def signatures(motions: Sequence[Motion]) -> list[dict[str, Found]]:

@@ -160,13 +160,13 @@ def test_the_command_replaces_no_other_file(tmp_path):
 
 @pytest.mark.parametrize("order", programs.ORDERS)
 def test_designs_have_their_order(order):
-    """Errors fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.1 of the order."""
+    """Errors of attitudes fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within ORDER_MEASURED of the order."""
     motions = [CATALOGUE["world_tensor"], CATALOGUE["heavy"], CATALOGUE["damped_and_driven"]]
     scale, all_of = programs.sizes(motions), designs(order)
     assert {(each.attitude, each.variable) for each in all_of} == set(product(ATTITUDES, VARIABLES))
     for each in all_of[:: 1 if order < 4 else 5]:
         coarse, fine = (programs.errors(motions, scale, each.run(motions, parts)) for parts in (1, 10))
-        assert np.abs(np.log10(coarse / fine)[:, :2].max(axis=1) - order).max() <= 0.2, each.name
+        assert np.abs(np.log10(coarse / fine)[:, 0] - order).max() <= 0.2, each.name
 
 
 @slow
