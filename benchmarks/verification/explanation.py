@@ -110,6 +110,12 @@ class Explanation:
             return None
         return explain(case, self.trial, made, self.values, self.numbers)
 
+    def refit(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
+        if self.trial is None or self.trial.anew is not None:
+            return None
+        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers])
+
 
 def explain(
     case: Compared,
