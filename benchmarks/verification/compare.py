@@ -66,7 +66,8 @@ class Compared:
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
-    alone decides, it is that. `step` is the step of a program, s; None if it is not known.
+    alone decides, it is that. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
+    which the quaternion of the file changes its sign; None if the file has no quaternions.
     """
 
     scene: Scene
@@ -82,6 +83,7 @@ class Compared:
     effort: Effort = field(default_factory=lambda: Effort(math.inf))
     rounded: tuple[float, float] = (0.0, 0.0)
     step: float | None = None
+    flipped: Any = None
 
     @property
     def from_row(self) -> bool:
@@ -90,7 +92,8 @@ class Compared:
 
     def take(self, rows: Any) -> Compared:
         """Return some of the rows."""
-        return replace(self, t=self.t[rows], data=take_rows(self.data, rows))
+        flipped = None if self.flipped is None else self.flipped[rows]
+        return replace(self, t=self.t[rows], data=take_rows(self.data, rows), flipped=flipped)
 
     def first(self, angle: float, least: int) -> Compared:
         """Return the rows in which the body turns by an angle, rad, or at least so many."""

@@ -19,7 +19,7 @@ from .find_steps import PARTS, STEPS_AT_MOST, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import RULES, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, ROWS, STANDSTILLS, RowHabit, Standstill
+from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -99,6 +99,8 @@ def diagnose(
     good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
     fewest = min(each.numbers for each in good)
     good = [each for each in good if each.numbers == fewest]
+    single = min(len(each.keys) for each in good)
+    good = [each for each in good if len(each.keys) == single]
     named = [each for each in good if _normalised(each)] or good
     return Diagnosis(named, tried, _separate(case, named))
 
@@ -112,8 +114,8 @@ def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
     size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
-    if not size.max() > 3 * largest > 0 or size[0] > 3 * largest:
-        return case
+    if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
+        return case  # no rows, or single ones
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
     return case.rescale(float(size[: len(case.t)].max()))
 
@@ -147,6 +149,8 @@ def _known(mistakes: Any) -> list[Any]:
 def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
     """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
     usable = [each for each in _known(READINGS) if fits(each, case) and (quaternion or not each.quaternions)]
+    if case.from_row and case.scene.free:  # whatever the axes of the world are
+        usable = [each for each in usable if not each.of_world]
     of = {name: [(), *((each,) for each in usable if each.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
     return pairs[1:] + [(each,) for each in usable if each.of == AXES]
@@ -412,26 +416,22 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     noise = np.maximum(np.sqrt((case.error[:, rest] ** 2).mean(axis=1)), 1e-13)
     allowed = np.maximum(1e-9, np.minimum(case.allowed, 10 * noise))
     fine = replace(case, noise=noise, allowed=allowed)
-    places = np.flatnonzero(off)
-    q = to_quaternion(case.exact[0])
-    signs = np.flatnonzero((q[1:] * q[:-1]).sum(axis=1) < 0) + 1
-    near = bool(len(signs)) and all(np.abs(signs - k).min() <= 1 for k in places)
+    places, q = np.flatnonzero(off), to_quaternion(case.exact[0])
+    signs = (q[1:] * q[:-1]).sum(axis=1) < 0 if case.flipped is None else case.flipped[1:]  # the scalar is not negative
+    near = bool(signs.any()) and all(np.abs(np.flatnonzero(signs) + 1 - k).min() <= 1 for k in places)
     gaps = np.diff(places)
     periodic = len(places) > 2 and np.ptp(gaps) == 0
-    stride = case.stride
     for each in ROWS:
-        if each.periodic != periodic or (not each.periodic and not near):
-            continue
-        made = each.change(case.exact, case.data, off)
-        values = {"first": float(places[0] * stride + 1)}
-        values |= {"period": float(gaps[0] * stride)} if periodic else {"rows": float(len(places))}
-        if (np.maximum(*fine.errors(*made)) <= 1e9).all():
-            free = each.change is ROWS[-1].change
-            yield explain(fine, Trial((each,), _rows_again(each)), made, values, numbers=2 + 3 * free)
-
-
-def _rows_again(mistake: RowHabit) -> Callable[[Compared], Solution | None]:
-    return _nowhere
+        if periodic if each.periodic else near:
+            made = each.change(case.exact, case.data, off)
+            values = {"first": float(places[0] * case.stride + 1)}
+            values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
+            yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
+    if not periodic and not near:
+        worst = float(case.error[:, places[0]].max())
+        values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
+        made = ROWS[-1].change(case.exact, case.data, off)
+        yield explain(fine, Trial((BY_KEY["single rows"],), _nowhere), made, values, numbers=9)
 
 
 def _off_rows(error: Array) -> Any:
@@ -461,20 +461,26 @@ def _turned_axes(case: Compared, asked: _Asked) -> Found:
         for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
             U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
             C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
-            yield attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+            yield best and _shortest_turn(best)
+        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
+        size = float((w * right).sum() / ((right * right).sum() or 1.0))
+        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
     trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     found = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
-    best = min(
-        (each for each in found if each is not None),
-        key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])),
-    )
-    turn = Rotation.from_rotvec([*best.values.values()]).as_rotvec().tolist()
-    values = dict(zip(best.values, turn, strict=True))
-    yield replace(best, values=values, sentence=trial.sentence(values))
+    shortest = [_shortest_turn(each) for each in found if each is not None]
+    yield min(shortest, key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
+
+
+def _shortest_turn(found: Explanation) -> Explanation:
+    """Return an explanation by a turn of at most half a revolution."""
+    turn = Rotation.from_rotvec([*found.values.values()]).as_rotvec().tolist()
+    values, trial = dict(zip(found.values, turn, strict=True)), found.trial
+    return replace(found, values=values, sentence=found.sentence if trial is None else trial.sentence(values))
 
 
 def _bodies(case: Compared, asked: _Asked) -> Found:
