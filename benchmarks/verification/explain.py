@@ -67,21 +67,20 @@ def diagnose(
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
-    case = replace(case.take(slice(None, None, stride)), stride=stride)
+    case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(EFFORT))
+    early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
         if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
             continue
         tell(name)
-        limited = replace(whole if search.whole else case, effort=Effort(EFFORT * search.share))
-        if search.whole:
-            limited = limited.first(LONGEST, FEWEST)
-        for each in search.find(limited, _Asked(quaternion, kinds, tuple(tried))):
+        case.effort.left = EFFORT * search.share
+        for each in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
             if each is not None:
                 tried.append(each)
-            if limited.effort.over:
+            if case.effort.over:
+                over = True
                 break
-        over |= limited.effort.over
         if search.ends and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
@@ -415,7 +414,7 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     rest = ~off
     noise = np.maximum(np.sqrt((case.error[:, rest] ** 2).mean(axis=1)), 1e-13)
     allowed = np.maximum(1e-9, np.minimum(case.allowed, 10 * noise))
-    fine = replace(case, noise=noise, allowed=allowed)
+    fine = case.change(noise=noise, allowed=allowed)
     places, q = np.flatnonzero(off), to_quaternion(case.exact[0])
     signs = (q[1:] * q[:-1]).sum(axis=1) < 0 if case.flipped is None else case.flipped[1:]  # the scalar is not negative
     near = bool(signs.any()) and all(np.abs(np.flatnonzero(signs) + 1 - k).min() <= 1 for k in places)
