@@ -30,9 +30,10 @@ from .solution import Equations, closed, truth
 from .trials import by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500  # rows that are explained
-EFFORT = 10_000  # stretches, after which the search ends: about 20 s of an idle core
+EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle core
 MOST_BREAKS = 50  # of loads, if numbers are fitted
 STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
+LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
 SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
@@ -216,6 +217,8 @@ def _moves(case: Compared, found: Explanation | None) -> bool:
     """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
     if found is None or found.made is None:
         return False
+    if not found.explains:
+        return True
     return bool((case.apart(found.made, _still(case)) > SHOWN * case.allowed).any())
 
 
@@ -570,35 +573,36 @@ def _other_body(case: Compared) -> Explanation:
 
 
 def _steps(case: Compared, asked: _Asked) -> Found:
-    """Yield integrators, also of the scene with the number that was fitted best."""
-    found = [*find_steps(case)]
-    yield from found
-    if any(each.explains for each in (*found, *asked.tried)):
-        return
-    sized = [
-        each for each in asked.tried if len(each.keys) == 1 and isinstance(BY_KEY[each.keys[0]], SceneMistake) and each.values
-    ]
-    for each in sorted(sized, key=lambda each: each.size)[:1]:
+    """Yield integrators, of the scene whose number was fitted best if it leaves little, or of the scene."""
+    sized = [each for each in asked.tried if each.keys[1:] == () and "factor" in each.values and each.rest < LITTLE]
+    for each in sorted(sized, key=lambda each: (each.size, each.keys))[:1]:
         mistake = BY_KEY[each.keys[0]]
-        assert isinstance(mistake, SceneMistake)
-        if each.rest > PROVEN:
+        if not isinstance(mistake, SceneMistake) or each.explains:
             continue
-        factor = each.values["factor"]
-        for rounded in (float(f"{factor:.{digits}g}") for digits in (2, 3, 4, 16)):
-            other = mistake.change(case.scene, rounded)
-            if other is None:
-                continue
-            both = list[Explanation]()
-            for one in find_steps(replace(case, scene=other)):
-                trial = one.trial
-                assert trial is not None
-                assert one.made is not None
-                joint = Trial((mistake, *trial.mistakes), _in_scene(mistake, rounded, trial))
-                some = case.take(slice(0, len(one.made[0])))
-                both.append(explain(some, joint, one.made, {"factor": rounded} | one.values))
-            yield from both
-            if any(one.explains for one in both):
-                return
+        factor = _round_factor(case, each)
+        other = mistake.change(case.scene, factor)
+        found = [*find_steps(replace(case, scene=other))] if other is not None else []
+        for one in found:
+            if one.trial is not None and one.made is not None:
+                both = Trial((mistake, *one.trial.mistakes), _in_scene(mistake, factor, one.trial))
+                yield explain(case.take(slice(0, len(one.made[0]))), both, one.made, {"factor": factor} | one.values)
+        if any(one.explains for one in found):
+            return
+    if not any(each.explains for each in asked.tried):
+        yield from find_steps(case)
+
+
+def _round_factor(case: Compared, found: Explanation) -> float:
+    """Return the factor with the fewest digits that leaves at most twice as much as the one that was fitted."""
+    factor, trial = found.values["factor"], found.trial
+    motion = None if trial is None else trial.build(case)
+    for digits in (1, 2, 3, 4) if motion is not None else ():
+        rounded = float(f"{factor:.{digits}g}")
+        if rounded != 1 and motion is not None:
+            R, w = case.evaluate(motion, np.append(np.zeros(6), rounded)[None])
+            if case.size(case.errors(R[0], w[0])) <= 2 * found.size:
+                return rounded
+    return factor
 
 
 def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[Compared], Solution | None]:
@@ -660,14 +664,14 @@ SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1),
-    "habits": Search(_habits, frozenset({"habits"}), 0.2, least=2),
+    "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
-    "other times": Search(_times, frozenset({"times"}), 0.05),
-    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.1),
+    "other times": Search(_times, frozenset({"times"}), 0.1),
+    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
-    "integrators": Search(_steps, frozenset({"steps"}), 0.2, ends=True),
+    "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
-    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
-    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.2),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.15),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.15),
 }
 """Parts of the search by the work that they do, in their order."""

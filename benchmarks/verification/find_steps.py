@@ -57,7 +57,7 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
         with np.errstate(all="ignore"):
             for number in range(last + 1):
                 if number % CHUNK == 0:
-                    case.effort.spend(CHUNK_EFFORT)
+                    case.effort.spend(CHUNK_EFFORT * weight)
                     if case.effort.over:
                         kept += [y * np.nan] * (n - len(kept))
                         break
@@ -209,13 +209,11 @@ class Linearised:
             found[parts], factor = self.share(method, parts)
             if factor <= 0:
                 break
-            parts = int(
-                np.clip(
-                    np.rint(parts * max(factor, 1e-12) ** (-1 / order)),
-                    1,
-                    max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used)),
-                )
-            )
+            most = max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used))
+            wanted = parts * max(factor, 1e-12) ** (-1 / order)
+            if wanted > 2 * most:
+                break  # its errors are too large with the shortest step
+            parts = int(np.clip(np.rint(wanted), 1, most))
         return min((left, n) for n, left in found.items())
 
     def others(self, method: Step, parts: int) -> list[int]:
