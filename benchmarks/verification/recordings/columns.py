@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -43,7 +44,7 @@ _HORIZON = re.compile(r"latitude|longitude|altitudemsl|geodetic")
 _SPREAD = re.compile(r"covariance|variance|bias|std|uncertainty|sigma(?=gyro|w|att)")
 _LOOKS = re.compile(
     r"quat|orientation|attitude|euler|roll|pitch|yaw|heading|bank(angle)?$|rotmat|dcm|rotvec|rodrigues|mrp|axisangle|gyro|"
-    r"ang(ular)?(vel|rate)|omega|bodyrate|rotationrate|^(phi|theta|psi)$|^q[wxyz0-4]$|^w[xyz]$"
+    r"ang(ular)?(vel|rate)|omega|bodyrate|rotationrate|^(phi|theta|psi)$|^w[xyz]$"
 )
 """Names of attitudes and rates, more than are understood."""
 _OTHERWISE = re.compile(
@@ -81,21 +82,7 @@ def choose(path: Path, layout: Layout, options: Options) -> Layout:
         if not kinds and not chosen.get("rates"):
             raise BadInput("run", f"{path} with angles whose sequence is not known", "their sequence, such as --euler zyx")
     for kind in ("time", "rates", *kinds[:1]):
-        if kind not in chosen:
-            layout.used[kind] = {}
-            continue
-        usual: str | None = "s" if kind == "time" else "rad"
-        texts = [split_name(name)[1] for name in chosen[kind]]
-        if None in texts and kind in ("rates", "angles", "rotation vector"):
-            usual = None if "/" in (options.units or "") and kind != "rates" else options.units
-            layout.notes += ["unit"] * (usual is not None)
-        plain = kind not in ("time", "rates", "angles", "rotation vector")  # a unit behind a quaternion is no unit
-        sizes = [math.nan if (unit := text or usual) is None else 1.0 if plain else UNITS.get(unit, 0.0) for text in texts]
-        if 0.0 in sizes:
-            raise no_unit(path, chosen[kind])
-        if kind == "time" and len(chosen[kind]) == 2:
-            sizes = [1.0, 1e-6 if re.search("micro|usec", chosen[kind][1].lower()) else 1e-9]
-        layout.used[kind] = dict(zip(chosen[kind], sizes, strict=True))
+        layout.used[kind] = _find_sizes(path, layout, kind, chosen[kind], options) if kind in chosen else {}
     taken = [name for part in layout.used.values() for name in part]
     if len(set(taken)) < len(taken) or any(names.count(name) > 1 for name in taken):
         twice = next(name for name in taken if names.count(name) > 1 or taken.count(name) > 1)
@@ -104,17 +91,41 @@ def choose(path: Path, layout: Layout, options: Options) -> Layout:
         if name not in taken:
             layout.unused.setdefault(name, "neither a time nor an attitude nor a rate by its name")
     others = {name for part in layout.also.values() for name in part}
-    layout.doubtful = [name for name in layout.unused if not options.columns and name not in others and _looks(name, layout)]
+    if not options.columns:
+        layout.doubtful = [name for name in _find_looks(layout) if name not in others]
     return layout
 
 
-def _looks(name: str, layout: Layout) -> bool:
-    """Return whether a column that is not used looks like a part of the motion."""
-    key = split_name(re.split(r"[./:]", name)[-1])[0]
-    key = key if len(key) > 2 else split_name(name)[0]
-    if layout.unused[name] in (MOVES, HORIZON, SEQUENCE):
-        return True
-    return bool(_LOOKS.search(key)) and not _OTHERWISE.search(key) and not _SPREAD.search(split_name(name)[0])
+def _find_sizes(path: Path, layout: Layout, kind: str, names: Sequence[str], options: Options) -> dict[str, float]:
+    """Return the sizes of the units of columns, nan for those that no name and no option has."""
+    if kind == "time" and len(names) == 2:  # seconds and their fractions
+        return dict(zip(names, [1.0, 1e-6 if re.search("micro|usec", names[1].lower()) else 1e-9], strict=True))
+    usual: str | None = "s" if kind == "time" else "rad"
+    texts, united = [split_name(name)[1] for name in names], kind in ("rates", "angles", "rotation vector")
+    if None in texts and united:
+        usual = None if "/" in (options.units or "") and kind != "rates" else options.units
+        layout.notes += ["unit"] * (usual is not None)
+    if not united and kind != "time":  # a unit behind a quaternion is no unit
+        return dict.fromkeys(names, 1.0)
+    sizes = [math.nan if (unit := text or usual) is None else UNITS.get(unit, 0.0) for text in texts]
+    if 0.0 in sizes:
+        raise no_unit(path, names)
+    return dict(zip(names, sizes, strict=True))
+
+
+def _find_looks(layout: Layout) -> list[str]:
+    """Return the columns that are not used and look like parts of the motion."""
+    found, whole = list[str](), {name: split_name(name)[0] for name in layout.unused}
+    sets = Counter(key[:-1] for key in whole.values() if re.fullmatch("q[a-z]*[wxyz0-4]", key))
+    for name, key in whole.items():
+        last = split_name(re.split(r"[./:]", name)[-1])[0]
+        last = last if len(last) > 2 else key
+        looks = _LOOKS.search(last) or sets[key[:-1]] > 2
+        if layout.unused[name] in (MOVES, HORIZON, SEQUENCE) or (
+            looks and not _OTHERWISE.search(last) and not _SPREAD.search(key)
+        ):
+            found.append(name)
+    return found
 
 
 def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options) -> None:

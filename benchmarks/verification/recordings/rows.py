@@ -105,9 +105,7 @@ class Cleaner:
                 "a value that is not a finite number": ~np.isfinite(values).all(axis=1),
                 f"a value beyond {LARGEST:g}": (np.abs(values) > LARGEST).any(axis=1),
                 "a quaternion of norm 0": np.linalg.norm(rest, axis=1) < 1e-3 if kind == "quaternion" else none,
-                "a matrix that is not a rotation": (
-                    np.linalg.det(rest.reshape(-1, 3, 3)) < 1e-3 if kind == "matrix" else none
-                ),
+                "a matrix that is not a rotation": (np.linalg.det(rest.reshape(-1, 3, 3)) < 1e-3 if kind == "matrix" else none),
             }
 
     def _refuse(self, values: Array, numbers: Array) -> None:
