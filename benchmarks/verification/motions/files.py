@@ -14,7 +14,7 @@ from conservative.attitude import Array
 from conservative.files import make_folder, write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, compare, measure
+from .programs import ANGLES, FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, compare, measure
 
 NEAR = 0.5
 """Largest sum of the squares of the logarithms of four ratios of errors, of a mistake that is named."""
@@ -121,6 +121,22 @@ def verdict(motion: dict[str, Any], order: int, angle: float, single: bool, R: A
     known = np.array([[each[name] for name in QUANTITIES] for each in motion["catches"]])
     apart = (np.log(np.maximum(found, allowed) / np.maximum(known, allowed)) ** 2).sum(axis=1)
     return float((found / allowed).max()), motion["catches"][apart.argmin()]["mistake"] if apart.min() < NEAR else ""
+
+
+def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[float, float]:
+    """Return the largest allowed errors of a program of an order at |w| h = 0.01: of the attitude, rad, and relative, of rates.
+
+    Order 3 and a program that chooses its steps (None) have the tolerances of order 2.
+    """
+    kept = read(motion.name)
+    (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (tested_order(order), ANGLES[-1]))
+    more = kept["single"] if single else 0.0
+    return row["attitude"] + more, row["rates"] + more
+
+
+def tested_order(order: int | None) -> int:
+    """Return the order whose tolerances a program of an order has to meet; None is a program that chooses its steps."""
+    return {1: 1, 2: 2, 3: 2, None: 2}.get(order, 4)
 
 
 def marks() -> Iterator[tuple[str, str]]:

@@ -1,47 +1,21 @@
-"""A recorded motion: the verdict, what was compared, what explains its error, and errors and drifts."""
+"""A recorded motion, or two: what was compared, what explains the error, and errors and drifts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from conservative.benchmarks.verification.finding import Verdict, Verification
+from conservative.benchmarks.verification.recordings.two import Two
 from conservative.benchmarks.verification.recordings.verdict import Details, Unit
 
 from ..document.cells import bound
-from ..document.model import Document, Emphasis, Items, Paragraph, Table, filled
+from ..document.model import Block, Items, Paragraph, Section, Table, filled
 
 LISTED = 12
 """Mistakes that the table lists."""
 
 
-def build(verification: Verification) -> Document:
-    """Return the document of the verification of a recording."""
-    name, wrong = verification.subject, verification.verdict is Verdict.WRONG
-    blocks = [Paragraph(f"{verification.sentence}.", Emphasis.LEAD), *recording_blocks(verification)]
-    failures = [f"{verification.sentence}."] if wrong else []
-    return Document("conservative judge", f"Judged: {name}", blocks, data=as_data(verification), failures=failures)
-
-
-def as_data(verification: Verification) -> dict[str, Any]:
-    """Return the verification of a recording for JSON, without its series."""
-    details = verification.details
-    assert isinstance(details, Details)
-    (finding,) = verification.findings
-    shown = {name: value for name, value in vars(details).items() if name not in ("times", "series")}
-    return {
-        "judged": verification.subject,
-        "verdict": verification.verdict,
-        "right": verification.verdict is Verdict.RIGHT,
-        "reason": verification.reason,
-        "undecided": finding.detail if verification.verdict is Verdict.UNDECIDED else "",
-        "causes": finding.causes,
-        "notes": verification.notes,
-        **shown,
-    }
-
-
-def recording_blocks(verification: Verification) -> list[Any]:
+def recording_blocks(verification: Verification) -> list[Block]:
     """Return the blocks on a recording that follow the sentence of its verdict: noise, mistakes, quantities, columns."""
     details = verification.details
     assert isinstance(details, Details)
@@ -63,7 +37,10 @@ def recording_blocks(verification: Verification) -> list[Any]:
         heading = "No known mistake explains the error" + (": none of these candidates is proven." if candidates else ".")
     compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in details.used.items())
     used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
-    unused = [f"Not used: {column}, {reason}." for column, reason in details.unused.items()]
+    reasons = sorted(set(details.unused.values()), key=list(details.unused.values()).index)
+    unused = [
+        f"Not used: {', '.join(name for name, why in details.unused.items() if why == each)}: {each}." for each in reasons
+    ]
     quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
     tried = [[each.name, _amount(each.left, details.units)] for each in details.tried[:LISTED]]
     return filled(
@@ -74,6 +51,13 @@ def recording_blocks(verification: Verification) -> list[Any]:
         Table(["mistake", "error that is left"], tried),
         Items.of([*used, *unused, *verification.notes]),
     )
+
+
+def two_blocks(verification: Verification) -> list[Block]:
+    """Return the blocks on two recordings: those of each, in a section of its own."""
+    details = verification.details
+    assert isinstance(details, Two)
+    return [Section(f"{each.subject}: {each.verdict}", recording_blocks(each)) for each in (details.first, details.second)]
 
 
 def _amount(errors: Sequence[float], units: Sequence[Unit]) -> str:

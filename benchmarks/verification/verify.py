@@ -1,0 +1,237 @@
+"""Verification of anything: recordings, methods, engines, programs and model files, each by the checks that fit it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from shutil import which
+from typing import TYPE_CHECKING, Any
+
+from conservative import registry
+from conservative.check import choice
+from conservative.errors import BadInput
+from conservative.programs import list_programs
+from conservative.scene import Scene
+
+from .finding import CHECKS, Verification
+
+if TYPE_CHECKING:
+    from conservative.method import Method
+
+Tell = Callable[[float, str], object]
+"""Called with the share of the work that is done, 0 to 1, and the next piece of it."""
+
+
+class Kind(StrEnum):
+    """What a subject is."""
+
+    RECORDING = "recording"
+    METHOD = "method"
+    ENGINE = "engine"
+    PROGRAM = "program"
+    MODEL = "model file"
+
+
+CHECKS_OF: dict[Kind, tuple[str, ...]] = {
+    Kind.RECORDING: ("recording",),
+    Kind.METHOD: ("motions", "order", "repeatability", "pairs"),
+    Kind.ENGINE: ("motions", "order", "repeatability", "pairs"),
+    Kind.PROGRAM: ("protocol", "motions", "order", "repeatability", "pairs", "times"),
+    Kind.MODEL: ("bodies",),
+}
+"""Checks of each kind of subject, in their order."""
+MODELS = (".urdf", ".sdf", ".mjcf", ".xml", ".usd", ".usda", ".usdc", ".usdz")
+"""Suffixes of model files."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A subject as the user wrote it, its kind, and its file or None."""
+
+    text: str
+    kind: Kind
+    path: Path | None = None
+
+
+def kind_of(text: str) -> Kind:
+    """Return the kind of a subject: a file, the name of a method or an engine, or a program. Raise `BadInput`."""
+    path = Path(text)
+    if path.is_file():
+        if path.suffix.lower() in MODELS:
+            return Kind.MODEL
+        return (
+            Kind.PROGRAM
+            if os.access(path, os.X_OK) and not path.suffix.lower().startswith((".csv", ".json"))
+            else Kind.RECORDING
+        )
+    words = _words(text)
+    if len(words) > 1 and which(words[0]):
+        return Kind.PROGRAM
+    name = registry.read_name(text, "subject") if len(words) == 1 and not set("/\\") & set(text) else None
+    if name is not None and name.base in list_programs():
+        return Kind.PROGRAM
+    if name is not None and name.base in registry.list_engines():
+        return Kind.ENGINE
+    if name is not None and name.base in registry.list_methods():
+        return Kind.METHOD
+    if len(words) == 1 and which(text):
+        return Kind.PROGRAM
+    allowed = "a file that exists, the name of an engine, a method or a program, or the command line of a program"
+    raise BadInput("subject", repr(text), allowed)
+
+
+def _words(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError:
+        return [text]
+
+
+def expand(texts: Sequence[str]) -> list[Subject]:
+    """Return the subjects of texts; a folder stands for its recordings and model files, by name. Raise `BadInput`."""
+    subjects = []
+    for text in texts:
+        if (folder := Path(text)).is_dir():
+            files = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in (*MODELS, *TABLES))
+            if not files:
+                raise BadInput(
+                    "subject", f"the folder {text!r}", f"a folder with files that end in {', '.join((*TABLES, *MODELS))}"
+                )
+            subjects += [Subject(str(path), kind_of(str(path)), path) for path in files]
+        else:
+            kind = kind_of(text)
+            subjects.append(Subject(text, kind, Path(text) if kind in (Kind.RECORDING, Kind.MODEL) else None))
+    return subjects
+
+
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".a", ".json", ".jsonl", ".ndjson", ".parquet", ".gz")
+"""Suffixes of recordings in a folder."""
+
+
+def verify(
+    subjects: str | os.PathLike[str] | Method | Sequence[str | os.PathLike[str] | Method],
+    body: str | Scene | None = None,
+    *,
+    engines: Sequence[str] = (),
+    only: Sequence[str] = (),
+    pairs: Sequence[str] = (),
+    search: Sequence[Path] = (),
+    start: str = "row",
+    error: float | None = None,
+    tell: Tell = lambda share, what: None,
+    **reading: Any,
+) -> list[Verification]:
+    """Verify subjects, and name the mistakes that explain what is wrong.
+
+    Parameters
+    ----------
+    subjects
+        Files of recorded motions, names of methods, engines or programs, command lines of programs, model files, folders of
+        files, or methods themselves. Two recordings are also compared with each other.
+    body
+        Scene, its name or its file, for recordings.
+    engines
+        Engines that load model files; by default those that are installed.
+    only
+        Names of checks, see `finding.CHECKS`; by default all that fit a subject.
+    pairs
+        Names of pairs of descriptions; by default all.
+    search
+        Folders of meshes and packages, for model files.
+    start, error, **reading
+        For recordings: "row" or "scene", the allowed error, and the options of `recordings.table.Options`.
+    tell
+        Called with the share of the work that is done and the next piece of it.
+
+    Returns
+    -------
+    list of Verification
+        One for each subject; one for two recordings.
+
+    Raises
+    ------
+    BadInput
+        A subject, a body or an option is unknown, or an option is not used by any subject.
+    MissingEngine
+        An engine is not installed.
+    """
+    given = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
+    methods: list[Any] = [each for each in given if not isinstance(each, str | os.PathLike)]
+    found = expand([os.fspath(each) for each in given if isinstance(each, str | os.PathLike)])
+    for name in only:
+        choice("only", name, tuple(CHECKS))
+    kinds = {each.kind for each in found} | ({Kind.METHOD} if methods else set())
+    _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, error=error, **reading)
+    if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
+        allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
+        raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
+    results: list[Verification] = []
+    if files := [each.path for each in found if each.kind is Kind.MODEL and each.path]:
+        from .bodies import verify_files
+
+        results += verify_files(files, engines, tell, search)
+    if tables := [each.path for each in found if each.kind is Kind.RECORDING and each.path]:
+        results += _verify_recordings(tables, body, start, error, tell, reading)
+    for each in found:
+        if each.kind is Kind.PROGRAM:
+            results.append(_verify_program(each.text, only, pairs, tell))
+        elif each.kind in (Kind.ENGINE, Kind.METHOD):
+            from ..studies.selection import methods as select  # here: recordings need no kernels
+
+            results += [_verify_method(method, each.kind, only, pairs, tell) for method in select([each.text])]
+    return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
+
+
+def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
+    from .programs import verify_method
+
+    return verify_method(method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell)
+
+
+def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
+    from conservative.references.environments.programs import find_program, read_program
+
+    from .programs import verify_program
+
+    checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
+    return verify_program(text, find_program(text) or read_program(text, "program"), checks, pairs, tell)
+
+
+def _verify_recordings(
+    files: Sequence[Path], body: str | Scene | None, start: str, error: float | None, tell: Tell, reading: Mapping[str, Any]
+) -> Iterator[Verification]:
+    """Yield the verification of each recording; of two recordings one, which also compares them."""
+    from .recordings import table, verdict
+
+    if body is None:
+        raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
+    scene = registry.scene(body) if isinstance(body, str) else body
+    recordings = [(path.name, table.read(path, table.Options(**reading))) for path in files]
+    if len(recordings) == 2:
+        from .recordings.two import verify_two
+
+        yield verify_two(scene, *recordings, from_row=start == "row", error=error, tell=lambda what: tell(0.0, what))
+        return
+    for name, recording in recordings:
+        yield verdict.verify_recording(
+            scene, recording, start == "row", error, lambda what, name=name: tell(0.0, f"{name}: {what}"), name
+        )
+
+
+USED_BY: dict[str, tuple[Kind, ...]] = {
+    "engines": (Kind.MODEL,),
+    "search": (Kind.MODEL,),
+    "pairs": (Kind.METHOD, Kind.ENGINE, Kind.PROGRAM),
+}
+"""Kinds of subjects that use an option; all others are of recordings."""
+
+
+def _refuse_unused(kinds: set[Kind], **options: Any) -> None:
+    for name, value in options.items():
+        users = USED_BY.get(name, (Kind.RECORDING,))
+        if value not in (None, (), [], "") and not kinds & set(users):
+            raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
