@@ -219,7 +219,7 @@ LOST = Apart(math.nan, math.nan)
 WILD = 100.0
 """A motion is lost if its rates exceed so many times the largest one at the start."""
 GAIN = 0.5
-"""Share of its energy that a motion may gain. Otherwise the step is too long, and a second motion that is lost proves nothing."""
+"""Share of its energy that a motion may gain; otherwise the step is too long, and a lost second motion shows nothing."""
 
 
 def _kept(one: Description, samples: Samples) -> bool:
