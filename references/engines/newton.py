@@ -36,7 +36,7 @@ ORDERS = {
 ENGINE = {
     "package": "newton[sim]",  # without the extra it lacks MuJoCo
     "module": "newton",
-    "requirements": ("usd-core<26.9", "newton-usd-schemas", "scipy"),  # its importer of USD; the extra `importers` takes 1 GB
+    "requirements": ("usd-core<26.9", "newton-usd-schemas", "scipy"),  # its importer of USD; its extra `importers` takes 1 GB
     "oldest": "1.8",  # earlier versions build and step models in other ways
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,

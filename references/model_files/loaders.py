@@ -29,7 +29,7 @@ def probe(engine, path, kind, cases):
         try:
             accelerate = LOADERS[engine](path, kind)
         except (NotImplementedError, ImportError) as error:
-            raise NotImplementedError(f"it does not support this: {error}" if str(error) else "") from None
+            raise NotImplementedError(f"it does not support this: {error}") from None
         except (Exception, SystemExit) as error:
             answer["refused"] = f"{type(error).__name__}: {' '.join(str(error).split())}"
         finally:
@@ -45,7 +45,7 @@ def probe(engine, path, kind, cases):
 
 def _choose(kind, **readers):
     if readers.get(kind) is None:
-        raise NotImplementedError
+        raise NotImplementedError(f"no loader for {kind.upper()}")
     return readers[kind]
 
 

@@ -47,9 +47,11 @@ DIGITS = "the digits of the file leave open if a body is like this"
 class Model(Reading):
     """A body of a model file, and what its readers make of it.
 
+    `file` is the name of the file, and `label` has the name of the body as well if the file has several.
     `reference` is the body by the `reader`, which is "" if none is installed, and `own` that by this package; or None, and why.
     """
 
+    file: str = ""
     label: str = ""
     body: Body = field(default_factory=Body)
     kind: str = ""
@@ -171,7 +173,8 @@ def read_here(path: Path, label: str, folder: Path, search: Sequence[Path] = ())
         bodies = split(path, kind, folder, search)
     models, refused = [], list[tuple[str, BadInput]]()
     for body in bodies:
-        model = Model(label=f"{label}: {body.name}" if len(bodies) > 1 else label, body=body, kind=kind, notes=[*body.notes])
+        name = f"{label}: {body.name}" if len(bodies) > 1 else label
+        model = Model(file=label, label=name, body=body, kind=kind, notes=[*body.notes])
         try:
             with _sentences(path):
                 _read(model, [body.path.parent, path.parent, *search])
