@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -33,13 +32,13 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
     other = {f"{each.subject}: {each.case}": each.detail for each in some if each.relation not in (*NOT_RUN, *PLAIN)}
-    scripts = [Item(each.script, each.script_file) for each in some if each.script]
+    scripts = "With `--scripts FOLDER`, the pairs that differ are scripts of the engine." if any(each.script for each in some) else ""
     return filled(
         Items([Item(group[0].detail, _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
         *(_table(engine, [each for each in some if each.subject == engine]) for engine in engines),
         Items([Item(text, what) for what, text in other.items()]),
-        Items(scripts),
+        Paragraph(scripts) if scripts else None,
         Paragraph(TERMS) if some else None,
     )
 
@@ -91,20 +90,3 @@ def _reduced(finding: PairFinding) -> list[str]:
     scale = number(finding.scale) if finding.scale else DASH
     steps = f"{one.n_steps} x {number(one.dt)}"
     return [finding.subject, finding.pair, moments, number(one.mass), field, rates, steps, scale, command(finding)]
-
-
-def changes(versions: Sequence[tuple[str, Sequence[tuple[str, Iterable[Finding]]]]]) -> list[str]:
-    """Return a sentence for each pair that began or ceased to differ from one version of an engine to the next.
-
-    `versions` are names with, for each setting in the same order, its text and the findings on it.
-    """
-    texts = []
-    for (before, old), (after, new) in pairwise(versions):
-        for (_, were), (setting, are) in zip(old, new, strict=True):
-            verdicts = {each.case: each.verdict for each in were if isinstance(each, PairFinding)}
-            for now in are:
-                was = verdicts.get(now.case)
-                if isinstance(now, PairFinding) and was and (was is Verdict.WRONG) != (now.verdict is Verdict.WRONG):
-                    what = now.detail if now.verdict is Verdict.WRONG else now.relation.value
-                    texts.append(f"{setting or 'default'}: {now.case}, {before} → {after}: {what}")
-    return texts

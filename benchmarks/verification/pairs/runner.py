@@ -231,9 +231,9 @@ def runner_of(method: Method) -> Runner:
 
 
 def _others(one: Description, n: int) -> list[Description]:
-    """Return n bodies unlike the given one, with the same steps."""
+    """Return n bodies unlike the given one, with the same axes and steps."""
     factors = np.random.default_rng(7).uniform(0.8, 1.2, (n, 4))
-    return [replace(one, w0=one.w0 * factor[:3], inertia=one.inertia * factor[3]) for factor in factors]
+    return [replace(one, w0=one.w0 * f[:3], mass=one.mass * f[3], inertia=one.inertia * f[3]) for f in factors]
 
 
 def run(runner: Runner, first: Description, one: Description, how: str, model: Callable[[], Samples]) -> Samples:

@@ -265,7 +265,7 @@ def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) ->
         allowed += DIGITS * max(engine.runner.digits.resolution(each) for each in (samples, raw))
     if pair.variant == "time":  # which is rounded, and so is each step
         allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(one.w0)) * one.n_steps
-    if allowed < apart and pair.variant in OF_INERTIA:
+    if allowed < 10 * apart and pair.variant in OF_INERTIA:
         allowed = max(allowed, engine.rounding(second, raw))
     return Apart(apart, allowed, "", scale)
 
@@ -280,6 +280,7 @@ class _Pair:
 
     engine: Engine
     method: Method
+    subject: str
     body: str
     pair: Pair
     one: Description
@@ -287,7 +288,7 @@ class _Pair:
     def finding(self, relation: Relation, apart: Apart = LOST, detail: str = "", **repeat: object) -> PairFinding:
         by = "bits" if self.pair.same_bits else "rounding"
         return PairFinding(
-            self.method.name,
+            self.subject,
             "pairs",
             f"{self.body}: {self.pair.name}",
             VERDICTS[relation],
@@ -460,13 +461,11 @@ def select_pairs(names: Sequence[str]) -> tuple[Pair, ...]:
     return tuple(pair for pair in PAIRS if not names or pair.name in names)
 
 
-def count_pairs(names: Sequence[str] = ()) -> int:
-    """Return the number of findings on one engine."""
-    return sum(len(pair.bodies) for pair in select_pairs(names))
-
-
 def verify_pairs(
-    method: Method, names: Sequence[str] = (), tell: Callable[[str], object] = lambda what: None
+    method: Method,
+    names: Sequence[str] = (),
+    tell: Callable[[str], object] = lambda what: None,
+    subject: str = "",
 ) -> Iterator[PairFinding]:
     """Yield the finding on every pair of every body in an engine, program or method. No verdict depends on times of runs.
 
@@ -478,6 +477,8 @@ def verify_pairs(
         Names of pairs, by default all.
     tell
         Function that is called with a text before each pair.
+    subject
+        Name in the findings, by default the name of the method.
 
     Raises
     ------
@@ -492,6 +493,6 @@ def verify_pairs(
         for body, one in BODIES.items():
             for pair in pairs:
                 if body in pair.bodies:
-                    tell(f"{method.name}: {body}, {pair.name}")
-                    yield _Pair(engine, method, body, pair, one).compare()
+                    tell(f"{body}, {pair.name}")
+                    yield _Pair(engine, method, subject or method.name, body, pair, one).compare()
             engine.forget()
