@@ -93,9 +93,9 @@ def test_our_guide_s_program_is_right(option, tmp_path):
 class Noted(Runner):
     """Bodies with constant rates, which depend on the description, so that pairs are reduced; it keeps all requests."""
 
-    def __init__(self, requests):
+    def __init__(self, requests, fault):
         super().__init__(registry.method("reduced"))
-        self.requests = requests
+        self.requests, self.fault = requests, fault
 
     def has(self, variant):
         return True
@@ -108,7 +108,7 @@ class Noted(Runner):
 
     def model(self, one):
         self.requests.append(one.numbers)
-        fault, n = 1e-3 * np.sin(one.R0[0, 0] + one.inertia.max() + one.dt + len(one.variant)), one.grid.n_samples
+        fault, n = self.fault * np.sin(one.R0[0, 0] + one.inertia.max() + one.dt + len(one.variant)), one.grid.n_samples
         return lambda: (np.tile(one.R0, (n, 1, 1)), np.tile(one.w0 * (1 + fault), (n, 1)))
 
     def many(self, bodies, number):
@@ -150,10 +150,11 @@ def check_request(given):
 def test_requests_are_as_protocol_md_promises(monkeypatch):
     """Of every pair and body, all trials of a reduction, and of bodies with any centre and axes."""
     requests, random = [], np.random.default_rng(3)
-    monkeypatch.setattr(verify, "runner_of", lambda method: Noted(requests))
-    found = list(verify_pairs(registry.method("reduced")))
-    assert sum(each.verdict is Verdict.WRONG for each in found) > 20  # measured 33
-    for _ in range(20):
+    for fault, names in ((0.0, ()), (1e-3, ("turned world", "length x 10^k"))):
+        monkeypatch.setattr(verify, "runner_of", lambda method, fault=fault: Noted(requests, fault))
+        found = [each.verdict for each in verify_pairs(registry.method("reduced"), names)]
+        assert found.count(Verdict.WRONG) == (4 if fault else 0)
+    for _ in range(10):
         R, com = rotation_about(random.normal(size=3), random.uniform(0, 3)), random.normal(size=3)
         one = replace(BODY, inertia=R @ BODY.inertia @ R.T, com=com, gravity=random.uniform(1, 9))
         one, _ = to_principal(one)
