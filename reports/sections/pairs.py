@@ -11,7 +11,7 @@ from conservative.benchmarks.verification.finding import Finding, Verdict
 from conservative.benchmarks.verification.pairs.verify import PairFinding, Relation
 
 from ..document.cells import DASH, number
-from ..document.model import Block, Cell, Grade, Item, Items, Paragraph, Table, filled
+from ..document.model import Block, Cell, Grade, Item, Items, Paragraph, Row, Table, filled
 
 TERMS = (
     "A pair is two descriptions of one motion of a body. Both motions have to be equal: bit for bit where the arithmetic is "
@@ -19,6 +19,7 @@ TERMS = (
     "the difference goes away with the step: the engine has two schemes for one body."
 )
 """Explanation of the tables."""
+SCRIPTS = "With `--scripts FOLDER`, the command writes the pairs that differ as scripts in the engine's own language."
 NOT_RUN = (Relation.NOT_AVAILABLE, Relation.UNSUPPORTED, Relation.NOT_RUN)
 """Relations that tables show as a dash."""
 GRADES = {Verdict.RIGHT: Grade.GOOD, Verdict.WRONG: Grade.BAD, Verdict.UNDECIDED: Grade.FAIR, Verdict.NOT_TESTED: Grade.NONE}
@@ -32,13 +33,15 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
     other = {f"{each.subject}: {each.case}": each.detail for each in some if each.relation not in (*NOT_RUN, *PLAIN)}
-    scripts = "With `--scripts FOLDER`, the pairs that differ are scripts of the engine." if any(each.script for each in some) else ""
+    scripts = (
+        "With `--scripts FOLDER`, the pairs that differ are scripts of the engine." if any(each.script for each in some) else ""
+    )
     return filled(
         Items([Item(group[0].detail, _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
         *(_table(engine, [each for each in some if each.subject == engine]) for engine in engines),
         Items([Item(text, what) for what, text in other.items()]),
-        Paragraph(scripts) if scripts else None,
+        Paragraph(SCRIPTS) if any(each.script for each in some) else None,
         Paragraph(TERMS) if some else None,
     )
 
@@ -68,11 +71,12 @@ def command(finding: PairFinding) -> str:
 def _table(engine: str, findings: Sequence[PairFinding]) -> Table:
     bodies = list(dict.fromkeys(each.body for each in findings))
     cells = {(each.pair, each.body): _cell(each) for each in findings}
-    rows = [
-        [pair, *(cells.get((pair, body), Cell("")) for body in bodies)]
-        for pair in dict.fromkeys(each.pair for each in findings)
-    ]
-    return Table(["pair", *bodies], [row for row in rows if any(str(cell) not in ("", DASH) for cell in row[1:])], engine)
+    rows = list[Row]()
+    for pair in dict.fromkeys(each.pair for each in findings):
+        row = [cells.get((pair, body), Cell("")) for body in bodies]
+        if any(str(cell) not in ("", DASH) for cell in row):
+            rows.append([pair, *row])
+    return Table(["pair", *bodies], rows, engine)
 
 
 def _cell(finding: PairFinding) -> Cell:
