@@ -33,9 +33,6 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
     other = {f"{each.subject}: {each.case}": each.detail for each in some if each.relation not in (*NOT_RUN, *PLAIN)}
-    scripts = (
-        "With `--scripts FOLDER`, the pairs that differ are scripts of the engine." if any(each.script for each in some) else ""
-    )
     return filled(
         Items([Item(group[0].detail, _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
