@@ -387,7 +387,7 @@ def verify_method(
     if "pairs" in checks:
         from .pairs import verify_pairs
 
-        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"))
+        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"), subject)
     return Verification(subject, kind, findings, summary(findings, named))
 
 
