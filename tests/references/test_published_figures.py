@@ -24,6 +24,7 @@ from conservative.grid import Grid, grid_for
 from conservative.references.truth import reference
 from conservative.shapes import MassDistribution
 
+from ..bodies import impossible_body
 from ..environments import ROOT
 
 with (ROOT / "tests" / "data" / "published_figures.csv").open(encoding="utf-8", newline="") as stream:
@@ -129,7 +130,7 @@ MOTIONS |= {
     "gazebo-flight": cv.Scene("published", BOX, START, (0.1, 5, 0.1), 10, BOX.gravity(9.8), v_WB0=(-2, 2, 8)),
     "eulr": cv.Scene(
         "published",
-        cv.RigidBody((0.5, 2, 3)),
+        impossible_body((0.5, 2, 3)),
         START,
         (1, 0, 0.9),
         20,
