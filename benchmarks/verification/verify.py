@@ -17,7 +17,6 @@ from conservative.errors import BadInput
 from conservative.programs import list_programs
 from conservative.scene import Scene
 
-from ..studies.selection import methods as select
 from .finding import CHECKS, Verification
 
 if TYPE_CHECKING:
@@ -181,6 +180,8 @@ def verify(
         if each.kind is Kind.PROGRAM:
             results.append(_verify_program(each.text, only, pairs, tell))
         elif each.kind in (Kind.ENGINE, Kind.METHOD):
+            from ..studies.selection import methods as select  # here: recordings need no kernels
+
             results += [_verify_method(method, each.kind, only, pairs, tell) for method in select([each.text])]
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
 

@@ -52,14 +52,15 @@ def outcome(seed, folder):
     path = Path(folder) / "run.csv"
     path.write_text(made.text, encoding="utf-8")
     begun = time.process_time()
-    found = verdict.judge(made.case.scene(), read(path, made.options))[0]
-    named = [each.name.removesuffix(BARE) for each in filter(None, [found["diagnosis"], *found["equally good"]])]
+    found = verdict.verify_recording(made.case.scene(), read(path, made.options))
+    named = [each.name.removesuffix(BARE) for each in found.details.explaining]
+    undecided = found.findings[0].detail if found.verdict == "undecided" else ""
     row = {
         "seed": seed, "mistake": made.mistake, "layout": made.layout, "noise": "single" if made.single else made.noise,
         "turns": round(made.turns, 2), "rows": made.about["rows"], "expected": made.expected,
-        "identifiable": made.identifiable, "size": made.size, "same": sorted(made.same), "verdict": found["verdict"],
-        "named": named, "candidates": [each.name for each in found["candidates"]], "undecided": found["undecided"],
-        "error": found["error"], "allowed": found["allowed"], "grain": made.about["grain"],
+        "identifiable": made.identifiable, "size": made.size, "same": sorted(made.same), "verdict": found.verdict,
+        "named": named, "candidates": [each.name for each in found.details.candidates], "undecided": undecided,
+        "error": found.details.error, "allowed": found.details.allowed, "grain": made.about["grain"],
         "seconds": [round(begun - began, 2), round(time.process_time() - begun, 2)],
     }  # fmt: skip
     return row | {"complaint": complaint(row)}

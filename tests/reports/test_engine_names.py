@@ -23,28 +23,30 @@ from conservative.reports.cli.main import main
 
 from .. import conftest
 
-TAKEN = ("methods", "engines", "engine", "names", "command")
+TAKEN = ("methods", "engines", "engine", "names", "command", "subjects")
 """Parameters of commands that take names of engines."""
 COMMAND_LINE = ("engines add", "command")
 """The parameter among them that takes a command line only."""
 GIVEN = {"scene": "brick_flip", "spread": "rate=1%", "name": "motion", "against": "HEAD", "versions": "9.9"}
 """Values of other parameters: those that are required, and those in `NEEDS`."""
 NEEDS = {"gate": "against", "track": "versions"}
-TABLES = ("recommend", "report", "study", "twins")
+TABLES = ("recommend", "report", "study")
 """Commands that show all settings of a name."""
 CAPTURED = {
-    "engines check": ("benchmarks.verification.protocol.check",),
     "engines install": ("references.environments.lock.resolve",),
     "engines remove": ("references.environments.install.drop", "references.environments.install.register"),
     "gate": (),
-    "importers": ("benchmarks.verification.bodies.loaded.Program.check",),
     "recommend": ("benchmarks.recommendation.recommend.recommend",),
     "report": ("reports.report.write",),
     "run": ("reports.run.single_run.Planned",),
     "study": ("reports.run.single_study.measure_study",),
     "sweep": ("reports.run.sweep.run_sweep",),
     "track": ("references.environments.install.find_environment",),
-    "twins": ("benchmarks.studies.twins.compare_methods",),
+    "verify": (
+        "benchmarks.verification.programs.verify_method",
+        "benchmarks.verification.programs.verify_program",
+        "benchmarks.verification.bodies.loaded.Program.check",
+    ),
     "watch": ("reports.run.single_run.Planned",),
 }
 """Functions that get what a command has selected, before any work. `gate` refuses versions."""

@@ -1,6 +1,6 @@
 """Pairs: a description of a body and its start, a second description of the same motion, and the map between both.
 
-Symbols: W is the world, F the axes of the description, G those of its twin, whose motion is mapped back to F and W.
+Symbols: W is the world, F the axes of the first description, G the axes of the second, whose motion is mapped back to F and W.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from conservative.references.engine import principal_axes
 from conservative.references.environments.plain_numbers import describe
 from conservative.scene import Scene
 
-HEAVY = "body", "top"
+USUAL = "body", "top"
 """Names of a free body and of one about a fixed point, with all pairs that are not about the inertia."""
 Samples = tuple[Array, Array]
 """Attitudes (s, 3, 3), F to W, and rates (s, 3), rad/s, axes F."""
@@ -41,8 +41,8 @@ class Description:
         Time step, s; number of steps; steps between samples.
     sign
         Sign of the quaternion of `R0`.
-    way
-        How the engine is told about the body; "" is the usual way of its adapter, others are in its `ways`.
+    variant
+        How the engine gets the body; "" is the usual description of its adapter, others are in its `descriptions`.
     """
 
     mass: float
@@ -55,44 +55,44 @@ class Description:
     n_steps: int = 100
     every: int = 50
     sign: float = 1.0
-    way: str = ""
+    variant: str = ""
 
     @property
     def grid(self) -> Grid:
         return Grid(self.dt, self.n_steps, self.every)
 
     @property
-    def about_origin(self) -> Array:
-        """Inertia (3, 3) about the origin of F, kg m^2: Steiner's theorem."""
-        return self.inertia + self.mass * (self.com @ self.com * np.eye(3) - np.outer(self.com, self.com))
+    def joint_inertia(self) -> Array:
+        """Inertia (3, 3), kg m^2, about the fixed point, the origin of F, or about the centre of mass of a free body."""
+        arm = self.com if self.gravity else np.zeros(3)
+        return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
     @property
     def scene(self) -> Scene:
         """The same motion as a scene. The attitude of a free body does not depend on its mass and its centre."""
         field = UniformGravity(self.mass * self.gravity, self.com) if self.gravity else None
-        J = self.about_origin if self.gravity else self.inertia
-        return Scene("twin", RigidBody(J), self.R0, self.w0, self.dt * self.n_steps, field)
+        return Scene("pair", RigidBody(self.joint_inertia), self.R0, self.w0, self.dt * self.n_steps, field)
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The numbers of a `prepare` request, see PROTOCOL.md."""
-        J, w0_W, x0 = self.about_origin, self.R0 @ self.w0, self.R0 @ self.com
-        principal = np.diag(self.inertia).copy(), np.eye(3)
-        if np.count_nonzero(self.inertia - np.diag(principal[0])):
-            principal = RigidBody(self.inertia).moments, RigidBody(self.inertia).R_BP
-        # Engines that read principal moments about the origin get no numbers for axes that are not principal.
-        moments = np.diag(J).copy() if np.allclose(J, np.diag(np.diag(J)), 0, 1e-9 * J.max()) else np.full(3, np.nan)
+        """The numbers of a `prepare` request, see PROTOCOL.md.
+
+        `moments` are the diagonal of `joint_inertia`: with the variant "frame" only, they are not the principal moments.
+        """
+        w0_W, x0 = self.R0 @ self.w0, self.R0 @ self.com
+        moments, axes = np.diag(self.inertia).copy(), np.eye(3)
+        if np.count_nonzero(self.inertia - np.diag(moments)):
+            moments, axes = RigidBody(self.inertia).moments, RigidBody(self.inertia).R_BP
+        # Fields that the scene does not have are 0.
+        others = describe(principal_axes(Scene("pair", RigidBody((1, 1, 1)), np.eye(3), (1, 0, 0), 1.0)), self.grid)
         return {
-            **describe(principal_axes(Scene("twin", RigidBody((1, 1, 1)), np.eye(3), (1, 0, 0), 1.0)), self.grid),
-            **{
-                "moments": moments,
-                "inertia_com": self.inertia,
-                "moments_com": principal[0],
-                "q_com": to_quaternion(principal[1]),
-            },
+            **others,
+            **{"moments": np.diag(self.joint_inertia).copy(), "inertia_com": self.inertia},
+            **{"moments_com": moments, "q_com": to_quaternion(axes)},
             **{"mass": self.mass, "com": self.com, "q0": self.sign * to_quaternion(self.R0), "R0": self.R0, "w0": self.w0},
             **{"w0_W": w0_W, "x0": x0, "v0": np.cross(w0_W, x0), "gravity": self.gravity, "free": not self.gravity},
-            **({"way": self.way} if self.way else {}),
+            # `way` is the name in programs that were written for the first releases of the protocol.
+            **({"description": self.variant, "way": self.variant} if self.variant else {}),
             **({} if self.gravity or not self.com.any() else {"p_WB0": np.zeros(3), "v_WB0": np.zeros(3)}),
         }
 
@@ -105,38 +105,38 @@ class Pair:
     ----------
     name
         Name of the pair.
-    twin
+    second
         Function that returns the second description.
     back
-        Function that maps samples of the twin to those of the description; by default they are the same.
+        Function that maps samples of the second description to samples of the first; by default they are the same.
     run
-        How the twin runs: "" by a new model, or one of `machine.RUNS`.
+        How the second description runs: "" by a new model, otherwise see `runner.run`.
     exact
         True if equal arithmetic gives equal bits. A difference then does not go away with the step.
-    way
-        The way in which the engine must be able to describe a body; a method of this package has only "frame".
-    sizes
-        Factors by which the twin is scaled, each tried; the motion of an engine without thresholds does not change.
-    said
+    variant
+        The variant of descriptions that the engine must have; a method of this package has only "frame".
+    scales
+        Factors by which the second description is scaled, each tried. In an engine without thresholds, none changes the motion.
+    relation
         How the second motion is related to the first, a sentence.
     bodies
-        Names of the bodies that have such twins, in `BODIES`.
+        Names of the bodies that are described, in `BODIES`.
     """
 
     name: str
-    twin: Callable[..., Description] = lambda one: one
+    second: Callable[..., Description] = lambda one: one
     back: Callable[..., Samples] = lambda samples, *_: samples
     run: str = ""
     exact: bool = False
-    way: str = ""
-    sizes: tuple[float, ...] = ()
-    said: str = "Both motions should be equal."
-    bodies: tuple[str, ...] = HEAVY
+    variant: str = ""
+    scales: tuple[float, ...] = ()
+    relation: str = "Both motions should be equal."
+    bodies: tuple[str, ...] = USUAL
 
     @property
     def same_bits(self) -> bool:
         """Whether any difference is a fault: the same numbers are integrated again."""
-        return self.exact and not self.sizes and not self.way
+        return self.exact and not self.scales and not self.variant
 
 
 TURN = rotation_about((0, 0, 1), 2.1)  # about the vertical, so that it does not change the weight
@@ -156,7 +156,19 @@ def _symmetric(J: Array) -> Array:
     return (J + J.T) / 2
 
 
-def _frame_back(R_FG: Array) -> Callable[..., Samples]:
+def to_principal(one: Description) -> tuple[Description, Array]:
+    """Return the description in axes G in which `joint_inertia` is diagonal, and the rotation (3, 3), G to F."""
+    J = one.joint_inertia
+    if np.abs(J - np.diag(np.diag(J))).max() <= 1e-12 * np.abs(J).max():  # the axes already are: measured up to 4e-16
+        return one, np.eye(3)
+    R_FG = RigidBody(J).R_BP
+    turned = reframe(one, R_FG)
+    round_off = np.abs(turned.com) < 1e-15 * np.linalg.norm(turned.com)
+    return replace(turned, com=np.where(round_off, 0.0, turned.com)), R_FG
+
+
+def frame_back(R_FG: Array) -> Callable[..., Samples]:
+    """Return the map of samples in axes G to samples in axes F."""
     return lambda samples, *_: (samples[0] @ R_FG.T, samples[1] @ R_FG.T)
 
 
@@ -166,30 +178,30 @@ def _mirrored(one: Description) -> Description:
     return replace(one, R0=MIRROR @ one.R0 @ MIRROR, w0=-MIRROR @ one.w0, **mirrored)
 
 
-def _lengths(one: Description, size: float) -> Description:
-    return replace(one, com=size * one.com, inertia=size**2 * one.inertia, gravity=size * one.gravity)
+def _lengths(one: Description, scale: float) -> Description:
+    return replace(one, com=scale * one.com, inertia=scale**2 * one.inertia, gravity=scale * one.gravity)
 
 
-def _masses(one: Description, size: float) -> Description:
-    return replace(one, mass=size * one.mass, inertia=size * one.inertia)
+def _masses(one: Description, scale: float) -> Description:
+    return replace(one, mass=scale * one.mass, inertia=scale * one.inertia)
 
 
-def _times(one: Description, size: float) -> Description:
-    return replace(one, w0=one.w0 / size, gravity=one.gravity / size**2, dt=one.dt * size)
+def _times(one: Description, scale: float) -> Description:
+    return replace(one, w0=one.w0 / scale, gravity=one.gravity / scale**2, dt=one.dt * scale)
 
 
-def _same_times(samples: Samples, size: float) -> Samples:
-    return samples[0], samples[1] * size
+def _same_times(samples: Samples, scale: float) -> Samples:
+    return samples[0], samples[1] * scale
 
 
 def _without_moment(one: Description) -> Description:
-    return replace(one, inertia=one.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(one.w0))))
+    return replace(one, inertia=one.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(one.w0))), variant="zero")
 
 
 OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved")
-"""Ways that are about the inertia."""
+"""Variants that are about the inertia."""
 FREE = ("body", "needle", "thin rod")
-"""Names of free bodies that are described in these ways."""
+"""Names of the free bodies with these variants."""
 
 SCALED = "The second motion is the first one in other units."
 
@@ -202,39 +214,44 @@ PAIRS = (
     Pair("n calls of one step", lambda one: replace(one, every=1), run="thinned"),
     Pair("body 3 of 7", run="3 of 7"),
     Pair("body 40 of 64", run="40 of 64"),
-    Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, way="quaternion"),
+    Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, variant="quaternion"),
     Pair(
         "turned world",
         lambda one: replace(one, R0=TURN @ one.R0),
         lambda samples, *_: (TURN.T @ samples[0], samples[1]),
-        said="The second attitude is the first one turned by 2.1 rad about the vertical; rates in the body are equal.",
+        relation="The second attitude is the first one turned by 2.1 rad about the vertical; rates in the body are equal.",
     ),
-    Pair("permuted axes", lambda one: reframe(one, CYCLE), _frame_back(CYCLE), said="The axes 1, 2, 3 are now 3, 1, 2."),
+    Pair("permuted axes", lambda one: reframe(one, CYCLE), frame_back(CYCLE), relation="The axes 1, 2, 3 are now 3, 1, 2."),
     Pair(
         "mirrored",
         _mirrored,
         lambda samples, *_: (MIRROR @ samples[0] @ MIRROR, -samples[1] @ MIRROR),
-        said="The second motion is the mirror image of the first, along the second axis.",
+        relation="The second motion is the mirror image of the first, along the second axis.",
     ),
-    Pair("length x 2^k", _lengths, exact=True, sizes=(2.0**-14, 2.0**14), said=SCALED),
-    Pair("length x 10^k", _lengths, sizes=(1e-4, 1e4), said=SCALED),
-    Pair("mass x 2^k", _masses, exact=True, sizes=(2.0**-30, 2.0**30), said=SCALED),
-    Pair("mass x 10^k", _masses, sizes=(1e-9, 1e9), said=SCALED),
-    Pair("time x 2^k", _times, _same_times, exact=True, sizes=(2.0**-14, 2.0**14), said=SCALED),
-    Pair("time x 10^k", _times, _same_times, sizes=(1e-4, 1e4), said=SCALED),
+    Pair("length x 2^k", _lengths, exact=True, scales=(2.0**-14, 2.0**14), relation=SCALED),
+    Pair("length x 10^k", _lengths, scales=(1e-4, 1e4), relation=SCALED),
+    Pair("mass x 2^k", _masses, exact=True, scales=(2.0**-30, 2.0**30), relation=SCALED),
+    Pair("mass x 10^k", _masses, scales=(1e-9, 1e9), relation=SCALED),
+    Pair("time x 2^k", _times, _same_times, exact=True, scales=(2.0**-14, 2.0**14), relation=SCALED),
+    Pair("time x 10^k", _times, _same_times, scales=(1e-4, 1e4), relation=SCALED),
     Pair(
         "another body frame",
-        lambda one: reframe(one, OTHER),
-        _frame_back(OTHER),
-        way="frame",
+        lambda one: replace(reframe(one, OTHER), variant="frame"),
+        frame_back(OTHER),
+        variant="frame",
         bodies=(*FREE, "top"),
-        said="The body is the same in other axes, turned by 1.3 rad about (0.3, -0.5, 0.8).",
+        relation="The body is the same in other axes, turned by 1.3 rad about (0.3, -0.5, 0.8).",
     ),
-    Pair("offset frame", lambda one: reframe(one, np.eye(3), OFFSET), way="offset", bodies=FREE),
-    Pair("moment of 0 about the axis of rotation", _without_moment, way="zero", bodies=("rod about its axis",)),
+    Pair("offset frame", lambda one: replace(reframe(one, np.eye(3), OFFSET), variant="offset"), variant="offset", bodies=FREE),
+    Pair("moment of 0 about the axis of rotation", _without_moment, variant="zero", bodies=("rod about its axis",)),
     *(
-        Pair(name, lambda one, way=way: replace(one, way=way), way=way, bodies=(*FREE, "top") if way in OF_INERTIA else HEAVY)
-        for way, name in {
+        Pair(
+            name,
+            lambda one, variant=variant: replace(one, variant=variant),
+            variant=variant,
+            bodies=(*FREE, "top") if variant in OF_INERTIA else USUAL,
+        )
+        for variant, name in {
             "file": "set by a file",
             "setter": "set by setters",
             "child": "inertia on a fixed child",

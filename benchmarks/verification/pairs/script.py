@@ -14,32 +14,30 @@ from conservative.references.engines import shared
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.registry import read_name
 
-from .differences import Twins
-from .pairs import PAIRS, Description
+from .pairs import Description, Pair
 
-MARK = "conservative twins: "
+MARK = "conservative pairs: "
 """Text in the first line of every script, by which an earlier one is recognized."""
 SCRIPTS_OF_NODE = ("rapier_js", "jolt")
 FOLDER = Path(__file__).with_name("scripts")
 SAME = {"rapier_deterministic": "rapier_js"}
 """Engines that have the script of another one."""
 IN_THE_NUMBERS = ("", "quaternion", "frame", "zero")
-"""Ways that only change the numbers that a script has."""
+"""Variants that only change the numbers that a script has."""
 ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping"), "rapier_js": ("setter",)}
-"""Further ways of the scripts."""
+"""Further variants of the scripts."""
 
 
-def script_of(method: Method, twins: Twins) -> str | None:
-    """Return the script of a pair that differs; None if the engine has none for it."""
+def script_of(method: Method, pair: Pair, first: Description, scale: float | None) -> str:
+    """Return the script of a pair that differs, for the engine's own language; "" if the engine has none for it."""
     family = read_name(method.family).base
-    file, pair = FOLDER / f"{SAME.get(family, family)}.txt", next(each for each in PAIRS if each.name == twins.pair)
-    ways = IN_THE_NUMBERS + ALSO.get(file.stem, ())
-    first = twins.first
-    if first is None or not isinstance(method, AdapterMethod) or not file.is_file() or pair.run or pair.way not in ways:
-        return None
+    file = FOLDER / f"{SAME.get(family, family)}.txt"
+    variants = IN_THE_NUMBERS + ALSO.get(file.stem, ())
+    if not isinstance(method, AdapterMethod) or not file.is_file() or pair.run or pair.variant not in variants:
+        return ""
     if (first.gravity and file.stem != "mujoco") or method.settings.get("as_installed"):
-        return None
-    second = pair.twin(first) if twins.size is None else pair.twin(first, twins.size)
+        return ""
+    second = pair.second(first) if scale is None else pair.second(first, scale)
     words: dict[str, Any] = {"n_steps": first.n_steps, "package": method.data.package}
     for name, one in (("first", first), ("second", second)):
         numbers = _numbers(one)
@@ -50,7 +48,7 @@ def script_of(method: Method, twins: Twins) -> str | None:
     solver, _, integrator = str(method.settings.get("solver", "")).partition("_")
     options = f', integrator="{integrator}", disable_contacts=True' if integrator else ", angular_damping=0.0"
     words |= {"solver": solver, "options": options if integrator or solver in ("SemiImplicit", "Featherstone") else ""}
-    title = f"{'//' if file.stem in SCRIPTS_OF_NODE else '#'} {MARK}{method.label}: {twins.pair}. {pair.said}\n"
+    title = f"{'//' if file.stem in SCRIPTS_OF_NODE else '#'} {MARK}{method.label}: {pair.name}. {pair.relation}\n"
     return title + Template(file.read_text(encoding="utf-8")).substitute(words)
 
 
@@ -65,7 +63,7 @@ def _numbers(one: Description) -> dict[str, Any]:
     names = {"mass": "mass", "com": "com", "moments": "moments_com", "axes": "q_com", "inertia": "inertia_com", "q": "q0"}
     names |= {"R": "R0", "w": "w0", "w_W": "w0_W", "dt": "dt"}
     plain = {name: getattr(given[key], "tolist", lambda key=key: given[key])() for name, key in names.items()}
-    return plain | ({"way": one.way} if one.way else {})
+    return plain | ({"description": one.variant} if one.variant else {})
 
 
 def _mjcf(method: AdapterMethod, one: Description) -> str:

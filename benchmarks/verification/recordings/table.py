@@ -134,6 +134,11 @@ class Layout:
         return next((kind for kind in ATTITUDES if kind in self.used), None)
 
     @property
+    def doubt(self) -> str:
+        """The sentence on columns that look like attitudes or rates and are not compared; "" without them."""
+        return ""
+
+    @property
     def numbered(self) -> bool:
         """Whether the quaternion's columns are numbered, so that their order is open. MuJoCo's qpos are scalar first."""
         keys = [_split(name)[0] for name in self.used.get("quaternion", ())]
@@ -170,6 +175,10 @@ class Recording:
     options: Options = field(default_factory=Options)
     path: Path | None = None
     origin: int = 0
+
+    def label(self, text: str) -> str:
+        """Return a description of rows after the name of the file."""
+        return text if self.path is None else f"{self.path}: {text}"
 
     def stream(self) -> Iterator[tuple[Array, States, Array | None]]:
         """Yield times, motion and shape of all rows, in chunks."""

@@ -25,7 +25,7 @@ T = np.linspace(0, 6, 121)
 
 
 def exact(scene, t=T):
-    """The motion by a closed form, else by SciPy with compiled derivatives: `judge` solves the same equations otherwise."""
+    """The motion by a closed form, else by SciPy with compiled derivatives, which the verification does not use."""
     if scene.potential is None and not scene.loaded and scene.body.rotor_momentum is None:
         return free_body(scene.body, scene.R_WB0, scene.w_WB_B0, t)
     scene = scene.rename(scene.name, t_end=max(scene.t_end, t[-1]))

@@ -1,7 +1,7 @@
 """Right programs of every common design, in plain Python: `python right_programs.py NAME` speaks PROTOCOL.md.
 
-A design is an attitude (quaternion or matrix), a variable of rotation (rates in body axes, momentum in body or in world axes), a
-step, and whether the attitude is normalised after each step. `wrong_programs` overrides parts of `Program` to plant mistakes.
+A design is an attitude (quaternion or matrix), a variable of rotation (rates in body axes, momentum in body or in world axes),
+a step, and whether the attitude is normalised after each step. `wrong_programs` overrides parts of `Program` to plant mistakes.
 """
 
 from __future__ import annotations

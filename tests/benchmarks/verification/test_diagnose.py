@@ -10,7 +10,7 @@ from conservative import registry
 from conservative.benchmarks.verification import explain as diagnose
 from conservative.benchmarks.verification.recordings import verdict
 from conservative.benchmarks.verification.recordings.table import Recording
-from conservative.benchmarks.verification.recordings.verdict import judge
+from conservative.benchmarks.verification.recordings.verdict import verify_recording
 
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
 
@@ -19,7 +19,9 @@ IMPLICIT = "semi-implicit Euler with an implicit gyroscopic term"
 
 
 def diagnosed(scene, R, w, t=T):
-    return judge(scene, Recording(t, (R, w), rows=len(t)))[0]["diagnosis"]
+    """The only mistake that explains a file; None without one, or if several do."""
+    explaining = verify_recording(scene, Recording(t, (R, w), rows=len(t))).details.explaining
+    return explaining[0] if len(explaining) == 1 else None
 
 
 FAULTS = {
@@ -49,9 +51,9 @@ def test_a_planted_fault_is_named(name):
 
 def test_two_mistakes_with_the_same_rows_are_both_named():
     """Without a torque, implicit Euler and this step of game engines differ in the norm of the quaternion only."""
-    found = judge(FREE, Recording(T, stepped(FREE, IMPLICIT, 3), rows=len(T)))[0]
-    assert found["diagnosis"] is None
-    assert {each.name for each in found["equally good"]} == {IMPLICIT, "implicit Euler"}
+    found = verify_recording(FREE, Recording(T, stepped(FREE, IMPLICIT, 3), rows=len(T)))
+    assert found.findings[0].mistake == ""
+    assert {each.name for each in found.details.explaining} == {IMPLICIT, "implicit Euler"}
 
 
 @pytest.mark.parametrize("name", ["time shift", "damped", "transposed", "body axes"])
@@ -111,7 +113,7 @@ def test_bodies_that_the_search_tries_give_no_warning(monkeypatch):
     R, w = exact(HEAVY)
     with warnings.catch_warnings():
         warnings.simplefilter("error", cv.ImpossibleInertia)
-        assert judge(HEAVY, Recording(T, (R, w * (-1, 1, 1)), rows=len(T)))[0]["verdict"] == "wrong"
+        assert verify_recording(HEAVY, Recording(T, (R, w * (-1, 1, 1)), rows=len(T))).verdict == "wrong"
 
 
 def test_the_search_ends_after_a_number_of_trial_motions(monkeypatch):
@@ -119,8 +121,8 @@ def test_the_search_ends_after_a_number_of_trial_motions(monkeypatch):
     monkeypatch.setattr(diagnose, "EFFORT", 100)
     random = np.random.default_rng(1)
     R, w = exact(HEAVY)
-    found = judge(HEAVY, Recording(T, (R, w + 0.1 * random.normal(size=w.shape)), rows=len(T)))[0]
-    assert any("before everything was tried" in note for note in found["notes"])
+    found = verify_recording(HEAVY, Recording(T, (R, w + 0.1 * random.normal(size=w.shape)), rows=len(T)))
+    assert any("before everything was tried" in note for note in found.notes)
 
 
 def test_a_method_is_named_up_to_where_it_diverges():

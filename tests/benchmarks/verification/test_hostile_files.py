@@ -47,7 +47,7 @@ def judged(folder, names, attitudes, rates=W, t=T):
         except cv.BadInput as refused:
             assert str(path) in str(refused)  # noqa: PT017
             return None
-        return verdict.judge(FREE, recording, True, None, lambda *_: None)[0]["right"]
+        return verdict.verify_recording(FREE, recording, True, None, lambda *_: None).verdict == "right"
 
 
 @pytest.mark.parametrize("names", ATTITUDES)
@@ -166,8 +166,8 @@ def test_a_name_that_is_not_used_is_shown_in_part(tmp_path):
     path, rows = tmp_path / "run.csv", np.column_stack([T, W])
     names = "t,w_x,w_y,w_z," + "k" * 150_000
     path.write_text(names + "\n" + "\n".join(",".join(map(repr, [*row, 0.0])) for row in rows.tolist()))
-    found = verdict.judge(FREE, table.read(path, table.Options(units="rad")), True, None, lambda *_: None)[0]
-    (name,) = found["not used"]
+    found = verdict.verify_recording(FREE, table.read(path, table.Options(units="rad")), True, None, lambda *_: None)
+    (name,) = found.details.unused
     assert len(name) < 2000  # 150,000
 
 

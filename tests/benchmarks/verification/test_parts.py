@@ -15,7 +15,7 @@ import conservative as cv
 from conservative import registry
 from conservative.benchmarks.verification.recordings import table as table_of_file
 from conservative.benchmarks.verification.recordings.table import Recording
-from conservative.benchmarks.verification.recordings.verdict import judge
+from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
 from conservative.flight import rotation_only
 from conservative.grid import Grid
@@ -155,9 +155,9 @@ PARTS = {
 
 
 def judged(scene, t, R, w, from_row=True, allowed=1e-9):
-    summary, rows = judge(scene, Recording(t, (R, w), rows=len(t)), from_row, allowed)
-    assert sorted({row["quantity"] for row in rows}) == sorted(each["quantity"] for each in summary["quantities"])
-    return summary
+    found = verify_recording(scene, Recording(t, (R, w), rows=len(t)), from_row, allowed)
+    assert {row["quantity"] for row in found.details.rows()} == {each.name for each in found.details.quantities}
+    return found
 
 
 @pytest.mark.parametrize(("name", "first"), [("rotor", 0.0), ("rotor", 3.7), ("rotor", 1e5), ("damping, jumps", 1.0)])
@@ -180,25 +180,25 @@ def test_a_file_in_several_chunks_whose_first_time_is_not_0(name, first, tmp_pat
         path.write_text(header + "\n" + "\n".join(",".join(map(repr, row)) for row in rows))
         recording = table_of_file.read(path, table_of_file.Options())
         assert len(recording.t) < recording.rows == len(t)
-        found, _ = judge(build(), recording, True, 1e-6 if first < 1e4 else 1e-4)
-        assert found["right"] == (at is None)
+        found = verify_recording(build(), recording, True, 1e-6 if first < 1e4 else 1e-4)
+        assert (found.verdict == "right") == (at is None)
         if at is not None:
-            assert found["error"][1] == pytest.approx(0.01 / np.linalg.norm(rates, axis=1).max(), rel=0.01)
+            assert found.details.error[1] == pytest.approx(0.01 / np.linalg.norm(rates, axis=1).max(), rel=0.01)
 
 
 @pytest.mark.parametrize("name", PARTS)
 def test_the_right_motion_is_right_from_any_row_and_without_the_part_it_is_wrong(name):
     build, part, missing = PARTS[name]
     R, w = integrate(T, **part)
-    assert np.max(judged(build(), T, R, w)["error"]) < 2e-11  # measured: at most 4e-12
+    assert np.max(judged(build(), T, R, w).details.error) < 2e-11  # measured: at most 4e-12
     late = judged(build(), T[50:], R[50:], w[50:])  # a scene that depends on time is integrated from the time of the row
-    assert np.max(late["error"]) < 2e-11
-    assert np.max(judged(build(), T[50:], R[50:], w[50:], from_row=False)["error"]) < 2e-11
-    assert all(each["largest"] < 1e-10 for each in late["quantities"])  # no balance without the work, no energy with a motor
+    assert np.max(late.details.error) < 2e-11
+    assert np.max(judged(build(), T[50:], R[50:], w[50:], from_row=False).details.error) < 2e-11
+    assert all(each.largest < 1e-10 for each in late.details.quantities)  # no balance without the work, no energy with a motor
     found = judged(build(), T, *integrate(T))
-    assert max(found["error"]) > 0.1
-    assert found["diagnosis"].name == missing
-    assert max(found["diagnosis"].left) < 2e-11
+    assert max(found.details.error) > 0.1
+    assert found.details.explaining[0].name == missing
+    assert max(found.details.explaining[0].left) < 2e-11
 
 
 OTHERS = {
@@ -213,13 +213,13 @@ OTHERS = {
 def test_the_other_sign_and_the_other_axes_are_named(name):
     part, made = OTHERS[name]
     found = judged(PARTS[part][0](), T, *integrate(T, **made))
-    assert (found["diagnosis"].name, max(found["diagnosis"].left) < 2e-11) == (name, True)
+    assert (found.details.explaining[0].name, max(found.details.explaining[0].left) < 2e-11) == (name, True)
 
 
 def test_missing_parts_are_named_together():
     both = scene(H, torque=cv.Torque(0.3 * H), damping=cv.Damping(D))
     part = {"h": lambda t: H}
-    assert judged(both, T, *integrate(T, **part))["diagnosis"].name == "without the torque and the damping"
+    assert judged(both, T, *integrate(T, **part)).details.explaining[0].name == "without the torque and the damping"
 
 
 @pytest.mark.parametrize("name", registry.list_scenes())
@@ -230,13 +230,13 @@ def test_the_right_motion_of_every_scene_is_right(name):
     # From the start of the scene: separatrices amplify the round-off of the first row to 1 rad.
     found = judged(scene, grid.t, right.R_WB, right.w_WB_B, from_row=False, allowed=1e-8)
     # Measured: 1.3e-11 rad for pendulum_over_top, 4e-12 for others.
-    assert (np.max(found["error"]) < 5e-11, found["diagnosis"] is None) == (True, True)
+    assert (np.max(found.details.error) < 5e-11, found.details.explaining == ()) == (True, True)
 
 
 @pytest.mark.parametrize("name", ["Heun's method", "semi-implicit Euler with an explicit gyroscopic term"])
 def test_a_textbook_method_is_named_in_a_torque_that_depends_on_time(name):
     driven = scene(H, torque=cv.Torque(lambda t: [0.3 * np.sin(t), 0.2 * np.cos(t), 0.1 * t]))
-    found = judged(driven, T, *stepped(driven, name, 4))["diagnosis"]
+    found = judged(driven, T, *stepped(driven, name, 4)).details.explaining[0]
     assert (found.name, found.values["step"]) == (name, pytest.approx(0.0125))
     assert max(found.left) < 1e-10
 
@@ -248,8 +248,8 @@ def test_another_body_is_one_that_can_exist():
     driven = cv.Scene("wheel", cv.RigidBody(J, lambda t: [0, 0, 0.05 * t]), np.eye(3), (0.02, 0.01, 0), 60.0)
     wheel = cv.Scene("wheel", driven.body, np.eye(3), (0.02, 0.01, 0), 60.0, torque=cv.Torque([0, 0, 0.05]))
     found = judged(driven, t, *exact(wheel, t))
-    assert max(found["error"]) > 1
-    assert found["diagnosis"] is None or found["diagnosis"].name != "another body"
+    assert max(found.details.error) > 1
+    assert found.details.explaining == () or found.details.explaining[0].name != "another body"
 
 
 def test_a_table_with_many_corners_is_judged_without_fits():
@@ -257,22 +257,22 @@ def test_a_table_with_many_corners_is_judged_without_fits():
     values = np.random.default_rng(1).normal(size=(61, 3))
     driven = scene(torque=cv.Torque((times, values)))
     R, w = exact(driven, times)
-    assert np.max(judged(driven, times, R, w)["error"]) < 1e-13  # measured: 5e-15
+    assert np.max(judged(driven, times, R, w).details.error) < 1e-13  # measured: 5e-15
     found = judged(driven, times, R, w + 0.01 * np.sin(times)[:, None])
-    assert not {each.name for each in found["tried"]} & {"damped", "another body", "body axes"}
-    assert "60 jumps and corners" in found["notes"][-1]
+    assert not {each.name for each in found.details.tried} & {"damped", "another body", "body axes"}
+    assert "60 jumps and corners" in found.notes[-1]
     weaker = judged(driven, times, *exact(scene(torque=cv.Torque((times, 0.1 * values))), times))
-    shares = {each.name: each.share for each in weaker["tried"]}
+    shares = {each.name: each.share for each in weaker.details.tried}
     assert 1e-3 < shares["without the torque"] < 0.5  # measured: 0.23, which is not called missing
-    assert weaker["diagnosis"] is None
+    assert weaker.details.explaining == ()
 
 
 def test_damping_in_addition_to_that_of_the_scene_is_named_as_such():
     damped = scene(H, damping=cv.Damping(D))
-    found = judged(damped, T, *without(damped, 0.05, True))["diagnosis"]
+    found = judged(damped, T, *without(damped, 0.05, True)).details.explaining[0]
     assert found.values == pytest.approx({"damping": 0.05})
     assert "in addition to the damping of the scene" in found.sentence
-    without_it = judged(scene(H), T, *without(scene(H), 0.05, True))["diagnosis"]
+    without_it = judged(scene(H), T, *without(scene(H), 0.05, True)).details.explaining[0]
     assert "in addition" not in without_it.sentence
 
 
@@ -281,7 +281,7 @@ def test_another_satellite_has_another_field():
     stretched = cv.RigidBody(J + np.diag([0.05, -0.02, 0.03]))
     across = PLANET - PLANET @ NORMAL / (NORMAL @ NORMAL) * NORMAL
     other = other.rename("other", body=stretched, potential=Orbit(RATE, NORMAL).gravity_gradient(stretched.inertia, across))
-    found = judged(scene(potential=satellite()), T, *exact(other))["diagnosis"]
+    found = judged(scene(potential=satellite()), T, *exact(other)).details.explaining[0]
     assert (found.name, max(found.left) < 1e-8) == ("another body", True)
 
 

@@ -11,23 +11,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from conservative.benchmarks.studies.twins import select_pairs
+from conservative.benchmarks.verification.pairs.differences import BODIES, BODY, NEEDLE, Engine, Twins, difference, twins_of
+from conservative.benchmarks.verification.pairs.machine import EngineMachine, Machine, machine_of
+from conservative.reports.sections.twins import changes
 
 from conservative import registry
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.selection import methods as select_methods
-from conservative.benchmarks.studies.twins import select_pairs
 from conservative.benchmarks.verification.pairs import differences as compare
-from conservative.benchmarks.verification.pairs.differences import BODIES, BODY, NEEDLE, Engine, Twins, difference, twins_of
-from conservative.benchmarks.verification.pairs.machine import EngineMachine, Machine, machine_of
 from conservative.benchmarks.verification.pairs.pairs import PAIRS
 from conservative.benchmarks.verification.pairs.script import FOLDER, MARK, script_name, script_of
 from conservative.errors import BadInput
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.catalogue import __getattr__ as adapter
 from conservative.reports.cli.main import main
-from conservative.reports.sections.twins import changes
 
 from ...environments import PATIENCE
 

@@ -13,7 +13,7 @@ from conservative import registry
 from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict as verdicts
 from conservative.benchmarks.verification.recordings.table import CHUNK, Options, Recording, read
-from conservative.benchmarks.verification.recordings.verdict import judge
+from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
 
@@ -27,7 +27,7 @@ ZERO = np.zeros((len(T), 3))
 
 
 def verdict(t, R, w, scene=SCENE, error=None, **about):
-    return judge(scene, Recording(t, (R, w), rows=len(t), **about), error=error)[0]
+    return verify_recording(scene, Recording(t, (R, w), rows=len(t), **about), error=error)
 
 
 def table(header, *columns, separator=",", digits="%.12g", decimal="."):
@@ -96,9 +96,12 @@ LAYOUTS = {
 def test_the_same_right_motion_in_the_layouts_that_people_have(name, tmp_path):
     text, options = LAYOUTS[name]
     (tmp_path / "run.csv").write_text(text)
-    found = judge(SCENE, read(tmp_path / "run.csv", Options(**options)))[0]
-    assert (found["verdict"], max(found["error"]) < 2e-6) == ("right", True)  # measured: 3e-7 for times since 1970, else 2e-10
-    assert found["rows"] == {"compared": 501, "in file": 501}
+    found = verify_recording(SCENE, read(tmp_path / "run.csv", Options(**options)))
+    assert (found.verdict, max(found.details.error) < 2e-6) == (
+        "right",
+        True,
+    )  # measured: 3e-7 for times since 1970, else 2e-10
+    assert (found.details.compared, found.details.in_file) == (501, 501)
 
 
 BAD = {
@@ -122,7 +125,7 @@ def test_byte_order_marks_line_ends_and_gzip_are_read(tmp_path):
     text = "\ufeff" + LAYOUTS["phyphox"][0].replace("\n", "\r\n")
     with gzip.open(tmp_path / "run.csv.gz", "wt", encoding="utf-8", newline="") as stream:
         stream.write(text)
-    assert judge(SCENE, read(tmp_path / "run.csv.gz", Options()))[0]["verdict"] == "right"
+    assert verify_recording(SCENE, read(tmp_path / "run.csv.gz", Options())).verdict == "right"
 
 
 @pytest.mark.parametrize("error", [float("nan"), -1.0, 0.0])
@@ -136,10 +139,10 @@ def test_the_noise_of_the_first_row_is_no_fault():
     phone, t = cv.Scene("phone", cv.RigidBody([1e-3, 2e-3, 3e-3]), np.eye(3), [0.02, 6, 0.02], 4.0), np.linspace(0, 4, 401)
     w = free_body(phone.body, np.eye(3), phone.w_WB_B0, t)[1] + np.random.default_rng(1).normal(0, 0.01, (401, 3))
     found = verdict(t, None, w, phone)
-    assert (found["verdict"], found["by"]) == ("right", "noise")
-    assert found["noise"][1] * np.linalg.norm(w, axis=1).max() == pytest.approx(0.01, rel=0.1)  # measured: 0.0099
+    assert (found.verdict, found.findings[0].by) == ("right", "noise")
+    assert found.details.noise[1] * np.linalg.norm(w, axis=1).max() == pytest.approx(0.01, rel=0.1)  # measured: 0.0099
     other = cv.Scene("other", cv.RigidBody([1e-3, 2.2e-3, 3e-3]), np.eye(3), [0.02, 6, 0.02], 4.0)
-    assert verdict(t, None, w, other)["verdict"] == "wrong"
+    assert verdict(t, None, w, other).verdict == "wrong"
 
 
 def test_a_single_row_is_found_in_the_whole_file(tmp_path):
@@ -151,9 +154,9 @@ def test_a_single_row_is_found_in_the_whole_file(tmp_path):
     np.savetxt(
         tmp_path / "run.csv", np.column_stack([t, w]), "%.15g", ",", header="t,w_x_rad_s,w_y_rad_s,w_z_rad_s", comments=""
     )
-    found = judge(SCENE, read(tmp_path / "run.csv", Options()))[0]
-    assert (found["verdict"], found["diagnosis"].name) == ("wrong", "single rows")
-    assert found["diagnosis"].values["row"] == CHUNK + 1235
+    found = verify_recording(SCENE, read(tmp_path / "run.csv", Options()))
+    assert (found.verdict, found.details.explaining[0].name) == ("wrong", "single rows")
+    assert found.details.explaining[0].values["row"] == CHUNK + 1235
     t[CHUNK] = t[CHUNK - 1]  # between two chunks
     np.savetxt(
         tmp_path / "run.csv", np.column_stack([t, w]), "%.15g", ",", header="t,w_x_rad_s,w_y_rad_s,w_z_rad_s", comments=""
@@ -164,8 +167,8 @@ def test_a_single_row_is_found_in_the_whole_file(tmp_path):
 
 def test_matrices_that_are_no_rotations_are_not_right():
     scaled = np.abs((1 + 0.05 * T) ** 2 - 1)
-    assert verdict(T, R, W, shape=scaled)["verdict"] == "wrong"
-    assert verdict(T, R, W, shape=1e-12 * scaled)["verdict"] == "right"
+    assert verdict(T, R, W, shape=scaled).verdict == "wrong"
+    assert verdict(T, R, W, shape=1e-12 * scaled).verdict == "right"
 
 
 def product(p, q):
@@ -203,33 +206,33 @@ def test_attitudes_that_are_not_the_integral_of_right_rates_are_named(name):
         q.append(ATTITUDES[name](q[-1], a, b, h))
         q[-1] = q[-1] / np.linalg.norm(q[-1])
     found = verdict(T, Rotation.from_quat(q, scalar_first=True).as_matrix(), W)
-    assert name in found["diagnosis"].sentence
-    assert max(found["diagnosis"].left) < 1e-11 < 1e-5 < max(found["diagnosis"].plain)  # measured: 4e-14
+    assert name in found.details.explaining[0].sentence
+    assert max(found.details.explaining[0].left) < 1e-11 < 1e-5 < max(found.details.explaining[0].plain)  # measured: 4e-14
 
 
 def test_fewer_numbers_do_not_win_over_a_much_smaller_rest():
     """A scaled time leaves nothing, a constant shift 20 times as much as is allowed: the shift must not be named."""
     later, w = free_body(SCENE.body, np.eye(3), W0, T * (1 + 1e-6))
-    assert verdict(T, later, w)["diagnosis"].name == "phase drift"
+    assert verdict(T, later, w).details.explaining[0].name == "phase drift"
     at = np.append(0.0, 0.02 + T[1:] * (1 + 3.5e-5))
     later, w = free_body(SCENE.body, np.eye(3), W0, at)
     found = verdict(T, later, w, error=1e-3, digits=(0.0, 1e-5, 1e-5))
-    shift = next(each for each in found["tried"] if each.name == "time shift")
+    shift = next(each for each in found.details.tried if each.name == "time shift")
     assert shift.explains
     assert 10 < shift.size < 40  # measured: 22 times the digits, and the scaled time leaves none of them
-    assert found["diagnosis"].name == "phase drift"
+    assert found.details.explaining[0].name == "phase drift"
 
 
 def test_an_allowed_error_decides_alone(monkeypatch):
     monkeypatch.setattr(verdicts, "diagnose", lambda *_: Diagnosis())  # names are searched for a minute
     t, off = T[::10], 1e-3 * np.sin(T[::10])[:, None]
     noise = np.random.default_rng(2).normal(0, 0.01, (len(T), 3))
-    assert [verdict(t, None, W[::10] + off, error=error)["verdict"] for error in (None, 1e-2, 1e-4)] == [
+    assert [verdict(t, None, W[::10] + off, error=error).verdict for error in (None, 1e-2, 1e-4)] == [
         "wrong",
         "right",
         "wrong",
     ]
-    assert [verdict(T, None, W + noise, error=error)["verdict"] for error in (None, 0.1, 1e-3)] == ["right", "right", "wrong"]
+    assert [verdict(T, None, W + noise, error=error).verdict for error in (None, 0.1, 1e-3)] == ["right", "right", "wrong"]
 
 
 def test_angles_called_phi_theta_psi_are_compared(tmp_path):
@@ -237,10 +240,10 @@ def test_angles_called_phi_theta_psi_are_compared(tmp_path):
     angles = turned.as_euler("ZYX", degrees=True)[:, ::-1]
     header = "Time,P (deg/s),Q (deg/s),R (deg/s),Phi (deg),Theta (deg),Psi (deg)"
     (tmp_path / "run.csv").write_text(table(header, T, np.degrees(W), angles))
-    found = judge(SCENE, read(tmp_path / "run.csv", Options(euler="zyx")))[0]
-    assert (found["verdict"], found["error"][0]) == ("wrong", pytest.approx(1.0, rel=1e-3))
-    assert found["candidates"] == []  # turned body axes leave 0.7 rad, and make right rates wrong by 28 deg/s
-    assert all(each.left[1] < 1e-6 for each in found["tried"])
+    found = verify_recording(SCENE, read(tmp_path / "run.csv", Options(euler="zyx")))
+    assert (found.verdict, found.details.error[0]) == ("wrong", pytest.approx(1.0, rel=1e-3))
+    assert not found.details.candidates  # turned body axes leave 0.7 rad, and make right rates wrong by 28 deg/s
+    assert all(each.left[1] < 1e-6 for each in found.details.tried)
     (tmp_path / "rates.csv").write_text(table("t,w_x (rpm),w_y (rpm),w_z (rpm)", T, W))
     with pytest.raises(BadInput, match="euler: got"):
         read(tmp_path / "rates.csv", Options(euler="zyx"))
@@ -248,17 +251,17 @@ def test_angles_called_phi_theta_psi_are_compared(tmp_path):
 
 def test_a_body_at_rest_beside_a_torque_is_wrong():
     driven = cv.Scene("driven", cv.RigidBody([1.0, 2.0, 3.0]), np.eye(3), [0, 0, 0], 10.0, torque=cv.Torque([1e-3, 0, 0]))
-    assert verdict(T, None, ZERO, driven)["verdict"] == "wrong"
-    assert verdict(T, None, ZERO, driven.rename("free", torque=None))["verdict"] == "right"
+    assert verdict(T, None, ZERO, driven).verdict == "wrong"
+    assert verdict(T, None, ZERO, driven.rename("free", torque=None)).verdict == "right"
 
 
 def test_every_column_is_used_or_has_a_reason(tmp_path):
     (tmp_path / "run.csv").write_text(
         table("t,w_x (rad/s),w_y (rad/s),w_z (rad/s),phase,q_lvlh_w,q_lvlh_x,q_lvlh_y,q_lvlh_z", T, W, T, Q)
     )
-    found = judge(SCENE, read(tmp_path / "run.csv", Options()))[0]
-    assert set(found["not used"]) == {"phase", "q_lvlh_w", "q_lvlh_x", "q_lvlh_y", "q_lvlh_z"}
-    json.dumps(found["not used"])
+    found = verify_recording(SCENE, read(tmp_path / "run.csv", Options()))
+    assert set(found.details.unused) == {"phase", "q_lvlh_w", "q_lvlh_x", "q_lvlh_y", "q_lvlh_z"}
+    json.dumps(found.details.unused)
 
 
 @pytest.mark.parametrize("name", registry.list_scenes())
@@ -266,7 +269,7 @@ def test_our_own_samples_of_every_scene_are_right_whole_and_without_their_start(
     scene = registry.scene(name)
     made = cv.integrate(scene, scene.dt, cv.Taylor())
     for k in (0, len(made.t) // 3):
-        assert verdict(made.t[k:], made.R_WB[k:], made.w_WB_B[k:], scene)["verdict"] == "right"  # measured: at most 2e-10
+        assert verdict(made.t[k:], made.R_WB[k:], made.w_WB_B[k:], scene).verdict == "right"  # measured: at most 2e-10
 
 
 def test_times_that_jitter_are_no_noise():
@@ -275,10 +278,10 @@ def test_times_that_jitter_are_no_noise():
     at = np.append(0.0, T[1:] + 0.004 * np.clip(random.normal(size=len(T) - 1), -2, 2))
     R_late, w_late = free_body(SCENE.body, np.eye(3), W0, at)
     found = verdict(T, R_late, w_late)
-    assert (found["verdict"], found["diagnosis"].name) == ("wrong", "jittered times")
-    assert max(found["diagnosis"].left) < 1e-8  # measured: 4e-14
+    assert (found.verdict, found.details.explaining[0].name) == ("wrong", "jittered times")
+    assert max(found.details.explaining[0].left) < 1e-8  # measured: 4e-14
     turned = R @ Rotation.from_rotvec(0.005 * random.normal(size=(len(T), 3))).as_matrix()
-    assert verdict(T, turned, W + 0.005 * random.normal(size=W.shape))["verdict"] == "right"
+    assert verdict(T, turned, W + 0.005 * random.normal(size=W.shape)).verdict == "right"
 
 
 def test_a_quaternion_that_is_not_of_norm_1_is_found_between_the_rows_that_are_kept(tmp_path):
@@ -287,9 +290,9 @@ def test_a_quaternion_that_is_not_of_norm_1_is_found_between_the_rows_that_are_k
     q = Rotation.from_matrix(free_body(SCENE.body, np.eye(3), W0, t)[0]).as_quat(scalar_first=True)
     q[5001] *= 1.1
     np.savetxt(tmp_path / "run.csv", np.column_stack([t, q]), "%.17g", ",", header="t,q_w,q_x,q_y,q_z", comments="")
-    found = judge(SCENE, read(tmp_path / "run.csv", Options()))[0]
-    assert (found["verdict"], found["diagnosis"]) == ("wrong", None)
-    assert f"{t[5001]:g} s" in found["shape"]
+    found = verify_recording(SCENE, read(tmp_path / "run.csv", Options()))
+    assert (found.verdict, found.findings[0].causes) == ("wrong", ())
+    assert f"{t[5001]:g} s" in found.details.shape
 
 
 NOISE = 1e-3 * np.linalg.norm(W, axis=1).max()
@@ -297,7 +300,7 @@ NOISE = 1e-3 * np.linalg.norm(W, axis=1).max()
 
 def notes_on_moments(scene, w):
     found = verdict(T, None, w + NOISE * np.random.default_rng(2).normal(size=w.shape), scene)
-    return found["verdict"], [note for note in found["notes"] if "moments" in note], found["diagnosis"]
+    return found.verdict, [note for note in found.notes if "moments" in note], found.details.explaining
 
 
 def ratios(sentence):
@@ -312,9 +315,9 @@ def test_a_noisy_recording_has_the_ratios_of_moments_that_fit_it():
     assert (np.abs(found - [3, 3.5]) <= 2 * off).all()  # measured: 0.6 and 0.8 of an interval
     assert (off < 0.05).all()  # measured: 0.003 and 0.003
     other = SCENE.rename("other", body=cv.RigidBody([2e-3, 6e-3, 6.5e-3]))
-    wrong, notes, diagnosis = notes_on_moments(other, W)
-    assert (wrong, notes, diagnosis.name) == ("wrong", [], "other moments")
-    found, off = ratios(diagnosis.sentence.partition("(of the body")[0])
+    wrong, notes, (mistake,) = notes_on_moments(other, W)
+    assert (wrong, notes, mistake.name) == ("wrong", [], "other moments")
+    found, off = ratios(mistake.sentence.partition("(of the body")[0])
     assert (np.abs(found - [3, 3.5]) <= 2 * off).all()
     rotor = SCENE.rename("rotor", body=cv.RigidBody(J, [1e-5, 0, 0]))
     assert notes_on_moments(rotor, W)[1] == []  # a motion with a rotor depends on more than ratios
@@ -323,5 +326,5 @@ def test_a_noisy_recording_has_the_ratios_of_moments_that_fit_it():
 def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_permit_it():
     jitter = 1e-3 * np.random.default_rng(3).normal(size=len(T))
     moved, rates = free_body(SCENE.body, np.eye(3), W0, np.maximum(T + np.append(0, jitter[1:]), 0))
-    assert verdict(T, moved, rates)["verdict"] == "wrong"
-    assert verdict(T, moved, rates, error=0.05)["verdict"] == "right"  # measured: an error of 0.006
+    assert verdict(T, moved, rates).verdict == "wrong"
+    assert verdict(T, moved, rates, error=0.05).verdict == "right"  # measured: an error of 0.006

@@ -1,4 +1,4 @@
-"""The CSV of `conservative run` is right for `conservative judge`, whole and with its start cut off."""
+"""The CSV of `conservative run` is right for `conservative verify`, whole and with its start cut off."""
 
 import json
 
@@ -21,7 +21,8 @@ def test_the_csv_of_a_scene_is_right_whole_and_without_its_start(name, tmp_path)
     header, *rows = whole.read_text().splitlines()
     rest.write_text("\n".join([header, *rows[len(rows) // 3 :], ""]))
     for path in (whole, rest):
-        done = CliRunner().invoke(main, ["judge", str(path), "--body", name, "--json"])
-        found = json.loads(done.stdout)
-        assert (found["verdict"], done.exit_code) == ("right", 0), found["error"]
-        assert found["rows"]["compared"] == found["rows"]["in file"] == len(rows) - (path == rest) * (len(rows) // 3)
+        done = CliRunner().invoke(main, ["verify", str(path), "--body", name, "--json"])
+        (found,) = json.loads(done.stdout)["subjects"]
+        assert (found["verdict"], done.exit_code) == ("right", 0), found["sentence"]
+        details = found["details"]
+        assert details["compared"] == details["in_file"] == len(rows) - (path == rest) * (len(rows) // 3)

@@ -1,4 +1,4 @@
-"""`conservative judge`: files with the faults of five flight simulators, files that are written, and exit codes."""
+"""`conservative verify` of recordings: faults of five flight simulators, files that are written, and exit codes."""
 
 import json
 
@@ -24,14 +24,16 @@ T = np.linspace(0, 30, 301)
 AB2 = "Adams-Bashforth 2 (first step Euler)"
 
 
-def judge(folder, rates, *options):
+def verify(folder, rates, *options):
     names = [f"bodyAngularRateWrtEi_deg_s_{axis}" for axis in ("Roll", "Pitch", "Yaw")]
     table = pd.DataFrame(np.degrees(rates), columns=names)
     table.insert(0, "time", T)
     table.to_csv(folder / "run.csv", index=False)
     (folder / "body.toml").write_text(TOML)
-    done = CliRunner().invoke(main, ["judge", str(folder / "run.csv"), "--body", str(folder / "body.toml"), *map(str, options)])
-    return done, (json.loads(done.stdout) if "--json" in options and done.exit_code < 2 else None)
+    done = CliRunner().invoke(
+        main, ["verify", str(folder / "run.csv"), "--body", str(folder / "body.toml"), *map(str, options)]
+    )
+    return done, (json.loads(done.stdout)["subjects"][0] if "--json" in options and done.exit_code < 2 else None)
 
 
 def late():
@@ -49,67 +51,71 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_faults_of_flight_simulators_are_named(name, tmp_path):
     made, fault, values = FILES[name]
-    done, found = judge(tmp_path, made(), "--json")
-    assert (done.exit_code, found["right"]) == ((0, True) if fault is None else (1, False))
+    done, found = verify(tmp_path, made(), "--json")
+    assert (done.exit_code, found["verdict"]) == ((0, "right") if fault is None else (1, "wrong"))
+    (finding,) = found["findings"]
     if fault is None:
-        assert found["diagnosis"] is None
-        assert max(found["error"]) < 1e-11  # measured: 4e-12, the round-off of the digits
+        assert finding["causes"] == []
+        assert max(found["details"]["error"]) < 1e-11  # measured: 4e-12, the round-off of the digits
     else:
-        assert found["diagnosis"]["name"] == fault
-        assert found["diagnosis"]["values"] == pytest.approx(values, rel=1e-6)
+        (cause,) = finding["causes"]
+        assert cause["keys"] == [fault]
+        assert cause["numbers"] == pytest.approx(values, rel=1e-6)
 
 
 def test_the_folder_has_every_format_and_is_replaced_by_the_same_command_only(tmp_path):
     out = tmp_path / "out"
-    done, _ = judge(tmp_path, late(), "--out", out)
+    done, _ = verify(tmp_path, late(), "--out", out)
     assert done.exit_code == 1
     text = " ".join(done.stdout.split())
-    assert "run.csv is WRONG: its largest error is 4.8e-3 deg/s; " in text  # 4.7428e-3, rounded up
-    assert "Constant time shift: the file is +0.0005 s ahead of the exact motion after its first row." in text
-    assert sorted(path.name for path in out.iterdir()) == ["judge.csv", "judge.json", "judge.md", "judge.svg"]
-    table = pd.read_csv(out / "judge.csv")
+    assert "run.csv is wrong: its largest error is 0.0047 deg/s; " in text
+    assert "Constant time shift: the file is +0.0005 s ahead of the exact motion after its first row (leaves" in text
+    assert sorted(path.name for path in out.iterdir()) == ["errors.csv", "errors.svg", "verify.csv", "verify.json", "verify.md"]
+    table = pd.read_csv(out / "errors.csv")
     assert table["quantity"].unique().tolist() == ["rate error, deg/s", "drift of energy"]
     assert table["value"].max() == pytest.approx(4.7428e-3, rel=1e-4)
-    picture = (out / "judge.svg").read_text()
+    picture = (out / "errors.svg").read_text()
     assert all(f"run.csv: {quantity}" in picture for quantity in table["quantity"].unique())
-    assert judge(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 0
-    (out / "judge.md").write_text("mine")
-    assert judge(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 2
-    assert (out / "judge.md").read_text() == "mine"
+    assert pd.read_csv(out / "verify.csv")[["subject", "verdict", "mistakes"]].values.tolist() == [
+        ["run.csv", "wrong", "time shift"]
+    ]
+    assert verify(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 0
+    (out / "verify.md").write_text("mine")
+    assert verify(tmp_path, exact(BRICK, T)[1], "--out", out)[0].exit_code == 2
+    assert (out / "verify.md").read_text() == "mine"
 
 
 def test_a_motion_that_the_integrator_turns_to_the_intermediate_axis_is_noted(tmp_path):
     angle = 0.8 * np.exp(-T / 4)
     J = BRICK.body.moments
-    done, found = judge(tmp_path, J[1] * 0.5 * np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=1) / J, "--json")
+    done, found = verify(tmp_path, J[1] * 0.5 * np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=1) / J, "--json")
     assert done.exit_code == 1
     assert "The energy approaches L^2/(2 I2)" in found["notes"][-1]
-    assert not any("L^2" in note for note in judge(tmp_path, late(), "--json")[1]["notes"])
+    assert not any("L^2" in note for note in verify(tmp_path, late(), "--json")[1]["notes"])
 
 
 @pytest.mark.slow
 def test_the_start_of_the_scene_shows_an_error_of_the_first_row(tmp_path):
     w = exact(BRICK.rename("faster", w_WB_B0=1.01 * BRICK.w_WB_B0), T)[1]
-    assert judge(tmp_path, w)[0].exit_code == 0
-    done, found = judge(tmp_path, w, "--start", "scene", "--json")
-    assert (done.exit_code, found["error"][1] > 0.009) == (1, True)
-    assert judge(tmp_path, w, "--start", "scene", "--error", "2")[0].exit_code == 0
+    assert verify(tmp_path, w)[0].exit_code == 0
+    done, found = verify(tmp_path, w, "--start", "scene", "--json")
+    assert (done.exit_code, found["details"]["error"][1] > 0.009) == (1, True)
+    assert verify(tmp_path, w, "--start", "scene", "--error", "2")[0].exit_code == 0
 
 
 def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_path):
     run = CliRunner().invoke(main, ["run", "lagrange_top", "-m", "exact", "--dt", "0.01", "--csv", str(tmp_path / "run.csv")])
     assert run.exit_code == 0, run.output
-    done = CliRunner().invoke(main, ["judge", str(tmp_path / "run.csv"), "--body", "lagrange_top", "--json"])
-    found = json.loads(done.stdout)
-    assert (done.exit_code, found["diagnosis"]) == (0, None)
-    assert [each["quantity"] for each in found["quantities"]][:2] == ["attitude error, rad", "rate error, rad/s"]
-    assert found["quantities"][2]["quantity"] == "drift of energy"
+    done = CliRunner().invoke(main, ["verify", str(tmp_path / "run.csv"), "--body", "lagrange_top", "--json"])
+    assert done.exit_code == 0
+    quantities = json.loads(done.stdout)["subjects"][0]["details"]["quantities"]
+    assert [each["name"] for each in quantities][:3] == ["attitude error, rad", "rate error, rad/s", "drift of energy"]
     table = pd.read_csv(tmp_path / "run.csv")
     R = table[[f"R_WB_{i}{j}" for i in "123" for j in "123"]].to_numpy().reshape(-1, 3, 3)
     q = cv.attitude.to_quaternion(R)[:, [1, 2, 3, 0]]
     columns = {"t": table["t (s)"], **{f"q{i}": q[:, i] for i in range(4)}}
     pd.DataFrame(columns).to_csv(tmp_path / "order.csv", index=False)
-    done = CliRunner().invoke(main, ["judge", str(tmp_path / "order.csv"), "--body", "lagrange_top"])
+    done = CliRunner().invoke(main, ["verify", str(tmp_path / "order.csv"), "--body", "lagrange_top"])
     assert done.exit_code == 0, done.output
     assert "xyzw fits better" in done.stdout
 
@@ -128,7 +134,7 @@ w_WB_B = [0.0, 0.1, 0.0]
 
 
 @pytest.mark.parametrize("gone", ["", "rotor", "torque"])
-def test_parts_of_a_scene_file_are_judged_from_any_row(gone, tmp_path):
+def test_parts_of_a_scene_file_are_verified_from_any_row(gone, tmp_path):
     (tmp_path / "body.toml").write_text(PARTS)
     made = PARTS
     if gone:
@@ -141,7 +147,7 @@ def test_parts_of_a_scene_file_are_judged_from_any_row(gone, tmp_path):
     pd.read_csv(tmp_path / "run.csv").iloc[150:].to_csv(tmp_path / "late.csv", index=False)
     for start in ("row", "scene"):
         arguments = [str(tmp_path / "late.csv"), "--body", str(tmp_path / "body.toml"), "--start", start, "--error", "1e-8"]
-        done = CliRunner().invoke(main, ["judge", *arguments])
+        done = CliRunner().invoke(main, ["verify", *arguments])
         assert done.exit_code == (1 if gone else 0), done.output
         assert (f"It is the motion without the {gone}" in done.stdout) == bool(gone)
 
@@ -150,6 +156,6 @@ def test_parts_of_a_scene_file_are_judged_from_any_row(gone, tmp_path):
     ("options", "expected"), [(("--euler", "zzq"), "euler: got 'zzq'"), (("--rates", "world"), "rates: got")]
 )
 def test_wrong_options_are_one_line(options, expected, tmp_path):
-    done, _ = judge(tmp_path, exact(BRICK, T)[1], *options)
+    done, _ = verify(tmp_path, exact(BRICK, T)[1], *options)
     assert (done.exit_code, len(done.stderr.splitlines())) == (2, 1)
     assert expected in done.stderr

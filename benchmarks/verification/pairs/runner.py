@@ -1,4 +1,4 @@
-"""How engines and methods run a description, in each of the ways that pairs need."""
+"""Runs of descriptions in engines and methods: alone, again, continued, in a new process, and with other bodies."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed
 from conservative.integration.many import integrate_many
 from conservative.method import Method
@@ -22,22 +23,29 @@ from conservative.references.worker.client import EngineTimeout, Worker, time_li
 
 from .pairs import Description, Samples
 
-RUN_LIMIT = 20.0
-"""Wall time in s of a run of an engine, which takes at most a twentieth of that in the usual description."""
-LIMIT = 600.0
-"""Wall time in s that a run in a new process may take."""
+RUN_LIMIT = 60.0
+"""Time limit of a run, s, against engines that hang. A run takes 800 steps at most, and may compile. It decides no verdict."""
+HANGS = 2
+"""After so many runs without an end, an engine is not run any more: each trial of a reduction could take the limit."""
+ENDLESS = f"the run had not ended after {RUN_LIMIT:g} s"
+FEW = 4
+"""Fewer numbers that are not 0 show no resolution."""
+PROBE = 9
+"""Significant digits that show whether numbers were rounded to single precision, which has seven to eight."""
 
 
 class NotAvailable(Exception):
-    """The engine has no such way to describe or run a body; the message says which."""
+    """The engine does not have this variant of a description or of a run; the message is the reason."""
 
 
-class Machine:
+class Runner:
     """An engine or method that integrates descriptions.
 
     Attributes: `method`; `precision`, the relative one of its numbers, or the tolerance of its steps if that is larger;
-    `adaptive`, True if it chooses its steps.
+    `resolution`, the relative one of its samples, 0 if they have all digits; `adaptive`, True if it chooses its steps.
     """
+
+    resolution = 0.0
 
     def __init__(self, method: Method) -> None:
         self.method, self.adaptive, self._tolerances = method, method.order is None, tuple[str, ...]()
@@ -47,17 +55,17 @@ class Machine:
             self._tolerances = tuple(filter(None, (own, "rtol", "tol")))
             self.precision = max([self.precision, *(getattr(method, name, 0.0) or 0.0 for name in self._tolerances)])
 
-    def looser(self) -> Machine | None:
-        """Return the machine of the method with a hundred times its tolerance; None if it has none that is known."""
+    def looser(self) -> Runner | None:
+        """Return the runner of the method with a hundred times its tolerance; None if it has none that is known."""
         name = next((name for name in self._tolerances if getattr(self.method, name, 0.0)), "")
         if not self.adaptive or not name:
             return None
         tolerance = {name: min(100 * getattr(self.method, name), 0.1)}
-        return machine_of(replace(cast("Any", self.method), **tolerance))
+        return runner_of(replace(cast("Any", self.method), **tolerance))
 
-    def has(self, way: str) -> bool:
-        """Return whether the engine can be told about a body in a way."""
-        return way in ("frame", "zero")
+    def has(self, variant: str) -> bool:
+        """Return whether the engine has a variant of descriptions."""
+        return variant in ("frame", "zero")
 
     def unsupported(self, one: Description) -> str | None:
         """Return why a description is not supported; None if it is."""
@@ -93,32 +101,36 @@ class Machine:
         """Return the samples of a run in a new process."""
         worker, method = python_worker(show_output=False), self.method
         try:
-            return run_within(LIMIT, lambda: machine_of(method).model(one)(), process=worker)
+            return run_within(RUN_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
+        except EngineTimeout:
+            raise NotAvailable(ENDLESS) from None
         finally:
             worker.close()
 
     @contextmanager
-    def closing(self) -> Iterator[Machine]:
-        """Free what the machine holds at the end of the block."""
+    def closing(self) -> Iterator[Runner]:
+        """Free what the runner holds at the end of the block."""
         yield self
 
 
-class EngineMachine(Machine):
+class EngineRunner(Runner):
     """An engine with an adapter, which gets the numbers of a description as they are, in a process of its own."""
 
     method: AdapterMethod
 
     def __init__(self, method: AdapterMethod) -> None:
         super().__init__(method)
-        self._worker = self._start()
+        self._worker, self._hangs = self._start(), 0
 
     def _start(self) -> Worker:
         if isinstance(self.method, EngineMethod):
             return new_worker(self.method.environment, self.method.precision)
         return python_worker(show_output=False)
 
-    def has(self, way: str) -> bool:
-        return way in ("quaternion", "zero") or way in self.method.data.ways
+    def has(self, variant: str) -> bool:
+        # PROTOCOL.md promises moments above 0. Our adapters pass a moment of 0 on, as a user of their engine does.
+        ours = getattr(self.method.adapter, "environment", None) is None
+        return variant == "quaternion" or (variant == "zero" and ours) or variant in self.method.data.descriptions
 
     def _given(self, numbers: dict[str, Any]) -> dict[str, Any]:
         return {"adapter": str(self.method.adapter.__file__), "settings": self.method.settings, **numbers}
@@ -127,18 +139,23 @@ class EngineMachine(Machine):
         run = WorkerRun(worker, self._given(numbers), lambda answer: answer)
 
         def samples() -> Any:
+            if self._hangs == HANGS:
+                raise NotAvailable(f"{ENDLESS}, {HANGS} times")
             try:
                 with time_limit(RUN_LIMIT):
                     answer = run()
             except NotImplementedError as error:
                 raise NotAvailable(str(error)) from None
             if isinstance(answer, EngineTimeout):  # such as of steps that become tiny, which is no other motion
-                raise NotAvailable(f"the run had not ended after {RUN_LIMIT:g} s")
+                self._hangs += 1
+                raise NotAvailable(ENDLESS)
             if isinstance(answer, IntegrationFailed):
                 worker.close()  # it may have lost its memory, as an aborted program of WebAssembly has
                 raise answer
             states = read_states(answer, shape)
             n, s, _ = states.values.shape
+            precision, resolution = find_digits(states.values)
+            self.precision, self.resolution = max(self.precision, precision), max(self.resolution, resolution)
             R, w, _ = to_body_axes(np.empty(s), states, np.broadcast_to(np.eye(3), (n, 3, 3)))
             return R, w
 
@@ -164,16 +181,33 @@ class EngineMachine(Machine):
             worker.close()
 
     @contextmanager
-    def closing(self) -> Iterator[Machine]:
+    def closing(self) -> Iterator[Runner]:
         try:
             yield self
         finally:
             self._worker.close()
 
 
-def machine_of(method: Method) -> Machine:
-    """Return the machine of a method."""
-    return EngineMachine(method) if isinstance(method, AdapterMethod) else Machine(method)
+def find_digits(values: Array) -> tuple[float, float]:
+    """Return the relative precision of the numbers in samples, and the resolution of written ones, 0 if all digits are there.
+
+    A program may compute in single precision, or write few digits, without a declaration.
+    """
+    ends = values[..., -1, :].ravel()
+    ends = ends[np.isfinite(ends) & (ends != 0)]
+    if len(ends) < FEW:
+        return 0.0, 0.0
+    with np.errstate(all="ignore"):
+        single = ends.astype(np.float32).astype(float)
+    if all(f"{one:.{PROBE}g}" == f"{other:.{PROBE}g}" for one, other in zip(ends, single, strict=True)):
+        return float(np.finfo("f4").eps), 0.0
+    written = next((digits for digits in range(3, 15) if all(float(f"{one:.{digits}g}") == one for one in ends)), 0)
+    return 0.0, 10.0 ** (1 - written) if written else 0.0
+
+
+def runner_of(method: Method) -> Runner:
+    """Return the runner of a method."""
+    return EngineRunner(method) if isinstance(method, AdapterMethod) else Runner(method)
 
 
 def _others(one: Description, n: int) -> list[Description]:
@@ -182,33 +216,37 @@ def _others(one: Description, n: int) -> list[Description]:
     return [replace(one, w0=one.w0 * factor[:3], inertia=one.inertia * factor[3]) for factor in factors]
 
 
-def run(machine: Machine, first: Description, one: Description, how: str, model: Callable[[], Samples]) -> Samples:
-    """Return the samples of a twin of a first description, run in a way of a pair; `model` is that of the first.
+def run(runner: Runner, first: Description, one: Description, how: str, model: Callable[[], Samples]) -> Samples:
+    """Return the samples of a second description, run as a pair asks for it (`Pair.run`); `model` is the model of the first.
 
     Raise `NotAvailable` if the engine cannot.
     """
     if how == "again":
         return model()
     if how == "process":
-        return machine.apart(one)
+        return runner.apart(one)
     if how == "reset":
         with suppress(IntegrationFailed):
-            machine.model(_others(one, 1)[0])()
+            runner.model(_others(one, 1)[0])()
         return model()
     if how == "thinned":
-        (R, w), kept = machine.model(one)(), first.grid.steps.astype(int)
+        (R, w), kept = runner.model(one)(), first.grid.steps.astype(int)
         return R[kept], w[kept]
     if how == "continued":
         steps = one.n_steps // 2
         if not steps:
             raise NotAvailable("half a step")
-        R, w = machine.model(replace(one, n_steps=steps, every=steps))()
+        R, w = runner.model(replace(one, n_steps=steps, every=steps))()
+        if not (np.isfinite(R).all() and np.isfinite(w).all()):
+            return R, w
+        # An engine may return attitudes that are not rotations to rounding; a request has a rotation.
+        U, _, V = np.linalg.svd(R[-1])
         rest = one.n_steps - steps
-        end = machine.model(replace(one, R0=R[-1], w0=w[-1], n_steps=rest, every=rest))()
+        end = runner.model(replace(one, R0=U @ V, w0=w[-1], n_steps=rest, every=rest))()
         return np.stack([R[0], end[0][-1]]), np.stack([w[0], end[1][-1]])
     if how:
         place, count = (int(word) for word in how.split(" of "))
         bodies = _others(one, count)
         bodies[place - 1] = one
-        return machine.many(bodies, place - 1)
-    return machine.model(one)()
+        return runner.many(bodies, place - 1)
+    return runner.model(one)()
