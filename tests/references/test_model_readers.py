@@ -222,7 +222,7 @@ def test_urdf_1_1_has_quaternions_and_1_0_ignores_them(read):
     assert any("quat_xyzw" in note for note in model.notes)
 
 
-def test_the_readers_of_scenes_and_of_importers_agree_about_a_urdf(read, tmp_path):
+def test_the_readers_of_scenes_and_of_engines_agree_about_a_urdf(read, tmp_path):
     quaternion = '<origin xyz="0.02 -0.01 0.03" quat_xyzw="0 0 0.6 0.8"/>'
     ours = body_of(read("a.urdf", urdf(INERTIAL.replace("<mass", f"{quaternion}<mass"), attributes=' version="1.1"')))
     (tmp_path / "s.toml").write_text('t_end = 1.0\n[body]\nurdf = "a.urdf"\nname = "a"\n[start]\nw_WB_B = [1, 2, 3]\n')

@@ -189,8 +189,8 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     printed = f" (it prints: {prints})" if prints else ""
     if not differs and not (flaw or model.disagree or model.invalid):
         return Opinion(Verdict.RIGHT, error=error)
-    if body and (asked := model.asked_for(engine, body, tolerance)):
-        return Opinion(Verdict.RIGHT, f"as the file asks: {asked}")
+    if body and (options := model.asked_for(engine, body, tolerance)):
+        return Opinion(Verdict.RIGHT, f"as the file asks: {options}")
     if doubt and not (flaw and not differs):
         return Opinion(Verdict.UNDECIDED, f"{doubt}; {has}{printed}")
     if flaw:
