@@ -181,7 +181,7 @@ FRB_TURN = rotation_about(np.cross(FRB_FIELD, (0, 0, 1)), np.arccos(FRB_FIELD[2]
 
 
 def with_momentum(moments, momentum, t_end, start=START, potential=None):
-    return cv.Scene("published", cv.RigidBody(moments), start, np.divide(momentum, moments), t_end, potential)
+    return cv.Scene("published", impossible_body(moments), start, np.divide(momentum, moments), t_end, potential)
 
 
 FRB_MOMENTUM = (-0.709894965287627, -0.685144717153487, 0.163174308075589)
