@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification, join_verdicts
+from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification
 
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
@@ -19,12 +19,14 @@ from .recording import recording_blocks, two_blocks
 
 Key = TypeVar("Key")
 SIGNS = {
+    Verdict.RIGHT: ("✓", Grade.GOOD),
     Verdict.WRONG: ("✗", Grade.BAD),
     Verdict.UNDECIDED: ("?", Grade.FAIR),
-    Verdict.RIGHT: ("✓", Grade.GOOD),
     Verdict.NOT_TESTED: (DASH, Grade.NONE),
 }
-"""Symbol and grade of each verdict; what decides comes first."""
+"""Symbol and grade of each verdict."""
+DECIDING = (Verdict.WRONG, Verdict.UNDECIDED, Verdict.NOT_TESTED, Verdict.RIGHT)
+"""Verdicts in the order in which they decide the verdict on several subjects: only right ones together are right."""
 LISTED = 4
 """Cases that an item of a list names."""
 TERMS = (
@@ -45,7 +47,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
     Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
     """
-    order = sorted(verifications, key=lambda each: list(SIGNS).index(each.verdict))
+    order = sorted(verifications, key=lambda each: DECIDING.index(each.verdict))
     models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
     listed_alone = [*others, *(models if len(models) == 1 else ())]
     sentences = [Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in listed_alone]
@@ -62,7 +64,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         brief=blocks(summary, [each for each in others if len(order) == 1 or each.verdict is not Verdict.RIGHT]),
         data={
             "verified": [each.subject for each in verifications],
-            "verdict": join_verdicts(each.verdict for each in verifications),
+            "verdict": order[0].verdict,
             "made": dict(made or {}),
             "subjects": [content(each) for each in verifications],
         },
@@ -72,9 +74,8 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:
-    """Return the exit code of a command: that of a wrong subject before that of an undecided one, and of a right one."""
-    codes = {each.exit_code for each in verifications}
-    return next(EXIT_CODES[verdict] for verdict in SIGNS if EXIT_CODES[verdict] in codes)
+    """Return the exit code of a command: of a wrong subject if there is one, otherwise of an undecided or untested one."""
+    return EXIT_CODES[min((each.verdict for each in verifications), key=DECIDING.index)]
 
 
 def content(verification: Verification) -> dict[str, Any]:
@@ -159,12 +160,10 @@ def _sentence(verifications: Sequence[Verification]) -> str:
     if len(verifications) == 1:
         return f"{verifications[0].sentence}."
     counts = Counter(each.verdict for each in verifications)
+    if len(counts) == 1:
+        return f"All {len(verifications)} subjects are {verifications[0].verdict}."
     words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
-    return (
-        f"All {len(verifications)} {words[0].partition(' ')[2]}."
-        if len(counts) == 1
-        else f"Of {len(verifications)} subjects, {listed(words)}."
-    )
+    return f"Of {len(verifications)} subjects, {listed(words)}."
 
 
 def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
