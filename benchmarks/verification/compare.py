@@ -24,6 +24,8 @@ UNITS_OF_DIGITS = 6.0  # of what digits round, that the largest error may have
 SIGMAS = 7.0  # of noise, that the largest error may have
 ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
+TINY = 1e-11  # of noise, which is round-off
+PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
 LINEAR = 0.3  # rad, differences of motions that are taken as small
@@ -67,6 +69,12 @@ def take_rows(data: States, rows: Any) -> States:
     return None if data[0] is None else data[0][rows], None if data[1] is None else data[1][rows]
 
 
+def take_part(motion: tuple[Array, Array], of: States) -> States:
+    """Return attitudes and rates of a motion as far as data have them."""
+    R, w = (x if y is not None else None for x, y in zip(motion, of, strict=True))
+    return R, w
+
+
 @dataclass
 class Effort:
     """The work that a search may still do. It is counted, because the clock depends on how busy the machine is.
@@ -94,7 +102,7 @@ class Compared:
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
-    alone decides, it is that.
+    alone decides, it is that. `step` is the step of a program, s; None if it is not known.
     """
 
     scene: Scene
@@ -109,6 +117,12 @@ class Compared:
     stride: int = 1
     effort: Effort = field(default_factory=lambda: Effort(math.inf))
     rounded: tuple[float, float] = (0.0, 0.0)
+    step: float | None = None
+
+    @property
+    def from_row(self) -> bool:
+        """Whether the initial state is that of the first row."""
+        return self.start == float(self.t[0])
 
     def take(self, rows: Any) -> Compared:
         """Return some of the rows."""
@@ -120,7 +134,7 @@ class Compared:
 
     def read(self, R: Array | None, w: Array | None) -> Compared:
         """Return the case of other attitudes and rates, from the first row on."""
-        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None and self.start == self.t[0]}
+        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None and self.from_row}
         return replace(self, scene=self.scene.rename(self.scene.name, **changes), data=(R, w))
 
     def rescale(self, scale: float) -> Compared:
@@ -168,6 +182,10 @@ class Compared:
         return np.stack(
             [2 * np.arcsin(np.minimum(np.linalg.norm(d[..., :9], axis=-1) / 2, 1)), np.linalg.norm(d[..., 9:], axis=-1)]
         )
+
+    def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+        """Return the largest differences (2,) of two motions in the quantities of the data: rad, and relative to the scale."""
+        return replace(self, data=take_part(other, self.data)).errors(*one).max(axis=1)
 
     def passes(self, error: Array) -> bool:
         """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
@@ -251,6 +269,18 @@ class Compared:
         return replace(self, scene=self.scene.rename(self.scene.name, R_WB0=R0, w_WB_B0=w0))
 
 
+def compare_answers(scene: Scene, t: Array, data: States, allowed: Array, step: float | None = None) -> Compared:
+    """Return the case of samples of a program or engine at times t, s, of the scene, whose errors (2,) may be `allowed`.
+
+    `step` is the step of the program, s.
+    """
+    allowed = np.asarray(allowed, float)
+    rates = truth(scene, 0.0, t)[1]
+    scale = float(np.linalg.norm(np.vstack([scene.w_WB_B0, rates]), axis=1).max()) or 1.0
+    noise = np.maximum(allowed * PART_OF_ALLOWED, 1e-13)
+    return Compared(scene, t, data, 0.0, scale, allowed, noise, rounded=(float(allowed[0]), float(allowed[1])), step=step)
+
+
 def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
     """Return motions (..., n) minus another one (n), (..., n, 6): turns in body axes, rad, and relative rates."""
     turn = np.nan_to_num(np.swapaxes(R0, -1, -2) @ R) + 0.0
@@ -303,5 +333,5 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
             d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
             found.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
         noise[i] = min(found)
-        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < 1e-11
+        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < TINY
     return noise, resolved

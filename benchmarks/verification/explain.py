@@ -4,28 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
-from typing import Any
+from itertools import chain, combinations, product
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array
-from conservative.needs import Need
+from conservative.attitude import Array, to_quaternion
 
 from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
-from .explanation import PROVEN, Explanation, attempt, explain
+from .explanation import PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, find_steps
-from .mistakes import catalogue as mistakes
-from .mistakes.catalogue import ATTITUDES, BARE, QUATERNION, READINGS
+from .mistakes import BY_KEY
+from .mistakes.attitudes import RULES, align, integrate
+from .mistakes.equations import EQUATIONS
+from .mistakes.habits import HABITS, ROWS, STANDSTILLS, RowHabit, Standstill
+from .mistakes.mistake import Number
+from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
+from .mistakes.scenes import PARTS as SCENE_PARTS
+from .mistakes.scenes import SCENES, SceneMistake, with_inertia
+from .mistakes.steps import INTEGRATORS
+from .mistakes.times import DROPPED, JITTERED, TIMES
 from .solution import Equations, closed, truth
+from .trials import by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500  # rows that are explained
-EFFORT = 30_000  # stretches, after which the search ends: about a minute; the tests of this package take up to 4,344
+EFFORT = 10_000  # stretches, after which the search ends: about 20 s of an idle core
 MOST_BREAKS = 50  # of loads, if numbers are fitted
+STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
+SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
-NOT_INTEGRAL = "The rates are right, but the attitudes are not their integral: they follow"
+ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
+PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
+"""Kinds of mistakes that a program can have beside the errors of its method."""
 
 
 @dataclass(frozen=True)
@@ -37,37 +49,49 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)
 
 
-def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = lambda _: None) -> Diagnosis:
-    """Search for the mistakes that explain the error of a file.
+def diagnose(
+    whole: Compared,
+    quaternion: bool = True,
+    tell: Callable[[str], None] = lambda _: None,
+    kinds: frozenset[str] = ALL_KINDS,
+) -> Diagnosis:
+    """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
 
-    A mistake explains a file if it leaves its noise or digits. Of several, the one with the fewest numbers is named, and all
-    that leave as little. A candidate leaves less than half of the error. Mistakes that make attitudes or rates worse than they
-    are have no place in either. `quaternion` is True if the order of quaternions can be wrong.
+    A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
+    fewest numbers is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes that make
+    attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions can be
+    wrong. The work is counted, so that the answer is the same on a busy machine.
     """
     whole = _before_divergence(whole)
-    units = [*_units(whole.first(LONGEST, FEWEST))] if closed(whole.scene) else []
     case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
-    case = replace(case.take(slice(None, None, stride)), stride=stride, effort=Effort(EFFORT))
-    tried = units
-    for name, search in SEARCHES.items() if len(case.t) > 3 and not any(each.explains for each in units) else ():
+    case = replace(case.take(slice(None, None, stride)), stride=stride)
+    tried, over = list[Explanation](), False
+    for name, search in SEARCHES.items():
+        if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
+            continue
         tell(name)
-        for each in search(case, quaternion):
-            tried.append(each)
-            if case.effort.over:
+        limited = replace(whole if search.whole else case, effort=Effort(EFFORT * search.share))
+        if search.whole:
+            limited = limited.first(LONGEST, FEWEST)
+        for each in search.find(limited, _Asked(quaternion, kinds, tuple(tried))):
+            if each is not None:
+                tried.append(each)
+            if limited.effort.over:
                 break
-        if search in (_readings, _attitudes, find_steps) and any(each.explains for each in tried):
+        over |= limited.effort.over
+        if search.ends and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
-    tried.sort(key=lambda each: (not each.explains, each.share))
-    if all(each.rest > PROVEN for each in tried if each.explains):  # an error that noise hides says little about its cause
-        tried = [replace(each, explains=False) for each in tried]
+    tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
+    if case.step is None and all(each.rest > PROVEN for each in tried if each.explains):
+        tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
     explaining = [each for each in tried if each.explains]
     if not explaining:
-        notes = ["The search ended before everything was tried: it takes too many trial motions."] * case.effort.over
+        notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
         return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)
@@ -75,15 +99,20 @@ def diagnose(whole: Compared, quaternion: bool, tell: Callable[[str], None] = la
     good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
     fewest = min(each.numbers for each in good)
     good = [each for each in good if each.numbers == fewest]
-    named = [each for each in good if each.name.removesuffix(BARE) == each.name or all(BARE in one.name for one in good)]
+    named = [each for each in good if _normalised(each)] or good
     return Diagnosis(named, tried, _separate(case, named))
+
+
+def _normalised(found: Explanation) -> bool:
+    """Return whether quaternions are normalised. Rates alone do not show it."""
+    return all(each.step.normalised for each in INTEGRATORS if each.key in found.keys)
 
 
 def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
     size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
-    if not size.max() > 3 * largest > 0:
+    if not size.max() > 3 * largest > 0 or size[0] > 3 * largest:
         return case
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
     return case.rescale(float(size[: len(case.t)].max()))
@@ -99,90 +128,118 @@ def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
 
 
-def _readings(case: Compared, quaternion: bool) -> Iterator[Explanation]:
+class _Asked(NamedTuple):
+    """What the caller of the search asks for: whether quaternions can have another order, kinds, and what was tried before."""
+
+    quaternion: bool
+    kinds: frozenset[str]
+    tried: tuple[Explanation, ...]
+
+
+Found = Iterator[Explanation | None]
+
+
+def _known(mistakes: Any) -> list[Any]:
+    """Return mistakes without numbers, in the order of their keys."""
+    return sorted((each for each in mistakes if not each.numbers), key=lambda each: each.key)
+
+
+def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
+    """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
+    usable = [each for each in _known(READINGS) if fits(each, case) and (quaternion or not each.quaternions)]
+    of = {name: [(), *((each,) for each in usable if each.of == name)] for name in (ATTITUDES, RATES)}
+    pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
+    return pairs[1:] + [(each,) for each in usable if each.of == AXES]
+
+
+def _readings(case: Compared, asked: _Asked) -> Found:
     """Yield other readings of attitudes and rates."""
-    first = ["", "transposed", *(QUATERNION if quaternion else ())] if case.data[0] is not None else [""]
-    second = ["", *(name for name in READINGS if name not in (*first, *QUATERNION))] if case.data[1] is not None else [""]
-    for name, other in list(product(first, second))[1:]:
-        data = case.data
-        if other == "world rates" and case.data[0] is None:
+    near = case.take(slice(0, 10))
+    for mistakes in _apply_readings(case, asked.quaternion):
+        trial = compose(*mistakes)
+        motion = trial.build(near)
+        if motion is None:
             continue
-        for each in filter(None, (name, other)):
-            data = READINGS[each][1](*data)
-        read = case.read(*data)
-        text = ". ".join(READINGS[each][0] for each in (name, other) if each)
-        if data[1] is not None and other:
-            read = replace(read, scale=float(np.linalg.norm(data[1], axis=1).max()) or 1.0)
-        near = read.take(slice(0, 10))
-        R, w = exact(near)(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), 10)
+        R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            yield attempt(case, ", ".join(filter(None, (name, other))), text, exact(read), read=read)
+            yield attempt(case, trial)
 
 
-def _changes(case: Compared, _: bool) -> Iterator[Explanation]:
+def _changes(case: Compared, asked: _Asked) -> Found:
     """Yield motions of scenes and equations with a mistake."""
-    for name, text, equations in mistakes.changes(case.scene):
-        yield attempt(case, name, text, _by(case, equations))
+    known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
+    several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
+    for mistakes in (*known, *(several if "scenes" in asked.kinds else ())):
+        yield attempt(case, compose(*mistakes))
 
 
-def _by(case: Compared, equations: Equations) -> Solution:
-    equations = replace(equations, tolerance=case.equations().tolerance)
+def _numbers(case: Compared, asked: _Asked) -> Found:
+    """Yield motions of scenes and equations with a mistake whose numbers are fitted."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    for each in sorted((*SCENES, *EQUATIONS), key=lambda each: each.key):
+        if each.numbers and each.kind in asked.kinds:
+            remark = remark_on_damping(case.scene) if each is BY_KEY["damping"] else ""
+            found = attempt(case, compose(each, remark=remark))
+            yield None if found is None else _within_digits(case, found)
+    if "equations" in asked.kinds:
+        remark = remark_on_damping(case.scene)
+        yield attempt(case, compose(BY_KEY["no gyroscopic term"], BY_KEY["damping"], remark=remark))
 
-    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
-        return equations.solve(case.start, R, w, case.t[:n])
 
-    return motion
+def _within_digits(case: Compared, found: Explanation) -> Explanation:
+    """Return an explanation, with a remark if the number differs from the scene's by less than the digits of the scene."""
+    if found.keys != ("rate of the orbit",):
+        return found
+    rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
+    text = f"{rate:.17g}".partition("e")[0] if len(repr(rate)) > 18 else repr(rate).partition("e")[0]
+    digits = len(text.replace(".", "").strip("0"))
+    if abs(found.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
+        return found
+    return replace(found, sentence=found.sentence + ", which is within the digits of the scene file")
 
 
-def _units(case: Compared) -> Iterator[Explanation]:
+def _units(case: Compared, asked: _Asked) -> Found:
     """Yield times in other units than seconds."""
-    for size in (1e-3, 1e-6, 1e-9, 60.0):
-        if case.turned * size < 2 * LONGEST and not case.scene.loads:
-            read = replace(case, t=case.start + (case.t - case.start) * size)
-            yield attempt(case, f"time in {size:g} s", f"The times are in units of {size:g} s", exact(read), read=read)
+    for each in TIMES:
+        if not each.unit or case.turned * each.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
+            continue
+        if case.step is None:
+            found = attempt(case, compose(each))
+            yield found if _moves(case, found) else None
 
 
-def _times(case: Compared, _: bool) -> Iterator[Explanation]:
+def _moves(case: Compared, found: Explanation | None) -> bool:
+    """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
+    if found is None or found.made is None:
+        return False
+    return bool((case.apart(found.made, _still(case)) > SHOWN * case.allowed).any())
+
+
+def _still(case: Compared) -> tuple[Array, Array]:
+    """Return the rows of a body that stands still, with the rates of the start."""
+    n = len(case.t)
+    return np.broadcast_to(case.scene.R_WB0, (n, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (n, 3))
+
+
+def _times(case: Compared, asked: _Asked) -> Found:
     """Yield the right states at other times: shifted, in proportion, with rows missing, jittered, or rates apart."""
+    if case.step is not None:
+        for each in TIMES:
+            if each.of_step or (each.unit and case.turned * each.unit < 2 * LONGEST):
+                found = attempt(case, compose(each))
+                yield found if not each.unit or _moves(case, found) else None
+        return
     later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
-    rest, gap, unit = case.take(later), float(np.median(np.diff(case.t))), 1 / case.scale
-    end = float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap)
-
-    def moved(both: bool) -> Solution:
-        known: list[Any] = []
-
-        def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
-            if case.free or not known:
-                known[:] = [case.equations().flow(case.start, R, w, end)]
-            flow = known[0]
-            times = (
-                case.start
-                + (rest.t[:n] - case.start) * (1 + np.clip(p[:, 1:].sum(axis=1), -0.5, 0.1))[:, None]
-                + p[:, :1] * unit
-            )
-            times[:, 0] = rest.t[0]
-            a, b = flow.shifted(np.clip(times, case.start, end))
-            return (a if both else np.broadcast_to(flow.at(rest.t[:n])[0], a.shape)), b
-
-        return motion
-
-    yield attempt(
-        rest, "time shift", "Constant time shift: the file is {shift:+.4g} s ahead of the exact motion after its first row",
-        moved(True), [0.0], lambda p: {"shift": float(p[0]) * unit},
-    )  # fmt: skip
-    yield attempt(
-        rest, "phase drift", "The time is scaled: the file is {rate:+.3g} s per second too fast, and {shift:+.3g} s ahead",
-        moved(True), [0.0, 0.0], lambda p: {"shift": float(p[0]) * unit, "rate": float(p[1])},
-    )  # fmt: skip
-    if all(x is not None for x in case.data):
-        yield attempt(
-            rest, "rates at other times", "The rates are {late:+.4g} s late against the attitudes (leapfrog: half a step)",
-            moved(False), [0.0], lambda p: {"late": -float(p[0]) * unit},
-        )  # fmt: skip
-    yield from _own_times(case, gap, end)
+    for each in TIMES:
+        if not each.of_step and not each.unit:
+            yield attempt(case.take(later), compose(each))
+    if "rows" in asked.kinds:
+        gap = float(np.median(np.diff(case.t)))
+        yield from _own_times(case, gap, float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap))
 
 
-def _own_times(case: Compared, gap: float, end: float) -> Iterator[Explanation]:
+def _own_times(case: Compared, gap: float, end: float) -> Found:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
     tau, e = case.t.copy(), 1e-6 / case.scale
     end += min(end - case.start, 50 * gap)
@@ -203,44 +260,50 @@ def _own_times(case: Compared, gap: float, end: float) -> Iterator[Explanation]:
     lost, size = np.rint(off / gap), float(np.sqrt(np.mean(off**2)))
     if lost.max() >= 1 and np.abs(off - lost * gap).max() < 0.2 * gap and (np.diff(lost) >= 0).all():
         at = float(case.t[np.flatnonzero(lost)[0]])
-        text = "Rows are missing: {rows:.0f}, the first before {at:.6g} s, and the times are those of a file without gaps"
         values = {"rows": float(lost.max()), "at": at}
-        yield explain(case, "dropped rows", text, sample(case.t + lost * gap), values, numbers=2)
+        yield explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
     elif abs(float(np.mean(off))) < 0.5 * size:
-        text = "The time stamps are jittered by {jitter:.3g} s (root of the mean square)"
-        yield explain(case, "jittered times", text, sample(tau), {"jitter": size}, numbers=3)
+        yield explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
 
 
-def _attitudes(case: Compared, _: bool) -> Iterator[Explanation]:
+def _nowhere(case: Compared) -> None:
+    """Return no motion: the mistake belongs to one recording."""
+
+
+def _attitudes(case: Compared, asked: _Asked) -> Found:
     """Yield attitudes by usual rules from the exact rates, if the rates of the file are exact."""
     R, w = case.data
     if R is None or w is None:
+        return
+    if case.step is not None:
+        if (case.errors(*case.exact)[1] <= case.allowed[1]).all():
+            for rule in RULES:
+                yield attempt(case, by_rule(rule, 1), known={"step": case.step})
         return
     alone = replace(case, data=(None, w), free=case.free[3:])
     if alone.free:  # the integral collects what the first row is off
         case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
     made = case.exact
-    if case.errors(*made)[1].max() > case.allowed[1]:
+    if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
-    for name, rule in ATTITUDES.items():
+    for rule in RULES:
         wanted, seen, found = [case.stride, 1], set[int](), list[Explanation]()
         while wanted and len(seen) < 8:
             parts = wanted.pop()
             if parts in seen or not 1 <= parts <= PARTS or parts * len(case.t) > 4 * STEPS_AT_MOST:
                 continue
             seen.add(parts)
+            case.effort.spend(parts * len(case.t) / 100)
             fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
             rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
-            turned = mistakes.integrate(rule, case.scene.R_WB0, rates, np.diff(fine), parts)
+            turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
             error, gone = turned - made[0], R - made[0]
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
-                turned = mistakes.align(turned, R, name.endswith(mistakes.IN_WORLD))
-            found.append(explain(
-                case, f"attitudes by {name}", f"{NOT_INTEGRAL} {name}, with a step of {{step:.4g}} s",
-                (turned, made[1]), {"step": float(np.median(np.diff(case.t))) / parts},
-            ))  # fmt: skip
+                turned = align(turned, R, rule.world)
+            step = float(np.median(np.diff(case.t))) / parts
+            found.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
             if found[-1].explains:
                 break
             if ratio > 0:
@@ -248,58 +311,190 @@ def _attitudes(case: Compared, _: bool) -> Iterator[Explanation]:
         yield min(found, key=lambda each: each.share)
 
 
-def _fits(case: Compared, _: bool) -> Iterator[Explanation]:
-    """Yield motions with numbers that are fitted."""
-    scene = case.scene
-    if len(scene.breaks) > MOST_BREAKS:
+def _habits(case: Compared, asked: _Asked) -> Found:
+    """Yield motions whose state is changed after each step, or that stand still."""
+    for each in STANDSTILLS:
+        yield _standstill(case, each)
+    w = case.data[1]
+    if w is None or len(case.scene.breaks) > MOST_BREAKS:
         return
-    more = ", in addition to the damping of the scene" * (Need.DAMPING in scene.needs)
-    for name, text, term in (("damped", "", 1.0), ("no gyroscopic term, damped", f"{mistakes.NO_TERM}. ", 0.0)):
-        text += "The rates are damped by {damping:.4g} per second" + more
+    before = _rates_before(case)
+    rows = w if case.from_row else np.vstack([case.scene.w_WB_B0, w])
+    for habit in HABITS:
+        numbers = habit.guess(rows[1:], before[-len(rows) + 1 :])
+        if not numbers:
+            continue
+        known = dict(zip((number.name for number in habit.numbers), numbers, strict=True))
+        found = list[Explanation]()
+        for parts in (1, 2, 5, 10) if case.step is None else (1,):
+            step = case.step or float(np.median(np.diff(case.t))) / parts
+            first = case.take(slice(0, int(np.flatnonzero(case.error.max(axis=0) > case.allowed.min())[:1].sum()) + 30))
+            for some in (first, case) if len(first.t) < len(case.t) and len(first.t) > 3 else (case,):
+                one = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
+                if one is None or one.share > 0.5 or some is case:
+                    break
+            if one is not None:
+                found.append(replace(one, trial=by_habit(habit, step), numbers=len(numbers)))
+                if one.explains:
+                    break
+        yield from found
 
-        def motion(R: Array, w: Array, p: Array, n: int, term: float = term) -> tuple[Array, Array]:
-            return case.equations(scene, term, damping=p[:, 0] * case.scale).solve(case.start, R, w, case.t[:n])
 
-        yield attempt(case, name, text, motion, [0.0], lambda p: {"damping": float(p[0]) * case.scale})
-    if case.start == case.t[0]:
+def _at_numbers(trial: Trial, numbers: tuple[float, ...]) -> Trial:
+    """Return a trial whose numbers are known."""
+
+    def build(case: Compared) -> Solution | None:
+        motion = trial.build(case)
+        if motion is None:
+            return None
+        return lambda R, w, p, n: motion(R, w, np.broadcast_to(numbers, (len(R), len(numbers))), n)
+
+    return replace(trial, build=build, numbers=())
+
+
+def _rates_before(case: Compared) -> Array:
+    """Return the rates (n, 3) of exact motions from the row before, or if these are unknown, of the whole exact motion."""
+    R, w = case.data
+    equations = case.equations()
+    gaps = np.diff(case.t)
+    R = np.broadcast_to(np.eye(3), (len(case.t), 3, 3)) if R is None and case.scene.free else R
+    if R is None or w is None or not equations.steady or np.ptp(gaps) > 1e-6 * gaps.min():
+        return case.exact[1]
+    case.effort.spend(len(case.t) / 10)
+    made = equations.solve(0.0, R[:-1], w[:-1], np.array([gaps.mean()]))[1][:, 0]
+    return np.vstack([case.exact[1][:1], made])
+
+
+def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
+    """Return the explanation by a body that stands still from a time on; None if the rows do not."""
+    R, w = case.data
+    moved = np.zeros(len(case.t) - 1)
+    for x, scale in ((R, 1.0), (w, case.scale)):
+        if x is not None:
+            moved = np.maximum(moved, np.abs(np.diff(x, axis=0)).reshape(len(moved), -1).max(axis=1) / scale)
+    going = np.flatnonzero(moved > STILL)
+    k = int(going[-1]) + 1 if len(going) else 0
+    rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
+    if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
+        return None
+    still = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), _still(case)[1]), _still(case))[0] <= STILL
+    if mistake.from_start != still or (R is None and not rest):
+        return None
+    stop = float(case.t[k])
+
+    def build(of: Compared) -> Solution | None:
+        equations = of.equations()
+
+        def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+            at = np.clip(p[:, :1] if p.shape[1] else of.start, of.start, None)
+            t = np.minimum(of.t[:n], at) if p.shape[1] else np.full((len(R), n), of.start)
+            flow = equations.flow(of.start, R, w, float(max(t.max(), of.start)) + 1e-9 * (of.t[-1] - of.start))
+            a, b = flow.shifted(t)
+            return a, np.where((of.t[:n] >= stop)[:, None], mistake.rest, 1.0) * b
+
+        return motion
+
+    trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _standstill(other, mistake))
+    if R is None or mistake.from_start:  # rates alone do not show when between two rows
+        known = {each.name: stop for each in mistake.numbers}
+        found = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
+        return None if found is None else replace(found, trial=trial)
+    return attempt(case, trial, [stop if k == 0 else float(case.t[k - 1] + case.t[k]) / 2])
+
+
+def _rows(case: Compared, asked: _Asked) -> Found:
+    """Yield right motions of which some rows are written wrongly: every n-th, or where the quaternion changes its sign."""
+    error = (case.error / case.allowed[:, None]).max(axis=0)
+    off = _off_rows(error)
+    if off is None:
+        return
+    rest = ~off
+    noise = np.maximum(np.sqrt((case.error[:, rest] ** 2).mean(axis=1)), 1e-13)
+    allowed = np.maximum(1e-9, np.minimum(case.allowed, 10 * noise))
+    fine = replace(case, noise=noise, allowed=allowed)
+    places = np.flatnonzero(off)
+    q = to_quaternion(case.exact[0])
+    signs = np.flatnonzero((q[1:] * q[:-1]).sum(axis=1) < 0) + 1
+    near = bool(len(signs)) and all(np.abs(signs - k).min() <= 1 for k in places)
+    gaps = np.diff(places)
+    periodic = len(places) > 2 and np.ptp(gaps) == 0
+    stride = case.stride
+    for each in ROWS:
+        if each.periodic != periodic or (not each.periodic and not near):
+            continue
+        made = each.change(case.exact, case.data, off)
+        values = {"first": float(places[0] * stride + 1)}
+        values |= {"period": float(gaps[0] * stride)} if periodic else {"rows": float(len(places))}
+        if (np.maximum(*fine.errors(*made)) <= 1e9).all():
+            free = each.change is ROWS[-1].change
+            yield explain(fine, Trial((each,), _rows_again(each)), made, values, numbers=2 + 3 * free)
+
+
+def _rows_again(mistake: RowHabit) -> Callable[[Compared], Solution | None]:
+    return _nowhere
+
+
+def _off_rows(error: Array) -> Any:
+    """Return which rows are off, if all others are much nearer: those of one residue, or up to a tenth of the rows."""
+    n = len(error)
+    for period in range(2, 7):
+        for first in range(period):
+            off = np.arange(n) % period == first
+            if off.sum() > 3 and np.median(error[off]) > 100 * error[~off].max():
+                return off & (error > 10 * error[~off].max())
+    order = np.sort(error)
+    small = order[: int(0.9 * n)].max()
+    off = error > 100 * max(small, 1e-6)
+    return off if 0 < off.sum() <= 0.1 * n else None
+
+
+def _turned_axes(case: Compared, asked: _Asked) -> Found:
+    """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    R, w = case.data
+    if R is not None and w is not None:
+        right = case.exact[1]
+        if case.from_row:  # the rates that the attitudes have
+            turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
+            right, w = turns, (w[1:] + w[:-1]) / 2
+        for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
+            U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
+            C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
+            yield attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+    trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+    motion = trial.build(near)
+    assert motion is not None
+    many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
+    left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
+    found = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
+    best = min(
+        (each for each in found if each is not None),
+        key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])),
+    )
+    turn = Rotation.from_rotvec([*best.values.values()]).as_rotvec().tolist()
+    values = dict(zip(best.values, turn, strict=True))
+    yield replace(best, values=values, sentence=trial.sentence(values))
+
+
+def _bodies(case: Compared, asked: _Asked) -> Found:
+    """Yield other first rows and other bodies."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    if case.from_row:
         have = [*range(3)] * (case.data[0] is not None) + [*range(3, 6)] * (case.data[1] is not None)
-        rest = replace(case.take(slice(1, None)), free=tuple(have))
+        rest = replace(case.take(slice(1, None)), free=tuple(have), start=case.start)
         if len(rest.t) > 3:
             initial, _extra, fitted = rest.fit(exact(rest), np.empty(0), np.empty(0))
             names = [f"start_{kind}_{i}" for kind in ("turn", "rate") for i in (1, 2, 3)]
-            text = "The first row does not fit the others: the motion starts at another attitude or other rates"
-            found = explain(replace(rest, free=()), "first row", text, fitted, {names[i]: float(initial[i]) for i in have})
+            values = {names[i]: float(initial[i]) for i in have}
+            found = explain(replace(rest, free=()), Trial((BY_KEY["first row"],), _nowhere), fitted, values)
             yield replace(found, numbers=len(have), explains=found.explains and found.size < 100)
     moments = fit_moments(case)
-    yield replace(moments, sentence=f"It is the motion of another body. {moments.sentence}. Correct --body")
-    if moments.explains:
-        return
-    yield _turned_axes(case)
-    yield _other_body(case)
-
-
-def _turned_axes(case: Compared) -> Explanation:
-    """Return the explanation by body axes that are turned, fitted from the best of 24 directions."""
-
-    def motion(of: Compared) -> Solution:
-        def turned(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
-            C = Rotation.from_rotvec(p).as_matrix()
-            a, b = exact(of)(R @ np.swapaxes(C, 1, 2), (C @ w[..., None])[..., 0], p, n)
-            return a @ C[:, None], (np.swapaxes(C, 1, 2)[:, None] @ b[..., None])[..., 0]
-
-        return turned
-
-    near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
-    many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
-    left = np.linalg.norm(near.differences(*motion(near)(*many, turns, len(near.t))), axis=(1, 2))
-    text = "The body axes of the file are not those of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad"
-
-    def values(p: Array) -> dict[str, float]:
-        back = Rotation.from_rotvec(p).as_rotvec()
-        return {f"turn_{i + 1}": float(x) for i, x in enumerate(back)}
-
-    found = [attempt(case, "body axes", text, motion(case), turns[k].tolist(), values, most=30) for k in np.argsort(left)[:3]]
-    return min(found, key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
+    sentence = BY_KEY["other moments"].sentence.format(text=moments.sentence)
+    yield replace(moments, sentence=sentence)
+    if not moments.explains:
+        yield _other_body(case)
 
 
 def fit_moments(case: Compared) -> Explanation:
@@ -321,7 +516,8 @@ def fit_moments(case: Compared) -> Explanation:
     off = [0.0] * ratios + (2 * case.deviations(_with_inertia(case, inertia), np.append(initial, p), 1e-5)[6:]).tolist()
     known = " : ".join(f"{x:.6g}" + f" ± {x * d:.1g}" * (d > 0) for x, d in zip(moments, off, strict=True))
     text = f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {known} (of the body: {own})"
-    return _possible(explain(case, "other moments", text, made, _components(inertia(p)), numbers=len(p)))
+    found = explain(case, Trial((BY_KEY["other moments"],), _nowhere), made, {"text": 0.0}, numbers=len(p))
+    return _possible(replace(found, sentence=text, values=_components(inertia(p))))
 
 
 def _components(inertia: Array) -> dict[str, float]:
@@ -338,7 +534,7 @@ def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution
     """Return the motion as a function of initial states and the numbers of an inertia."""
 
     def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
-        scenes = [mistakes.with_inertia(case.scene, inertia(numbers)) or case.scene for numbers in p]
+        scenes = [with_inertia(case.scene, inertia(numbers)) or case.scene for numbers in p]
         made = [case.equations(scene).solve(case.start, R[[i]], w[[i]], case.t[:n]) for i, scene in enumerate(scenes)]
         return np.concatenate([a for a, _ in made]), np.concatenate([b for _, b in made])
 
@@ -355,19 +551,118 @@ def _other_body(case: Compared) -> Explanation:
         made = stretch @ J @ stretch
         return made * (np.trace(J) / np.trace(made)) if free else made
 
-    text = "It is the motion of another body, with the inertia ({inertia_11:.6g}, {inertia_22:.6g}, {inertia_33:.6g}; "
-    text += "{inertia_12:.6g}, {inertia_13:.6g}, {inertia_23:.6g}) kg m^2"
-    text += " or a multiple of it. Correct --body" if free else ". Correct --body"
-    motion = _with_inertia(case, inertia)
-    return _possible(attempt(case, "another body", text, motion, [0.0] * 6, lambda p: _components(inertia(p))))
+    mistake = BY_KEY["another body"]
+    numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
+    trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
+    found = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))
+    assert found is not None
+    (a, b, c), (d, e, f) = (
+        (made := inertia(np.array([*found.values.values()])))[[0, 1, 2], [0, 1, 2]],
+        made[[0, 0, 1], [1, 2, 2]],
+    )
+    text = f"the inertia ({a:.6g}, {b:.6g}, {c:.6g}; {d:.6g}, {e:.6g}, {f:.6g}) kg m^2" + " or a multiple of it" * free
+    return _possible(replace(found, sentence=mistake.sentence.format(text=text), values=_components(made), trial=None))
 
 
-SEARCHES: dict[str, Callable[[Compared, bool], Iterator[Explanation]]] = {
-    "other equations": _changes,
-    "other readings": _readings,
-    "other times": _times,
-    "attitudes from rates": _attitudes,
-    "integrators": find_steps,
-    "other bodies": _fits,
+def _steps(case: Compared, asked: _Asked) -> Found:
+    """Yield integrators, also of the scene with the number that was fitted best."""
+    found = [*find_steps(case)]
+    yield from found
+    if any(each.explains for each in (*found, *asked.tried)):
+        return
+    sized = [
+        each for each in asked.tried if len(each.keys) == 1 and isinstance(BY_KEY[each.keys[0]], SceneMistake) and each.values
+    ]
+    for each in sorted(sized, key=lambda each: each.size)[:1]:
+        mistake = BY_KEY[each.keys[0]]
+        assert isinstance(mistake, SceneMistake)
+        if each.rest > PROVEN:
+            continue
+        factor = each.values["factor"]
+        for rounded in (float(f"{factor:.{digits}g}") for digits in (2, 3, 4, 16)):
+            other = mistake.change(case.scene, rounded)
+            if other is None:
+                continue
+            both = list[Explanation]()
+            for one in find_steps(replace(case, scene=other)):
+                trial = one.trial
+                assert trial is not None
+                assert one.made is not None
+                joint = Trial((mistake, *trial.mistakes), _in_scene(mistake, rounded, trial))
+                some = case.take(slice(0, len(one.made[0])))
+                both.append(explain(some, joint, one.made, {"factor": rounded} | one.values))
+            yield from both
+            if any(one.explains for one in both):
+                return
+
+
+def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[Compared], Solution | None]:
+    """Return the motion of a trial in the scene with a mistake."""
+
+    def build(case: Compared) -> Solution | None:
+        other = mistake.change(case.scene, number)
+        return None if other is None else trial.build(replace(case, scene=other))
+
+    return build
+
+
+def _several(case: Compared, asked: _Asked) -> Found:
+    """Yield two to four mistakes of a program at once: of its scene or equations, attitudes, rates and times."""
+    if case.step is None or any(each.explains for each in asked.tried):
+        return
+    moved = [(), *((each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds)]
+    times = [(), *((each,) for each in TIMES if not each.numbers and fits(each, case))] if "times" in asked.kinds else [()]
+    readings = [(), *_apply_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
+    ranked = []
+    start = case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t)
+    for first, second in product(moved, times):
+        if second and second[0].unit and case.turned * second[0].unit > LONGEST:
+            continue
+        motion = compose(*first, *second).build(case) if first or second else exact(case)
+        if motion is None:
+            continue
+        case.effort.spend(1 + case.turned)
+        R, w = motion(*start)
+        R, w = R[0], w[0]
+        for third in readings:
+            a, b = R, w
+            for each in third:
+                a, b = each.write(a, b)  # type: ignore[assignment]
+            if len(mistakes := (*first, *second, *third)) > 1:
+                ranked.append((len(mistakes), case.size(case.errors(a, b)), mistakes))
+    allowed = float((case.allowed / case.noise).max())
+    for _, _, mistakes in sorted(ranked, key=lambda each: (max(each[1], allowed) * 10 ** each[0], each[1]))[:3]:
+        yield attempt(case, compose(*mistakes))
+
+
+@dataclass(frozen=True)
+class Search:
+    """A part of the search: it finds explanations of some kinds with a share of the work.
+
+    If it `ends` the search, mistakes that explain the error end it after this part. `whole` is True for a part that takes rows
+    at any angle; `least` is the number of rows that it needs.
+    """
+
+    find: Callable[[Compared, _Asked], Found]
+    kinds: frozenset[str]
+    share: float
+    ends: bool = False
+    whole: bool = False
+    least: int = 4
+
+
+SEARCHES = {
+    "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
+    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.1),
+    "habits": Search(_habits, frozenset({"habits"}), 0.2, least=2),
+    "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
+    "other times": Search(_times, frozenset({"times"}), 0.05),
+    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.1),
+    "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
+    "integrators": Search(_steps, frozenset({"steps"}), 0.2, ends=True),
+    "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.2),
 }
-"""Searches by the work that they do, in their order."""
+"""Parts of the search by the work that they do, in their order."""

@@ -1,4 +1,4 @@
-"""A mistake that was tried as an explanation of a recorded motion."""
+"""A mistake, or several at once, that was tried as an explanation of a recorded motion."""
 
 from __future__ import annotations
 
@@ -12,21 +12,60 @@ import numpy as np
 from conservative.attitude import Array
 
 from .compare import HOPELESS, Compared, Solution
+from .finding import Cause
+from .mistakes.mistake import Mistake, Number
 
 HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
+OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Mistakes that are tried together.
+
+    Attributes
+    ----------
+    mistakes
+        One or several.
+    build
+        From a case to the motion with the mistakes, as a function of initial states and numbers; None if they make no
+        difference, or if the case does not have what they need.
+    numbers
+        Numbers that `build` takes; by default all of the mistakes.
+    remark
+        End of the sentence.
+    anew
+        For a mistake with numbers that belong to each recording, such as the time at which a body falls asleep: from another
+        case to the explanation.
+    """
+
+    mistakes: tuple[Mistake, ...]
+    build: Callable[[Compared], Solution | None]
+    numbers: tuple[Number, ...] = ()
+    remark: str = ""
+    anew: Callable[[Compared], Explanation | None] | None = None
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the mistakes."""
+        return tuple(each.key for each in self.mistakes)
+
+    def sentence(self, values: Mapping[str, float]) -> str:
+        """Return what is wrong, with numbers."""
+        return ". ".join(each.sentence.format(**values) for each in self.mistakes) + self.remark
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """A mistake that was tried: its name, the sentence that it states about the file, and its numbers in SI units.
+    """Mistakes that were tried: their keys, the sentence that they state about the file, and their numbers in SI units.
 
-    `left` and `plain` are the largest errors with it and without it, over the rows that it was tried on: of attitudes, rad, and
-    of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
-    units of the noise, and `explains` is True if what is left is noise. `numbers` are those that were fitted, and `made` is the
-    motion (n, 3, 3), (n, 3), None for another reading of the file. `rest` is the share of the root of the mean square.
+    `left` and `plain` are the largest errors with them and without, over the rows that they were tried on: of attitudes, rad,
+    and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
+    units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
+    the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
     """
 
-    name: str
+    keys: tuple[str, ...]
     sentence: str
     values: dict[str, float]
     left: list[float]
@@ -37,58 +76,92 @@ class Explanation:
     numbers: int = 0
     made: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
     rest: float = 0.0
+    trial: Trial | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """The keys as one text."""
+        return self.cause.key
+
+    @property
+    def cause(self) -> Cause:
+        """The mistakes as the cause of a finding, with the error of attitudes or rates, whichever is larger without them."""
+        worst = int(np.argmax(self.plain))
+        remedies = [] if self.trial is None else [each.remedy for each in self.trial.mistakes if each.remedy]
+        values = MappingProxyType(self.values)
+        return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
+
+    def again(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes with the same numbers, without any fit.
+
+        None if they make no difference there, or cannot be applied.
+        """
+        if self.trial is None:
+            return None
+        if self.trial.anew is not None:
+            return self.trial.anew(case)
+        motion = self.trial.build(case)
+        if motion is None:
+            return None
+        values = np.array([self.values[each.name] for each in self.trial.numbers])
+        R, w = case.evaluate(motion, np.concatenate([np.zeros(6), values])[None])
+        made = R[0], w[0]
+        if (case.apart(made, case.exact) <= case.allowed).all():
+            return None
+        return explain(case, self.trial, made, self.values, self.numbers)
 
 
 def explain(
     case: Compared,
-    name: str,
-    text: str,
+    trial: Trial,
     made: tuple[Array, Array],
     values: Mapping[str, float] = MappingProxyType({}),
-    read: Compared | None = None,
     numbers: int | None = None,
 ) -> Explanation:
-    """Return the explanation by the motion that a mistake makes, next to the file, or to another reading of it.
-
-    `text` is a format of `values`; `numbers` counts those that were fitted, by default all.
-    """
-    of, plain = read or case, case.plain.max(axis=1)
-    error = of.errors(*made)
-    share, rest = float(error.max() / max(plain.max(), 1e-15)), of.size(error) / max(case.size(case.plain), 1e-15)
+    """Return the explanation by the motion that mistakes make; `numbers` counts those that were fitted, by default all."""
+    plain, error = case.plain.max(axis=1), case.errors(*made)
+    rest = case.size(error) / max(case.size(case.plain), 1e-15)
     return Explanation(
-        name,
-        text.format(**values),
+        trial.keys,
+        trial.sentence(values),
         dict(values),
         error.max(axis=1).tolist(),
         plain.tolist(),
-        share,
-        of.size(error),
-        of.passes(error) and rest < HALF,
+        float(error.max() / max(plain.max(), 1e-15)),
+        case.size(error),
+        bool(case.passes(error / (1.0 if case.step is None else OWN_ERROR)) and rest < HALF),
         len(values) if numbers is None else numbers,
-        made if read is None else None,
+        made,
         rest,
+        trial,
     )
 
 
 def attempt(
     case: Compared,
-    name: str,
-    text: str,
-    motion: Solution,
-    extra: Sequence[float] = (),
-    values: Callable[[Array], dict[str, float]] = lambda _: {},
+    trial: Trial,
+    start: Sequence[float] | None = None,
     small: float = 1e-6,
     most: int = 8,
-    read: Compared | None = None,
-) -> Explanation:
+    known: Mapping[str, float] = MappingProxyType({}),
+) -> Explanation | None:
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
-    `extra` (k,) are the numbers to start with, `small` is their change for slopes, `values` names the fitted ones in SI units,
-    and `most` is the number of iterations. `read` has another reading of the rows.
+    `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
+    iterations. `known` are other numbers of the sentence, which `build` has. None if the mistakes cannot be applied.
     """
-    of, p = read or case, np.array(extra, float)
-    _, p, made = replace(of, free=()).fit(motion, p, np.full(len(p), small), most)
-    error = of.errors(*made)
-    if of.free and not of.passes(error) and (error.max(axis=1) <= HOPELESS * of.noise * of.growth).any():
-        _, p, made = of.fit(motion, p, np.full(len(p), small), most)
-    return explain(case, name, text, made, values(p), read)
+    motion = trial.build(case)
+    if motion is None:
+        return None
+    units = np.array([each.size(case.scale) for each in trial.numbers])
+    p = np.array([each.start for each in trial.numbers] if start is None else start, float) / units
+
+    def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+        return motion(R, w, p * units, n)
+
+    _, p, made = replace(case, free=()).fit(scaled, p, np.full(len(p), small), most)
+    error = case.errors(*made)
+    if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
+        _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
+    names = (each.name for each in trial.numbers)
+    return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

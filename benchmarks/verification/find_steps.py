@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from conservative.attitude import Array, to_quaternion
 
 from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise
-from .explanation import Explanation, attempt
-from .mistakes.catalogue import STEPS, Step
+from .explanation import Explanation, Trial, attempt
+from .mistakes.steps import INTEGRATORS, Integrator, Step
 from .solution import Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
@@ -72,12 +72,17 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
     return motion
 
 
+def by_step(integrator: Integrator, parts: int) -> Trial:
+    """Return the trial of an integrator with so many steps between two rows."""
+    return Trial((integrator,), lambda case: march(case, integrator.step, parts))
+
+
 def count_gaps(case: Compared) -> Any:
     """Return the numbers of the rows, counted in the least distance of two."""
     return np.rint((case.t - case.start) / np.diff(case.t).min()).astype(int)
 
 
-def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
+def find_steps(case: Compared) -> Iterator[Explanation]:
     """Yield motions by methods with a step that divides the distance of the rows.
 
     Candidates leave least of the differences between a row and the exact motion from the row before (`RowByRow`), or of the
@@ -106,21 +111,21 @@ def find_steps(case: Compared, _: bool) -> Iterator[Explanation]:
 def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
     """Yield motions by the methods that leave the smallest shares."""
     step_of_rows = float(np.diff(case.t).mean())
-    ranked = sorted(((*linear.best(method), name) for name, method in STEPS.items()), key=lambda each: each[0])
+    ranked = sorted(((*linear.best(each.step), each.key, each) for each in INTEGRATORS), key=lambda each: each[:3])
     proven = False
-    for left, parts, name in ranked[:5]:
+    for left, parts, _, integrator in ranked[:5]:
         if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
             continue
         if case.effort.over:
             return
-        for count in sorted({parts, *linear.others(STEPS[name], parts)}, key=lambda n: abs(n - parts)):
+        for count in sorted({parts, *linear.others(integrator.step, parts)}, key=lambda n: abs(n - parts)):
             for most in (2000, STEPS_AT_MOST):  # steps
                 some = case.take(slice(0, max(4, most // count)))
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
                 step = step_of_rows / count
-                text = f"The rows follow {name} with a step of {step:.4g} s"
-                found = replace(attempt(some, name, text, march(some, STEPS[name], count)), values={"step": step}, numbers=1)
+                found = attempt(some, by_step(integrator, count), known={"step": step})
+                assert found is not None
                 if found.share > 0.5 or len(some.t) == len(case.t):
                     break
             yield found

@@ -160,3 +160,8 @@ class Verification:
             return f"{self.verdict}: {self.reason}"
         subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
         return f"{subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")
+
+
+def uncapitalised(sentence: str) -> str:
+    """Return a sentence as a part of another one."""
+    return sentence[:1].lower() + sentence[1:] if sentence[1:2].islower() else sentence

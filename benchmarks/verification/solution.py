@@ -35,50 +35,67 @@ _INTEGRAL = chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), l
 class Equations:
     """The equations of motion of a scene, J w' = (J w + h) x w - h' + T and q' = q w / 2, and changes of them.
 
-    A state (7, ...) is a quaternion, scalar first, body to world, and u = w, rad/s, body axes; with a motor u = w + J^-1 h.
-    `gyroscopic` scales the first term, `field` the torque of the potential, `damping` (B,) is an additional one, 1/s, and
-    `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn with the body.
-    `tolerance` is the error of solutions in a stretch.
+    A state (7, ...) is a quaternion, scalar first, body to world, and u = w, rad/s, body axes; with a motor u = w + r J^-1 h,
+    where r is `reaction`. `gyroscopic`, `field`, `reaction` and `turn` scale the first term, the torque of the potential, -h',
+    and q'; `damping` is an additional one, 1/s. Each but `reaction` is a number, or (B,). `spinning` (3, 3) is the inertia of
+    the gyroscopic term. `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn
+    with the body. With `half_turned` the inertia in world axes is R J instead of R J R'. With `left` q' = w q / 2. `tolerance`
+    is the error of solutions in a stretch.
     """
 
     scene: Scene
-    gyroscopic: float = 1.0
-    field: float = 1.0
+    gyroscopic: float | Array = 1.0
+    field: float | Array = 1.0
     damping: float | Array = 0.0
     fixed: Array | None = None
     tolerance: float = 2 * _EPS
+    reaction: float = 1.0
+    turn: float | Array = 1.0
+    left: bool = False
+    spinning: Array | None = None
+    half_turned: bool = False
 
     def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Callable[[Array], Array]:
         """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
         body = self.scene.body
         J, inverse = body.inertia, body.inverse
         motor = None if body.motor is None else np.array([body.motor.at(each, None, window) for each in t.tolist()]).T
-        turning = None if motor is None else inverse @ motor
+        turning = None if motor is None else self.reaction * (inverse @ motor)
         rotor = np.zeros(3) if body.rotor_momentum is None or motor is not None else body.rotor_momentum
+        spinning, side = J if self.spinning is None else self.spinning, -1.0 if self.left else 1.0
+        gyroscopic, turn = _column(self.gyroscopic), 0.5 * _column(self.turn)
         load = self._loads(t, window)
 
         def slope(y: Array) -> Array:
             shape = y.shape[1:]
             w = y[4:] if turning is None else y[4:] - turning.reshape(3, *(1,) * (y.ndim - 2), -1)
-            (q0, q1, q2, q3), (w1, w2, w3) = y[:4], 0.5 * w
+            (q0, q1, q2, q3), (w1, w2, w3) = y[:4], turn * w
             out = np.empty_like(y)
             out[0] = -(q1 * w1 + q2 * w2 + q3 * w3)
-            out[1] = q0 * w1 + q2 * w3 - q3 * w2
-            out[2] = q0 * w2 + q3 * w1 - q1 * w3
-            out[3] = q0 * w3 + q1 * w2 - q2 * w1
-            if self.fixed is None:
-                L = _apply(J, y[4:]) + rotor.reshape(3, *(1,) * len(shape))
-                torque = self.gyroscopic * cross(L, w)
+            out[1] = q0 * w1 + side * (q2 * w3 - q3 * w2)
+            out[2] = q0 * w2 + side * (q3 * w1 - q1 * w3)
+            out[3] = q0 * w3 + side * (q1 * w2 - q2 * w1)
+            if self.fixed is None and not self.half_turned:
+                if motor is None or (self.reaction == 1 and self.spinning is None):
+                    L = _apply(spinning, y[4:]) + rotor.reshape(3, *(1,) * len(shape))
+                else:
+                    L = _apply(spinning, w) + motor.reshape(3, *(1,) * (len(shape) - 1), -1)
+                torque = gyroscopic * cross(L, w)
                 out[4:] = _apply(inverse, torque if load is None else torque + load(y, w))
+            elif self.fixed is None:
+                T = J @ _matrix(y)  # R' (R J) R
+                L = (T @ np.moveaxis(w, 0, -1)[..., None])[..., 0] + rotor
+                torque = gyroscopic * cross(np.moveaxis(L, -1, 0), w) + (0.0 if load is None else load(y, w))
+                out[4:] = np.moveaxis(np.linalg.solve(T, np.moveaxis(torque, 0, -1)[..., None])[..., 0], -1, 0)
             else:
                 R = _matrix(y)
                 L = _turn(R, 0 * w + rotor.reshape(3, *(1,) * len(shape)))
                 spin = _turn(R, w)
-                torque = self.gyroscopic * cross(L + _apply(self.fixed, spin), spin)
+                torque = gyroscopic * cross(L + _apply(self.fixed, spin), spin)
                 torque = torque if load is None else torque + _turn(R, load(y, w))
                 out[4:] = _turn(np.swapaxes(R, -1, -2), _apply(np.linalg.inv(self.fixed).astype(float), torque))
             if np.any(self.damping):
-                out[4:] -= np.asarray(self.damping).reshape(-1, 1) * w
+                out[4:] -= _column(self.damping) * w
             return out
 
         return slope
@@ -104,7 +121,7 @@ class Equations:
             R = _matrix(y) if turned else np.eye(3)
             times = np.broadcast_to(t, rates.shape[:-1])
             if field is not None:
-                out += self.field * field(R)
+                out += _column(self.field)[..., None] * field(R)
             if torque is not None:
                 value = M if M is not None else _each(torque.at, times, R, window)
                 out += value if torque.frame == "body" else (np.broadcast_to(value, rates.shape)[..., None, :] @ R)[..., 0, :]
@@ -123,7 +140,9 @@ class Equations:
     def wheel(self, t: Array) -> Array:
         """Return J^-1 h (3, n), rad/s, of a rotor with a motor; 0 without one."""
         body = self.scene.body
-        return 0 * t if body.motor is None else body.inverse @ np.array([body.motor.at(each) for each in t.tolist()]).T
+        if body.motor is None:
+            return 0 * t
+        return self.reaction * (body.inverse @ np.array([body.motor.at(each) for each in t.tolist()]).T)
 
     def solve(self, start: float, R: Array, w: Array, t: Array) -> tuple[Array, Array]:
         """Return attitudes (B, n, 3, 3), rates (B, n, 3) at times (n,), s, of states (B, 3, 3), (B, 3) at `start`."""
@@ -245,6 +264,11 @@ def _matrix(y: Array) -> Array:
 def _turn(R: Array, v: Array) -> Array:
     """Return vectors (3, ...) turned by matrices (..., 3, 3)."""
     return np.moveaxis((R @ np.moveaxis(v, 0, -1)[..., None])[..., 0], -1, 0)
+
+
+def _column(value: float | Array) -> Array:
+    """Return a number, or numbers (B,) of each motion as (B, 1)."""
+    return np.asarray(value, float).reshape(-1, 1) if np.ndim(value) else np.asarray(value, float)
 
 
 def _apply(matrix: Array, v: Array) -> Array:

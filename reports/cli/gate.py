@@ -166,6 +166,7 @@ def _compare(options: dict[str, Any]) -> Document:
     from conservative.references.environments.lock import Source
     from conservative.registry import read_name
 
+    from ..run.causes import find_causes
     from ..run.provenance import provenance
     from ..sections.comparison import build
     from ..terminal.progress import progress
@@ -195,4 +196,4 @@ def _compare(options: dict[str, Any]) -> Document:
     with TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         base, latest = prepare(options["against"]), prepare(head)
         with progress() as step:
-            return build(compare_projects(base, latest, tell=step, **asked), made, prices)
+            return build(compare_projects(base, latest, tell=step, explain=find_causes, **asked), made, prices)

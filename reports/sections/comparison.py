@@ -172,7 +172,7 @@ def _record(line: ProjectLine) -> dict[str, Any]:
     for when, row in zip(("was", "is"), line.results, strict=True):
         if row is not None:
             values = {"values": row.values, "spreads": row.spreads}
-            record[when] = {"status": row.status, "reason": row.reason, "cause": row.cause, **values}
+            record[when] = {"status": row.status, "reason": row.reason, "mistake": row.mistake, "cause": row.cause, **values}
     if (time := line.times) is not None:
         again = {} if time.again is None else {"again": time.again}
         ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}

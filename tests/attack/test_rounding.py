@@ -7,6 +7,7 @@ import pytest
 
 from conservative.benchmarks.versions.project import MOTION, compare_projects, judge
 from conservative.benchmarks.versions.version import Checkout, Version
+from conservative.reports.run.causes import find_causes
 from conservative.version import VERSION
 
 from ..benchmarks.versions.rewrites import MISTAKES, build, rewrite
@@ -31,7 +32,9 @@ def gate(tmp_path, monkeypatch):
 
     def run(flags, changes, scenes):
         was = version("was", [flag for flag in flags if flag.startswith("-D")], {})
-        return judge(compare_projects(was, version("is", flags, changes), scenes, ["mine"], processes=0)).violations
+        return judge(
+            compare_projects(was, version("is", flags, changes), scenes, ["mine"], processes=0, explain=find_causes)
+        ).violations
 
     return run
 

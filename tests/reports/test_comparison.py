@@ -213,7 +213,7 @@ def test_the_action_and_the_workflow_use_options_that_there_are():
 
 
 def test_a_row_of_another_motion_and_an_accepted_price_have_their_standing():
-    lost = replace(row(attitude_error_max=3.1), cause="no torque")
+    lost = replace(row(attitude_error_max=3.1), mistake="no torque", cause="no torque")
     slow = ((row(), row(), timed((1.1, 1.08, 1.12), (1.1, 1.08, 1.12))),)
     moved = comparison((row(), lost, None))
     assert [str(cells[2]) for cells in table(moved, judge(moved).violations).rows] == [f"✗ {Standing.MOTION}"]

@@ -22,7 +22,8 @@ from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from ..mistakes.catalogue import EQUATIONS, READINGS, SCENES, STEPS, TURNED, Reading, Step, with_inertia
+from ..mistakes import BY_KEY
+from ..mistakes.steps import STEPS, TURNED, Step
 from ..solution import Equations
 from .motion import Motion
 
@@ -37,7 +38,7 @@ OURS = {1: (), 2: ("no_squish", "moser_veselov:order=2"), 4: ("no_squish:order=4
 ROUND_OFF, FACTOR = 1e-11, 10.0  # errors that depend on the machine; factor of a mistake that is listed
 QUANTITIES = ("attitude", "rates", "energy", "momentum")
 RK2, RK4, MIDPOINT = STEPS["the explicit midpoint rule (RK2)"], STEPS["RK4"], STEPS["the implicit midpoint rule"].next
-CLAMP, SLEEP, SMALLEST = 100.0, 0.5, 1e-6  # rad/s, rad/s and kg m^2, as engines have them
+CLAMP, SLEEP = 100.0, 0.5  # rad/s, as engines have them
 
 
 class Slope:
@@ -185,12 +186,6 @@ def _limit(y: Array, low: float, high: float) -> Array:
     return np.concatenate([y[:4], y[4:] * scale])
 
 
-def _coarse(scene: Scene) -> Scene | None:
-    """Return the scene with principal moments of at least `SMALLEST`; None if they are."""
-    J, R = np.maximum(scene.body.moments, SMALLEST), scene.body.R_BP
-    return None if (scene.body.moments >= SMALLEST).all() else with_inertia(scene, R @ np.diag(J) @ R.T)
-
-
 @dataclass(frozen=True)
 class Mistake:
     """A mistaken program: equations of a scene, or None where it makes no difference, and how they are solved and read."""
@@ -201,7 +196,7 @@ class Mistake:
     step: Step = RK2
     first: float = 1.0
     after: Callable[[Array], Array] | None = None
-    read: Reading = lambda R, w: (R, w)
+    read: Callable[..., Any] = lambda R, w: (R, w)
 
 
 def _of_scene(change: Callable[[Scene], Scene | None], scene: Scene) -> Equations | None:
@@ -210,12 +205,15 @@ def _of_scene(change: Callable[[Scene], Scene | None], scene: Scene) -> Equation
 
 
 MISTAKES: dict[str, Mistake] = {
-    **{name: Mistake(sentence, partial(_of_scene, do)) for name, (sentence, do) in SCENES.items() if " and " not in name},
-    **{name: Mistake(sentence, build) for name, (sentence, build) in EQUATIONS.items()},
-    **{name: Mistake(*READINGS[name][:1], read=READINGS[name][1])
-       for name in ("transposed", "reversed rates")},
-    "order xyzw": Mistake("The quaternions have the scalar last", read=READINGS["order wxyz"][1]),
-    "world rates": Mistake("The rates are in world axes", read=lambda R, w: (R, _times(R, w))),
+    **{name: Mistake(BY_KEY[name].sentence, partial(_of_scene, BY_KEY[name].change))
+       for name in ("without the rotor", "without the torque", "without the damping", "without the field", "sign of the rotor",
+                    "turning of the field", "sign of the torque", "axes of the torque", "no products of inertia",
+                    "sign of the products of inertia")},
+    **{name: Mistake(BY_KEY[name].sentence, BY_KEY[name].build)
+       for name in ("no gyroscopic term", "sign of the field", "sign of the gyroscopic term", "inertia of the start",
+                    "inertia in world axes")},
+    **{name: Mistake(BY_KEY[name].sentence, read=BY_KEY[name].write)
+       for name in ("transposed", "reversed rates", "order xyzw", "world rates")},
     "diagonal gyroscopic term": Mistake(
         "The gyroscopic term has the diagonal of the inertia only",
         options=(("spinning", lambda J: J * np.eye(3, dtype=J.dtype)),),
@@ -225,7 +223,7 @@ MISTAKES: dict[str, Mistake] = {
     **{f"damping {rate}": Mistake(f"Damping of {rate} per second is on", step=Step(2, 0, partial(_damped, rate=rate)))
        for rate in (0.01, 0.05)},
     "no gyroscopic term and damping 0.05": Mistake(
-        "Both, as in engines as installed", EQUATIONS["no gyroscopic term"][1], step=Step(2, 0, partial(_damped, rate=0.05))
+        "Both, as in engines as installed", BY_KEY["no gyroscopic term"].build, step=Step(2, 0, partial(_damped, rate=0.05))
     ),
     "clamp": Mistake(f"Rates are limited to {CLAMP:g} rad/s", after=partial(_limit, low=0.0, high=CLAMP)),
     "sleep": Mistake(f"Bodies slower than {SLEEP:g} rad/s are put to sleep", after=partial(_limit, low=SLEEP, high=np.inf)),
@@ -235,7 +233,7 @@ MISTAKES: dict[str, Mistake] = {
     "stale rates": Mistake(
         "The attitude is turned by the rates of the start of the step", step=Step(1, 0, partial(_stale, update="old"))
     ),
-    "smallest moments": Mistake("Moments below 1e-6 kg m^2 are replaced by it", partial(_of_scene, _coarse)),
+    "smallest moments": Mistake(BY_KEY["smallest moments"].sentence, partial(_of_scene, BY_KEY["smallest moments"].change)),
 }  # fmt: skip
 """The mistakes that are compared with a failing program, by name."""
 

@@ -18,6 +18,7 @@ from ..compare import (
     HOPELESS,
     NUMERICAL,
     SIGMAS,
+    TINY,
     UNITS_OF_DIGITS,
     Allowed,
     Compared,
@@ -33,6 +34,7 @@ from .table import Recording
 MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
 ROUND_OFF = 2e-15  # of an exact motion
 ROWS_OF_NOISE = 4000  # rows that noise is estimated from
+QUARTER = math.pi / 2  # rad from row to row, above which differences of high order of a motion do not fall
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +137,9 @@ def _find_noise(
 ) -> tuple[Array, Array]:
     """Return the noise (2,) of rows, and whether they are close enough to tell it from motion.
 
-    It is the smaller of two estimates: from the rows, and from the rows minus the exact motion. The rows alone have corners of
-    a torque and turns by many degrees, which look like noise. If digits allow more than the first estimate, it is enough.
+    It is the smaller of two estimates: from the rows, and from the rows minus the exact motion. Corners of a torque, and turns
+    by more than a quarter from row to row, look like noise. The exact motion itself shows how much of the first estimate they
+    are; the second one has them only in fast turns. If digits allow more than the first estimate, it is enough.
     """
     t, data, _ = next(recording.stream())
     t, data = t[:ROWS_OF_NOISE], take_rows(data, slice(0, ROWS_OF_NOISE))
@@ -146,10 +149,13 @@ def _find_noise(
         n = len(t) if closed(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
-        if all(x is None or np.isfinite(x).all() for x in rest):
-            other, told = estimate_noise(t[:n], rest)
-            better = told & (~resolved | (other < noise))
-            noise, resolved = np.where(better, other, noise), resolved | told
+        if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
+            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
+            slow = float(np.median(np.diff(t))) * scale < QUARTER
+            resolved &= (motion < 0.3 * noise) | (noise < TINY)
+            told = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
+            better = told & (~resolved | (other[0] < noise))
+            noise, resolved = np.where(better, other[0], noise), resolved | told
     return np.where(resolved & (noise / sizes <= MOST_NOISE), noise / sizes, 0.0), resolved
 
 
@@ -248,8 +254,9 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
 def _near(part: Compared) -> bool:
     """Return whether the second row is as near as noise and digits of the first one let it be, so that a fit can help."""
     two = part.take(slice(0, 2))
-    growth = max(1.0, float(np.linalg.norm(linearise(two)[2][-1])))
-    return bool((two.error[:, -1] <= HOPELESS * two.noise * growth).all())
+    flow = linearise(two)[2][-1].reshape(2, 3, 2, 3)
+    growth = np.maximum(np.linalg.norm(flow, axis=(1, 3)), np.eye(2))  # noise of rates also turns attitudes
+    return bool((two.error[:, -1] <= HOPELESS * growth @ two.noise).all())
 
 
 def _compare_all(

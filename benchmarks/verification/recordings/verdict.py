@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -11,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.errors import BadInput, ImpossibleInertia, shorten
+from conservative.errors import BadInput, shorten
 from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
 from conservative.scene import Scene
@@ -20,7 +19,7 @@ from conservative.trajectory import Trajectory
 from ..compare import SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
-from ..finding import Cause, Finding, Verdict, Verification
+from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .table import Recording
 
@@ -167,8 +166,7 @@ def verify_recording(
     elif not found.passed:
         tell("explain")
         whole = replace(found.case, growth=found.parts[0].growth)
-        with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # of bodies that the search tries
-            explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
+        explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     proven = [each for each in explained.named if each.explains]
     verdict, doubt = Verdict.WRONG, ""
     if found.passed and shaped:
@@ -237,26 +235,27 @@ def _pair(values: Array) -> tuple[float, float]:
 
 
 def _cause(found: Explanation, worse: int) -> Cause:
-    return Cause((found.name,), found.sentence, found.left[worse], found.plain[worse], found.values)
+    return replace(found.cause, left=found.left[worse], of=found.plain[worse])
 
 
 def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
     """Return what decides the verdict: the errors, what is allowed, and the mistakes with what they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if " and " in allowed else "is"
-    parts = [
+    decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",
         *([details.shape] if details.shape else []),
     ]
-    causes = [f"{each.sentence} (leaves {details.show(each.left)})" if max(each.plain) else each.sentence for each in proven]
+    causes = [
+        uncapitalised(each.sentence) + (f" (leaves {details.show(each.left)})" if max(each.plain) else "") for each in proven
+    ]
     if finding.verdict is Verdict.UNDECIDED:
-        parts.append(finding.detail)
-    elif causes:
-        parts.append(" or ".join(causes))
-    elif finding.verdict is Verdict.WRONG and not details.shape:
-        parts.append("no known mistake explains it")
-    return "; ".join(parts)
+        return "; ".join([finding.detail, *decided])
+    if causes:
+        return "; ".join([" or ".join(causes), *decided])
+    unknown = finding.verdict is Verdict.WRONG and not details.shape
+    return "; ".join([*decided, *(["no known mistake explains it"] if unknown else [])])
 
 
 def _single_rows(found: Comparison) -> Explanation:
@@ -264,7 +263,7 @@ def _single_rows(found: Comparison) -> Explanation:
     unit = UNITS[int(np.argmax(found.worst.max(axis=1)))]
     text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
     values = {"row": float(number), "time": at, "error": size}
-    return Explanation("single rows", text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
+    return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
@@ -277,7 +276,8 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
         )
     if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
         d = case.differences(*case.exact)
-        if abs(float((d[1:] * d[:-1]).sum() / (d * d).sum())) < 0.3:
+        lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
+        if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
             return "What is left looks like noise, but the rows are too far apart to tell. More rows a turn, or --error, decide"
     return ""
 

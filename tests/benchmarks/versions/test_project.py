@@ -73,12 +73,12 @@ def test_a_row_that_fails_now_or_is_gone_fails():
 
 def test_another_motion_is_one_violation_with_its_cause():
     lost = row(attitude_error_max=3.1, rate_error_max=5.0, energy_drift_max=0.5)
-    (each,) = compare(row(), replace(lost, cause="no torque")).violations
+    (each,) = compare(row(), replace(lost, mistake="no torque", cause="no torque")).violations
     assert (each.measure, each.allowed) == (MOTION, "")
     assert "no torque" in each.finding
     assert violations(row(), lost) == {MOTION}  # without a cause
-    assert violations(row(), replace(row(), cause="late")) == {MOTION}  # which the scene does not show
-    failed = replace(row("diverged", status=Status.FAILED), cause="no torque")
+    assert violations(row(), replace(row(), mistake="late", cause="late")) == {MOTION}  # which the scene does not show
+    failed = replace(row("diverged", status=Status.FAILED), mistake="no torque", cause="no torque")
     assert violations(row(), failed) == {MOTION}
     assert violations(row(), row(attitude_error_max=0.5)) == {"attitude error max"}  # an error may have grown
 
@@ -91,10 +91,10 @@ def test_a_motion_that_is_lost_in_both_versions_is_never_faster():
     assert violations(was, now) == set()  # half a turn says nothing
     assert violations(was, replace(now, values={**now.values, "energy drift max": 0.1})) == {"energy drift max"}
     assert violations(was, now, timed(SLOW, SLOW)) == {TIME}
-    known = replace(was, cause="no torque")
-    assert violations(was, replace(now, cause="no torque")) == {MOTION}
-    assert violations(known, replace(now, cause="no torque")) == set()
-    assert any("no torque" in note for note in compare(known, replace(now, cause="no torque")).notes)
+    known = replace(was, mistake="no torque", cause="no torque")
+    assert violations(was, replace(now, mistake="no torque", cause="no torque")) == {MOTION}
+    assert violations(known, replace(now, mistake="no torque", cause="no torque")) == set()
+    assert any("no torque" in note for note in compare(known, replace(now, mistake="no torque", cause="no torque")).notes)
 
 
 def test_a_longer_time_can_have_a_price(tmp_path):
