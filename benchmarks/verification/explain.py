@@ -58,9 +58,9 @@ def diagnose(
     """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
 
     A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
-    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes that make
-    attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions can be
-    wrong. The work is counted, so that the answer is the same on a busy machine.
+    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes
+    that make attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions
+    can be wrong. The work is counted, so that the answer is the same on a busy machine.
     """
     whole = _before_divergence(whole)
     case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
