@@ -1,4 +1,4 @@
-"""Versions of a project: the gate judges errors, drifts, orders and counts, as against a baseline; times are measured in turn.
+"""Versions of a project: the gate compares errors, drifts, orders and counts, as with a baseline; times are in turn.
 
 This process measures the errors of all versions against its own reference solution, and computes the drifts. A version only
 integrates, and reports the outcome of its runs.
