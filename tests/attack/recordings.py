@@ -1,6 +1,6 @@
 """Recordings with a planted mistake, or none, for `conservative verify`: a scene, a simulator, a layout, noise and a length.
 
-Nothing here comes from the verification or an integrator of the package: right-hand side, steps and layouts are its own. A state
+Nothing here comes from the package: right-hand side, steps and layouts are its own. A state
 is (q, w): a quaternion, scalar first, body to world, and rates, rad/s, body axes.
 
     q' = q (0, w) / 2        J w' = (J w + h) x w + T - h'
