@@ -109,7 +109,7 @@ def summary(verification: Verification) -> list[Block]:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
     differ = pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
-    return filled(mistakes(others), _open(others), _counts(verification), *differ, Items.of(verification.notes))
+    return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
 
 
 def details(verification: Verification) -> list[Block]:
@@ -185,9 +185,11 @@ def _cases_of(findings: Sequence[Finding]) -> str:
     return ", ".join(names[:LISTED]) + more
 
 
-def _open(findings: Iterable[Finding]) -> Items:
-    undecided = [each for each in findings if each.verdict is Verdict.UNDECIDED]
-    groups = grouped(undecided, lambda each: (each.check, explanation(each)))
+def _remarks(findings: Sequence[Finding]) -> Items:
+    """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
+    told = (each for each in findings if each.verdict is Verdict.RIGHT and each.detail and each.check != "order")
+    undecided = (each for each in findings if each.verdict is Verdict.UNDECIDED)
+    groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
     return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
 
 
