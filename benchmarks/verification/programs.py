@@ -30,11 +30,11 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from . import protocol
-from .compare import SIGMAS, Compared
-from .explain import diagnose
+from .compare import Compared, compare_answers
+from .explain import PROGRAM_KINDS, diagnose
 from .explanation import Explanation
 from .finding import Finding, Verdict, Verification
-from .motions import files
+from .motions.files import tolerance
 from .motions.motion import Motion, load
 from .motions.programs import ORDERS, PARTS
 
@@ -56,8 +56,8 @@ RESOLVED = {"f64": 1e-11, "f32": 1e-4}
 """Smallest errors, rad, that show an order, above round-off in each precision."""
 ROUNDS = 5
 """Largest number of motions that are searched for mistakes."""
-KINDS = ("readings", "times", "scenes", "equations", "habits", "attitudes")
-"""Kinds of mistakes that a program can have; those of files and of steps are others."""
+LEAST = 0.1
+"""Smallest share of the failing motions that a second mistake explains: a mistake can resemble another one in a motion."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
@@ -106,7 +106,7 @@ def in_principal_axes(motion: Motion) -> Motion:
     )
 
 
-def run_motion(solve: Solve, motion: Motion, allowed: Array, scale: float, parts: int = FINE) -> Ran:
+def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) -> Ran:
     """Return a motion run with so many steps in 0.1 rad. Raise `Unsupported`."""
     every = motion.steps * parts
     thin = max(n for n in range(1, every + 1) if every % n == 0 and n * motion.samples <= max(ROWS, motion.samples))
@@ -123,19 +123,10 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, scale: float, parts
         ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
     elif not (np.isfinite(R).all() and np.isfinite(w).all()):
         ended = "samples are not finite"
-    case = _case(scene, t, R, w, scale, allowed)
+    case = compare_answers(scene, t, (R, w), allowed, grid.dt)
     at = slice(thin, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
     return Ran(motion, case, error, allowed, grid.dt, ended)
-
-
-def _case(scene: Scene, t: Array, R: Array, w: Array, scale: float, allowed: Array) -> Compared:
-    return Compared(scene, t, (R, w), 0.0, scale, allowed, allowed / SIGMAS, rounded=tuple(allowed.tolist()))
-
-
-def _limits(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
-    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s."""
-    return np.array(files.tolerance(motion, order, single)), float(files.read(motion.name)["scale"]["rates"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,12 +161,12 @@ def run_motions(
     for every in load():
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
-        allowed, scale = _limits(motion, order, single)
+        allowed = np.array(tolerance(motion, order, single))
         if reason := unsupported(motion.scene):
             reasons[motion.name] = reason
             continue
         try:
-            ran.append(run_motion(solve, motion, allowed, scale))
+            ran.append(run_motion(solve, motion, allowed))
         except Unsupported as error:
             reasons[motion.name] = str(error)
     return Answers(solve, ran, reasons, order, single)
@@ -184,7 +175,7 @@ def run_motions(
 def _falls(answers: Answers, ran: Ran) -> float:
     """Return the exponent with which the error falls from the step to half of it; 0 if it is below the declared order."""
     with suppress(Unsupported):
-        again = run_motion(answers.solve, ran.motion, ran.allowed, ran.case.scale, 2 * FINE)
+        again = run_motion(answers.solve, ran.motion, ran.allowed, 2 * FINE)
         slope = float(np.log2(ran.ratio / max(again.ratio, 1e-300)))
         return slope if math.isfinite(slope) and slope >= (answers.order or 2) - SLOPE else 0.0
     return 0.0
@@ -200,7 +191,7 @@ def measure_order(answers: Answers) -> float:
         each for each in answers.ran if not each.motion.needs and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
     ]
     for each in free[:GENERIC]:
-        errors = [float(run_motion(answers.solve, each.motion, each.allowed, each.case.scale, n).error[0]) for n in LADDER]
+        errors = [float(run_motion(answers.solve, each.motion, each.allowed, n).error[0]) for n in LADDER]
         good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < 0.3]
         if len(good) > 1:
             (a, first), (b, last) = good[-2:]
@@ -230,11 +221,13 @@ def explain_motions(failing: Sequence[Ran]) -> list[Named]:
         if each.motion.name not in rest:
             rounds -= 1
             continue
-        found = [one for one in diagnose(each.case, quaternion=True, kinds=KINDS, step=each.step).named if one.explains]
+        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).named if one.explains]
         explained = {i: _explained(one, rest.values(), each) for i, one in enumerate(found)}
         if not explained:
             continue
         most = max(map(len, explained.values()))
+        if named and most < LEAST * len(failing):
+            continue
         best = [i for i, names in explained.items() if len(names) == most]
         fewest = min(found[i].numbers for i in best)
         best = [i for i in best if found[i].numbers == fewest and explained[i] == explained[best[0]]]
@@ -308,8 +301,7 @@ def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> d
         return {}
     found = {}
     for each in failing:
-        allowed, _ = _limits(each.motion, lower, answers.single)
-        if (each.error <= allowed).all():
+        if (each.error <= tolerance(each.motion, lower, answers.single)).all():
             found[each.motion.name] = f"within the tolerance of order {lower}"
     return found
 
