@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.verification.recordings import table as table_of_file
+from conservative.benchmarks.verification.recordings.formats import table as formats
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
@@ -164,7 +165,7 @@ def judged(scene, t, R, w, from_row=True, allowed=1e-9):
 def test_a_file_in_several_chunks_whose_first_time_is_not_0(name, first, tmp_path, monkeypatch):
     """Rows between those that are kept for fits are compared in a second pass, at the times of the file."""
     monkeypatch.setattr(table_of_file, "ROWS", 10)
-    monkeypatch.setattr(table_of_file, "CHUNK", 17)
+    monkeypatch.setattr(formats, "CHUNK", 17)
     build, part, _ = PARTS[name]
     timed = name != "rotor"
     start = first if timed else 0.0  # of the motion; a scene without loads has any time
