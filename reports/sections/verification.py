@@ -14,7 +14,6 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
 from .bodies import body_blocks
-from .pairs import pair_blocks
 from .recording import recording_blocks, two_blocks
 
 Key = TypeVar("Key")
@@ -108,7 +107,7 @@ def summary(verification: Verification) -> list[Block]:
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
-    differ = pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
+    differ = _pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
     return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
 
 
@@ -118,8 +117,16 @@ def details(verification: Verification) -> list[Block]:
         return summary(verification)
     pairs, others = _pairs(verification)
     tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
-    right = pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
+    right = _pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
     return filled(*summary(verification), *tables, *right)
+
+
+def _pair_blocks(findings: Sequence[Finding]) -> list[Block]:
+    if not findings:
+        return []
+    from .pairs import pair_blocks  # here: it needs kernels, which recordings do without
+
+    return pair_blocks(findings)
 
 
 def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
