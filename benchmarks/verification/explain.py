@@ -59,9 +59,9 @@ def diagnose(
     """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
 
     A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
-    fewest numbers is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes that make
-    attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions can be
-    wrong. The work is counted, so that the answer is the same on a busy machine.
+    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes
+    that make attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions
+    can be wrong. The work is counted, so that the answer is the same on a busy machine.
     """
     whole = _before_divergence(whole)
     case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
@@ -97,10 +97,8 @@ def diagnose(
         return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)
     least = min(each.size for each in explaining)
     good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
-    fewest = min(each.numbers for each in good)
-    good = [each for each in good if each.numbers == fewest]
-    single = min(len(each.keys) for each in good)
-    good = [each for each in good if len(each.keys) == single]
+    fewest = min((each.numbers, len(each.keys)) for each in good)
+    good = [each for each in good if (each.numbers, len(each.keys)) == fewest]
     named = [each for each in good if _normalised(each)] or good
     return Diagnosis(named, tried, _separate(case, named))
 
