@@ -87,7 +87,9 @@ def diagnose(
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
-    if case.step is None and all(each.rest > PROVEN for each in tried if each.explains):
+    # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
+    doubtful = all(each.rest > PROVEN and each.keys != (JITTERED.key,) for each in tried if each.explains)
+    if case.step is None and doubtful:
         tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
     explaining = [each for each in tried if each.explains]
     if not explaining:
@@ -247,6 +249,8 @@ def _times(case: Compared, asked: _Asked) -> Found:
 
 def _own_times(case: Compared, gap: float, end: float) -> Found:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
+    if case.free:  # the first row has noise
+        case = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0])
     tau, e = case.t.copy(), 1e-6 / case.scale
     end += min(end - case.start, 50 * gap)
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
