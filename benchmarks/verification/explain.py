@@ -115,7 +115,7 @@ def _normalised(found: Explanation) -> bool:
 def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
-    size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
+    size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
     if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
         return case  # no rows, or single ones
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
