@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..verification.compare import SIGMAS, Compared
-from ..verification.explain import SEARCHES
+from ..verification.explain import diagnose
 
 ALLOWED = 3.0
 """Error that an explanation may leave, in units of the difference between the runs with the two shortest steps."""
@@ -49,10 +48,8 @@ def _find(scene: Scene, solve: Callable[[Scene, Grid], Trajectory]) -> str:
     allowed = np.full(2, max(SMALLEST, ALLOWED * apart))
     scale = float(np.linalg.norm(last.w_WB_B, axis=1).max())
     case = Compared(scene, last.t, (last.R_WB, last.w_WB_B), 0.0, scale, allowed, allowed / SIGMAS, rounded=tuple(allowed))
-    tried = chain(*(SEARCHES[name](case, False) for name in ("other equations", "other bodies")))
-    for each in tried:  # readings and times are those of the test
-        if each.explains and each.name != "first row":  # which is given
-            return each.sentence.removesuffix(". Correct --body")
-        if each.name == "other moments":  # the other bodies take minutes
-            break
+    for kinds in ({"scenes", "equations"}, {"bodies"}):  # readings and times are those of the test
+        for each in diagnose(case, False, kinds=frozenset(kinds)).named:
+            if each.explains and each.keys != ("first row",):  # which is given
+                return each.sentence.removesuffix(". Correct --body")
     return UNKNOWN
