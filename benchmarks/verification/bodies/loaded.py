@@ -100,7 +100,7 @@ class LoadedBody:
 def verify_files(
     files: Sequence[Path] = (),
     engines: Sequence[str] = (),
-    tell: Callable[[float, str], None] = lambda share, what: None,
+    tell: Callable[[float, str], object] = lambda share, what: None,
     search: Sequence[Path] = (),
 ) -> list[Verification]:
     """Return a verification for each model file (URDF, SDF, MJCF or USD), with a finding for each engine and body.
