@@ -5,7 +5,7 @@ The whole command but for times runs: two builds, each in the process of its ver
 
 import pytest
 
-from conservative.benchmarks.versions.project import MOTION, compare_projects, judge
+from conservative.benchmarks.versions.project import MOTION, compare_projects, decide
 from conservative.benchmarks.versions.version import Checkout, Version
 from conservative.reports.run.causes import find_causes
 from conservative.version import VERSION
@@ -32,7 +32,7 @@ def gate(tmp_path, monkeypatch):
 
     def run(flags, changes, scenes):
         was = version("was", [flag for flag in flags if flag.startswith("-D")], {})
-        return judge(
+        return decide(
             compare_projects(was, version("is", flags, changes), scenes, ["mine"], processes=0, explain=find_causes)
         ).violations
 

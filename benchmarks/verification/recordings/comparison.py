@@ -141,7 +141,7 @@ def _find_noise(
     by more than a quarter from row to row, look like noise. The exact motion itself shows how much of the first estimate they
     are; the second one has them only in fast turns. If digits allow more than the first estimate, it is enough.
     """
-    t, data, _ = next(recording.stream())
+    t, data, *_ = next(recording.stream())
     t, data = t[:ROWS_OF_NOISE], take_rows(data, slice(0, ROWS_OF_NOISE))
     sizes = np.array([1.0, scale])
     noise, resolved = estimate_noise(t, data)
@@ -198,7 +198,7 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     whole = len(parts) == 1 and len(errors[0]) == len(case.t)
     if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
-    worst, compared, outliers = errors, len(case.t), _outliers(errors, case)
+    worst, compared, outliers = errors, len(case.t), _outliers(errors, case, recording)
     shape = _largest(recording.t, recording.shape)
     if (passed or outliers) and recording.rows > len(recording.t) and not undecided:
         worst, compared, bad, shape = _compare_all(parts, recording, -shift if from_row else 0.0)
@@ -255,7 +255,7 @@ def _near(part: Compared) -> bool:
     """Return whether the second row is as near as noise and digits of the first one let it be, so that a fit can help."""
     two = part.take(slice(0, 2))
     flow = linearise(two)[2][-1].reshape(2, 3, 2, 3)
-    growth = np.maximum(np.linalg.norm(flow, axis=(1, 3)), np.eye(2))  # noise of rates also turns attitudes
+    growth = np.maximum(np.linalg.norm(flow, 2, axis=(1, 3)), np.eye(2))  # noise of rates also turns attitudes
     return bool((two.error[:, -1] <= HOPELESS * growth @ two.noise).all())
 
 
@@ -268,7 +268,7 @@ def _compare_all(
     """
     worst, count, bad, shape, current = np.zeros((2, 1)), 0, None, (0.0, 0.0), list(parts)
     ends = [part.start for part in parts[1:]] + [math.inf]
-    for t, data, departure in recording.stream():
+    for t, data, departure, numbers in recording.stream():
         at, shape = t + shift, max(shape, _largest(t, departure))
         for i, part in enumerate(current):
             some = (at >= (part.t[0] if i == 0 else parts[i].start)) & (at < ends[i])
@@ -280,7 +280,7 @@ def _compare_all(
             off = np.flatnonzero((error > part.allowed[:, None]).any(axis=0))
             if len(off) and bad is None:
                 row = int(np.flatnonzero(some)[off[0]])
-                bad = count + row + 1, float(t[row]), float(error[:, off[0]].max())
+                bad = int(numbers[row]), float(t[row]), float(error[:, off[0]].max())
             worst = np.maximum(worst, error.max(axis=1, keepdims=True))
             if not closed(part.scene):
                 scene = part.scene.rename("file", R_WB0=R[-1], w_WB_B0=w[-1])
@@ -303,12 +303,12 @@ def _late(case: Compared) -> bool:
     return bool(varied and ((d * v).sum(axis=1) ** 2).sum() > 0.8 * (d * d).sum())
 
 
-def _outliers(errors: Array, case: Compared) -> list[tuple[int, float, float]]:
+def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple[int, float, float]]:
     """Return number, time and error of rows that are off while at least 98 of 100 others agree."""
     off = np.flatnonzero((errors > case.allowed[:, None]).any(axis=0))
     if not 0 < len(off) <= 0.02 * len(case.t) or 0 in off:
         return []
-    return [(int(k) + 1, float(case.t[k]), float(errors[:, k].max())) for k in off]
+    return [(recording.number(k), float(case.t[k]), float(errors[:, k].max())) for k in off]
 
 
 def _largest(t: Array, shape: Array | None) -> tuple[float, float]:

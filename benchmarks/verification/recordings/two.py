@@ -82,18 +82,21 @@ def verify_two(
     """
     if first[0] == second[0]:
         first, second = (f"{first[0]} (first)", first[1]), (f"{second[0]} (second)", second[1])
-    rows, made = list[Rows](), list[Verification]()
-    for name, recording in (first, second):
+    rows, made = dict[str, Rows](), dict[str, Verification]()
+    for name, recording in sorted((first, second), key=_missing):
+        started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
         try:
-            rows.append(prepare(rotation_only(scene), recording, from_row, error))
-            made.append(verify_recording(scene, recording, from_row, error, lambda what, of=name: tell(f"{of}: {what}"), name))
+            rows[name] = prepare(rotation_only(started), recording, from_row, error)
+            made[name] = verify_recording(
+                started, recording, from_row, error, lambda what, of=name: tell(f"{of}: {what}"), name
+            )
         except BadInput as refused:
             if refused.argument != "run" or name in refused.got:
                 raise
             raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
     tell("difference")
-    found = _difference(scene, rows, (first[1], second[1]), from_row)
-    a, b = made
+    a, b = made[first[0]], made[second[0]]
+    found = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
     names = f"{a.subject} and {b.subject}"
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
@@ -107,10 +110,10 @@ def verify_two(
         found.error[worse],
         found.allowed[worse],
         UNITS[worse],
-        "error" if error is not None else rows[0].allowed.by[worse],
+        rows[first[0]].allowed.by[worse],
         detail=found.missing,
     )
-    notes = [f"{each.subject}: {note}" for each in made for note in each.notes]
+    notes = [f"{each.subject}: {note}" for each in (a, b) for note in each.notes]
     return Verification(names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, found), notes, Two(a, b, found))
 
 
@@ -148,7 +151,24 @@ def _order(each: Verification) -> bool:
     return each.verdict is not Verdict.RIGHT
 
 
-def _difference(scene: Scene, rows: list[Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
+def _missing(named: Named) -> int:
+    """Return the number of quantities, of attitudes and rates, that a recording does not have."""
+    return sum(x is None for x in named[1].data)
+
+
+def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verification]]) -> Scene:
+    """Return the scene with the start of a recording, as far as it does not have it, from another one that is right."""
+    for rows, verification in before:
+        case, first = rows.case, float(recording.t[0])
+        at = first + float(case.t[0] - rows.recording.t[0])
+        if verification.verdict is Verdict.RIGHT and any(x is None for x in recording.data) and case.t[0] <= at <= case.t[-1]:
+            R, w = truth(case.scene, case.start, np.array([case.start, at]))
+            if not scene.loads:  # whose motion begins at t = 0
+                return scene.rename(scene.name, R_WB0=R[1], w_WB_B0=w[1])
+    return scene
+
+
+def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
     """Return the largest difference between two recordings at common times.
 
     Without common times, the departure of the second one from an exact motion is interpolated: it changes slowly where the rows

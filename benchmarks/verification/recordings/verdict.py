@@ -170,7 +170,7 @@ def verify_recording(
     proven = [each for each in explained.named if each.explains]
     verdict, doubt = Verdict.WRONG, ""
     if found.passed and shaped:
-        verdict, doubt = Verdict.RIGHT, found.undecided or recording.layout.doubt
+        verdict, doubt = Verdict.RIGHT, found.undecided or recording.doubt(error)
     elif error is None and shaped and not proven:
         doubt = _doubt(found.case, found.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
@@ -198,7 +198,7 @@ def verify_recording(
         first_row=_pair(found.alone),
         units=units,
         compared=found.compared,
-        in_file=recording.rows,
+        in_file=recording.rows + sum(recording.left.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
         unused={shorten(column): reason for column, reason in recording.layout.unused.items()},
         shape="" if shaped else _misshapen(found, recording),

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.verification.recordings import table as table_of_file
+from conservative.benchmarks.verification.recordings.formats import table as formats
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
@@ -164,7 +165,7 @@ def judged(scene, t, R, w, from_row=True, allowed=1e-9):
 def test_a_file_in_several_chunks_whose_first_time_is_not_0(name, first, tmp_path, monkeypatch):
     """Rows between those that are kept for fits are compared in a second pass, at the times of the file."""
     monkeypatch.setattr(table_of_file, "ROWS", 10)
-    monkeypatch.setattr(table_of_file, "CHUNK", 17)
+    monkeypatch.setattr(formats, "CHUNK", 17)
     build, part, _ = PARTS[name]
     timed = name != "rotor"
     start = first if timed else 0.0  # of the motion; a scene without loads has any time
@@ -219,7 +220,7 @@ def test_the_other_sign_and_the_other_axes_are_named(name):
 def test_missing_parts_are_named_together():
     both = scene(H, torque=cv.Torque(0.3 * H), damping=cv.Damping(D))
     part = {"h": lambda t: H}
-    assert judged(both, T, *integrate(T, **part)).details.explaining[0].name == "without the torque and the damping"
+    assert judged(both, T, *integrate(T, **part)).details.explaining[0].name == "without the torque + without the damping"
 
 
 @pytest.mark.parametrize("name", registry.list_scenes())
@@ -259,7 +260,7 @@ def test_a_table_with_many_corners_is_judged_without_fits():
     R, w = exact(driven, times)
     assert np.max(judged(driven, times, R, w).details.error) < 1e-13  # measured: 5e-15
     found = judged(driven, times, R, w + 0.01 * np.sin(times)[:, None])
-    assert not {each.name for each in found.details.tried} & {"damped", "another body", "body axes"}
+    assert not {each.name for each in found.details.tried} & {"damping", "another body", "body axes"}
     assert "60 jumps and corners" in found.notes[-1]
     weaker = judged(driven, times, *exact(scene(torque=cv.Torque((times, 0.1 * values))), times))
     shares = {each.name: each.share for each in weaker.details.tried}

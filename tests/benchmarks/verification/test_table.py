@@ -186,7 +186,7 @@ WRONG = {
         "--units deg or rad",
     ),
     "backwards": (lambda c: c.update(time=np.where(T[7] == T, 0, T)), "row 8: a time that is not later"),
-    "not a number": (lambda c: c.update(q_w=np.where(T[4] == T, np.nan, Q[:, 0])), "row 5, column q_w: ''"),
+    "not a number": (lambda c: c.update(q_w=np.where(T[4] == T, "lost", Q[:, 0])), "row 5, column q_w: 'lost'"),
     "norm 0": (
         lambda c: c.update({f"q_{p}": np.where(T[2] == T, 0, c[f"q_{p}"]) for p in "wxyz"}),
         "row 3: a quaternion of norm 0",

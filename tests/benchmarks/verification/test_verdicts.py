@@ -12,7 +12,8 @@ import conservative as cv
 from conservative import registry
 from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict as verdicts
-from conservative.benchmarks.verification.recordings.table import CHUNK, Options, Recording, read
+from conservative.benchmarks.verification.recordings.formats.table import CHUNK
+from conservative.benchmarks.verification.recordings.table import Options, Recording, read
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
