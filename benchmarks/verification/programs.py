@@ -432,12 +432,16 @@ def verify_program(
     checks: Sequence[str],
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
+    method: Method | None = None,
 ) -> Verification:
-    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong."""
+    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
+
+    `method` is the program with one of its settings, by default with their defaults.
+    """
     findings = list[Finding]()
     try:
         with time_limit(PATIENCE):
-            method = program_class(program, PATIENCE)()
+            method = method or program_class(program, PATIENCE)()
             if "protocol" in checks:
                 findings += protocol.findings(subject, method)
             if any(each.verdict is Verdict.WRONG for each in findings):

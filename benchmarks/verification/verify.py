@@ -179,7 +179,7 @@ def verify(
         results += _verify_recordings(tables, body, start, error, tell, reading)
     for each in found:
         if each.kind is Kind.PROGRAM:
-            results.append(_verify_program(each.text, only, pairs, tell))
+            results += _verify_program(each.text, only, pairs, tell)
         elif each.kind in (Kind.ENGINE, Kind.METHOD):
             from ..studies.selection import methods as select  # here: recordings need no kernels
 
@@ -193,13 +193,28 @@ def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Seque
     return verify_method(method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell)
 
 
-def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
-    from conservative.references.environments.programs import find_program, read_program
+def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Iterator[Verification]:
+    """Yield the verification of a program with each of its settings; the protocol and the times are verified once."""
+    from conservative.references.environments.programs import UnusableProgram, find_program, read_program
 
+    from ..studies.selection import methods as select
     from .programs import verify_program
 
     checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
-    return verify_program(text, find_program(text) or read_program(text, "program"), checks, pairs, tell)
+    program = find_program(text.partition(":")[0])
+    if program is None:  # the command line of a program that is not registered
+        yield verify_program(text, read_program(text, "program"), checks, pairs, tell)
+        return
+    try:
+        first, *others = select([text])
+    except UnusableProgram:  # which is a finding
+        yield verify_program(text, program, checks, pairs, tell)
+        return
+    rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]
+    others = others if rest else []
+    yield verify_program(first.name if others else text, program, checks, pairs, tell, first)
+    for method in others:
+        yield _verify_method(method, Kind.PROGRAM, rest, pairs, tell)
 
 
 def _verify_recordings(
