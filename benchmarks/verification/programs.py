@@ -129,8 +129,8 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) 
         ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
     elif not (np.isfinite(R).all() and np.isfinite(w).all()):
         ended = "samples are not finite"
-    case = compare_answers(scene, t, (R, w), allowed, grid.dt)
-    at = slice(thin, None, thin)  # the samples of the motion
+    case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
+    at = slice(thin - 1, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
     return Ran(motion, case, error, allowed, grid.dt, ended)
 
