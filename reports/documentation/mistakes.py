@@ -37,7 +37,7 @@ from conservative.benchmarks.verification.motions import files
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
-from conservative.benchmarks.verification.solution import States, truth
+from conservative.benchmarks.verification.solution import truth
 from conservative.benchmarks.verification.trials import by_habit, by_rule, compose
 from conservative.errors import Unsupported
 from conservative.grid import Grid
@@ -74,7 +74,7 @@ def scenes() -> list[Scene]:
     damped = free.rename("damped", damping=cv.Damping(0.2 * np.eye(3)))
     turning = free.rename("turning", potential=cv.Turning(field, cv.Orbit(0.4, [0.3, 0.2, 0.9])))
     tiny = Scene("tiny", cv.RigidBody([4e-7, 9e-7, 1.2e-6]), *start, float(T[-1]))
-    motor = cv.RigidBody(body.inertia, motor=cv.Torque(([0.0, 6.0], [[0.0, 0.0, 0.2], [0.0, 0.3, 0.9]])))
+    motor = cv.RigidBody(body.inertia, rotor_momentum=([0.0, 6.0], [[0.0, 0.0, 0.2], [0.0, 0.3, 0.9]]))
     return [free, heavy, rotor, free.rename("torque", torque=torque), damped, turning, tiny, free.rename("motor", body=motor)]
 
 
@@ -96,6 +96,10 @@ OF_KEY: Mapping[str, Mapping[str, float]] = {"rate limit per component": {"limit
 """Other values, for mistakes that these numbers do not show."""
 
 
+Rows = tuple[Array, Array]
+"""Attitudes (n, 3, 3) and rates (n, 3)."""
+
+
 def case_of(scene: Scene, t: Array, step: float | None = None) -> Compared:
     """Return the exact motion of a scene, from its start at t = 0, as a case of the search."""
     R, w = truth(scene, 0.0, t)
@@ -104,7 +108,7 @@ def case_of(scene: Scene, t: Array, step: float | None = None) -> Compared:
     return Compared(scene, t, (R, w), 0.0, scale, allowed, allowed / SIGMAS, rounded=(1e-13, 1e-13), step=step)
 
 
-def plant(mistake: Mistake, case: Compared) -> States | None:
+def plant(mistake: Mistake, case: Compared) -> Rows | None:
     """Return the rows that a mistake makes of an exact motion; None if it makes no difference."""
     trial = trial_of(mistake)
     if trial is None:
@@ -112,7 +116,7 @@ def plant(mistake: Mistake, case: Compared) -> States | None:
     elif (motion := trial.build(case)) is None:
         return None
     else:
-        values = NUMBERS | OF_KEY.get(mistake.key, {})
+        values = {**NUMBERS, **OF_KEY.get(mistake.key, {})}
         numbers = np.array([[values[each.name] for each in trial.numbers]])
         R, w = motion(case.scene.R_WB0[None], case.scene.w_WB_B0[None], numbers, len(case.t))
         made = R[0], w[0]
@@ -133,8 +137,8 @@ def trial_of(mistake: Mistake) -> Trial | None:
     return None
 
 
-def _stands(time: float, rest: float) -> Callable[[Compared], States]:
-    def change(case: Compared) -> States:
+def _stands(time: float, rest: float) -> Callable[[Compared], Rows]:
+    def change(case: Compared) -> Rows:
         t = np.minimum(case.t, time)
         at, place = np.unique(t, return_inverse=True)
         R, w = truth(case.scene, 0.0, at) if len(at) > 1 else (x[:1] for x in case.exact)
@@ -143,13 +147,14 @@ def _stands(time: float, rest: float) -> Callable[[Compared], States]:
     return change
 
 
-def _some(off: Callable[[Compared], Array], key: str) -> Callable[[Compared], States]:
-    def change(case: Compared) -> States:
+def _some(off: Callable[[Compared], Array], key: str) -> Callable[[Compared], Rows]:
+    def change(case: Compared) -> Rows:
         random = np.random.default_rng(0)
         turn = Rotation.from_rotvec(0.2 * random.normal(size=(len(case.t), 3))).as_matrix()
         R, w = case.exact
         other = R @ turn, w + 0.2 * random.normal(size=w.shape)
-        return BY_KEY[key].change(case.exact, other, off(case))  # type: ignore[attr-defined]  # of a `RowHabit`
+        mistake: Any = BY_KEY[key]  # a `RowHabit`
+        return mistake.change(case.exact, other, off(case))
 
     return change
 
@@ -163,28 +168,28 @@ def _signs(case: Compared) -> Array:
     return np.append(False, (q[1:] * q[:-1]).sum(axis=1) < 0)
 
 
-def _other_times(change: Callable[[Array], Array]) -> Callable[[Compared], States]:
+def _other_times(change: Callable[[Array], Array]) -> Callable[[Compared], Rows]:
     return lambda case: truth(case.scene, 0.0, change(case.t))
 
 
-def _with_inertia(case: Compared, inertia: Array) -> States:
+def _with_inertia(case: Compared, inertia: Array) -> Rows:
     return truth(case.scene.rename("other", body=cv.RigidBody(inertia)), 0.0, case.t)
 
 
-def _first_row(case: Compared) -> States:
+def _first_row(case: Compared) -> Rows:
     R, w = (x.copy() for x in case.exact)
     R[0], w[0] = R[0] @ Rotation.from_rotvec([0.01, 0.02, -0.01]).as_matrix(), w[0] * 1.01
     return R, w
 
 
-def _single_rows(case: Compared) -> States:
+def _single_rows(case: Compared) -> Rows:
     R, w = (x.copy() for x in case.exact)
     w[77] *= 1.1
     R[77] = R[77] @ Rotation.from_rotvec([0.1, 0.2, -0.1]).as_matrix()
     return R, w
 
 
-BY_HAND: Mapping[str, Callable[[Compared], States]] = {
+BY_HAND: Mapping[str, Callable[[Compared], Rows]] = {
     "sleep": _stands(NUMBERS["time"], 0.0),
     "halt": _stands(NUMBERS["time"], 1.0),
     "frozen motion": lambda case: (np.repeat(case.exact[0][:1], len(case.t), 0), np.repeat(case.exact[1][:1], len(case.t), 0)),
@@ -208,7 +213,7 @@ def times_of(key: str) -> Array:
 
 
 @cache
-def planted(key: str) -> tuple[Scene, States] | None:
+def planted(key: str) -> tuple[Scene, Rows] | None:
     """Return the first scene on which a mistake makes a difference, and the rows; None if there is none."""
     for scene in scenes():
         case = case_of(scene, times_of(key), T[1] / PARTS if getattr(BY_KEY[key], "of_step", False) else None)
