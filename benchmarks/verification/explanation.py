@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -110,6 +110,12 @@ class Explanation:
             return None
         return explain(case, self.trial, made, self.values, self.numbers)
 
+    def refit(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
+        if self.trial is None or self.trial.anew is not None:
+            return None
+        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers])
+
 
 def explain(
     case: Compared,
@@ -148,8 +154,20 @@ def attempt(
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
     `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
-    iterations. `known` are other numbers of the sentence, which `build` has. None if the mistakes cannot be applied.
+    iterations. Mistakes that explain too little of the first rows are not tried on all. `known` are other numbers of the
+    sentence, which `build` has. None if the mistakes cannot be applied.
     """
+    if case.screen is not None:
+        found = _attempt(case.screen, trial, start, small, most, known)
+        if found is None or (not found.explains and found.rest > HALF):
+            return found
+        start = [found.values[each.name] for each in trial.numbers]
+    return _attempt(case, trial, start, small, most, known)
+
+
+def _attempt(
+    case: Compared, trial: Trial, start: Sequence[float] | None, small: float, most: int, known: Mapping[str, float]
+) -> Explanation | None:
     motion = trial.build(case)
     if motion is None:
         return None
@@ -159,7 +177,7 @@ def attempt(
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
 
-    _, p, made = replace(case, free=()).fit(scaled, p, np.full(len(p), small), most)
+    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
     error = case.errors(*made)
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
         _, p, made = case.fit(scaled, p, np.full(len(p), small), most)

@@ -32,7 +32,7 @@ from conservative.trajectory import Trajectory
 from . import protocol
 from .compare import Compared, compare_answers
 from .explain import PROGRAM_KINDS, diagnose
-from .explanation import Explanation
+from .explanation import HALF, OWN_ERROR, Explanation
 from .finding import Finding, Verdict, Verification
 from .motions.files import tolerance
 from .motions.motion import Motion, load
@@ -56,6 +56,12 @@ RESOLVED = {"f64": 1e-11, "f32": 1e-4}
 """Smallest errors, rad, that show an order, above round-off in each precision."""
 ROUNDS = 5
 """Largest number of motions that are searched for mistakes."""
+CANDIDATES = 6
+"""Largest number of mistakes that explain one motion and are applied to the others."""
+REFITS = 4
+"""Largest number of motions that make the numbers of a mistake more precise."""
+CLEAR = 2.0
+"""Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
 LEAST = 0.1
 """Smallest share of the failing motions that a second mistake explains: a mistake can resemble another one in a motion."""
 Solve = Callable[[Scene, Grid], Trajectory]
@@ -207,39 +213,59 @@ class Named:
     motions: tuple[str, ...]
 
 
-def explain_motions(failing: Sequence[Ran]) -> list[Named]:
+def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[Named]:
     """Return the mistakes that explain failing motions, first the one that explains most.
 
     A mistake is searched in one motion, with numbers that are fitted to it. It is then applied to all others with the same
-    numbers. Motions that it does not explain are searched next, up to `ROUNDS` of them.
+    numbers, which the motions that it nearly explains make more precise. Of several mistakes the one is named that explains
+    most, less the `right` motions that it would make wrong. Motions that it does not explain are searched next, up to `ROUNDS`
+    of them.
     """
     rest = {each.motion.name: each for each in sorted(failing, key=_rank) if not each.ended}
-    named, rounds = list[Named](), 0
+    named: dict[tuple[tuple[str, ...], ...], Named] = {}
     searched = list(rest.values())
-    while rest and searched and rounds < ROUNDS:
-        each, rounds = searched.pop(0), rounds + 1
-        if each.motion.name not in rest:
-            rounds -= 1
+    for _ in range(ROUNDS):
+        searched = [each for each in searched if each.motion.name in rest]
+        if not searched:
+            break
+        each = searched.pop(0)
+        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains][:CANDIDATES]
+        scored = [(one, *_explained(one, list(rest.values()), right)) for one in found]
+        if not scored:
             continue
-        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).named if one.explains]
-        explained = {i: _explained(one, rest.values(), each) for i, one in enumerate(found)}
-        if not explained:
+        best = max(scored, key=lambda one: (one[2], -one[0].numbers))
+        equal = [one for one in scored if (one[1], one[2], one[0].numbers) == (best[1], best[2], best[0].numbers)]
+        names, before = best[1], named.get(keys := tuple(one[0].keys for one in equal))
+        if before is None and named and len(names) < LEAST * len(failing):
             continue
-        most = max(map(len, explained.values()))
-        if named and most < LEAST * len(failing):
-            continue
-        best = [i for i, names in explained.items() if len(names) == most]
-        fewest = min(found[i].numbers for i in best)
-        best = [i for i in best if found[i].numbers == fewest and explained[i] == explained[best[0]]]
-        named.append(Named(tuple(found[i] for i in best), tuple(explained[best[0]])))
-        for name in explained[best[0]]:
+        # Numbers of the first search stand: it had the motions that show them best.
+        explanations = before.explanations if before else tuple(one[0] for one in equal)
+        named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
+        for name in names:
             del rest[name]
-    return sorted(named, key=lambda each: -len(each.motions))
+    return sorted(named.values(), key=lambda each: -len(each.motions))
 
 
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
-    """Return the place in the search: free bodies with three moments first, then by the error."""
-    return bool(ran.motion.needs), not _is_generic(ran.motion), -ran.ratio
+    """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
+    return bool(ran.motion.needs), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+
+
+def _explained(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> tuple[list[str], int]:
+    """Return the failing motions that a mistake explains, and their number less the right ones that it would make wrong."""
+    names, best, refits = list[str](), one, 0
+    for each in sorted(failing, key=lambda each: each.ratio):
+        again = best.again(each.case)
+        if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
+            refined, refits = best.refit(each.case), refits + 1
+            best, again = (refined, refined) if refined is not None and refined.explains else (best, again)
+        if again is not None and again.explains:
+            names.append(each.motion.name)
+    refuted = sum(
+        (again := best.again(each.case)) is not None and bool((np.array(again.left) > OWN_ERROR * each.allowed).any())
+        for each in right
+    )
+    return names, len(names) - refuted
 
 
 def _is_generic(motion: Motion) -> bool:
@@ -248,20 +274,11 @@ def _is_generic(motion: Motion) -> bool:
     return bool((np.diff(moments) > 1e-3 * moments[-1]).all())
 
 
-def _explained(one: Explanation, rest: Any, source: Ran) -> list[str]:
-    names = []
-    for each in rest:
-        again = one if each is source else one.again(each.case)
-        if again is not None and again.explains:
-            names.append(each.motion.name)
-    return names
-
-
 def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], float]:
     """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
     near = {each.motion.name: slope for each in answers.failing if each.ratio <= NEAR and (slope := _falls(answers, each))}
     failing = [each for each in answers.failing if each.motion.name not in near]
-    named = explain_motions(failing)
+    named = explain_motions(failing, [each for each in answers.ran if each not in failing])
     explained = {name: each for each in named for name in each.motions}
     # What converges as it declares, and is no known mistake, has a large error constant.
     rest = [each for each in failing if each.motion.name not in explained and not each.ended]
@@ -370,7 +387,7 @@ def verify_method(
     if "pairs" in checks:
         from .pairs import verify_pairs
 
-        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"))
+        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"), subject)
     return Verification(subject, kind, findings, summary(findings, named))
 
 

@@ -32,6 +32,8 @@ class Reading(Mistake):
         True if only quaternions can have it.
     both
         True if attitudes and rates are needed.
+    of_world
+        True if only the axes of the world differ.
     """
 
     kind: ClassVar[str] = "readings"
@@ -40,6 +42,7 @@ class Reading(Mistake):
     of: str
     quaternions: bool = False
     both: bool = False
+    of_world: bool = False
 
 
 def attitude(change: Callable[..., Array]) -> Change:
@@ -117,6 +120,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP.T @ R),
         attitude(lambda R: TO_Y_UP @ R),
         ATTITUDES,
+        of_world=True,
         remedy="attitudes are relative to W, whose third axis is up",
     ),
     Reading(
@@ -125,6 +129,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP @ R),
         attitude(lambda R: TO_Y_UP.T @ R),
         ATTITUDES,
+        of_world=True,
         remedy="attitudes are relative to W, whose third axis is up",
     ),
     Reading(
@@ -159,6 +164,24 @@ READINGS = (
     ),
     Reading("rates in radians", "The rates are in rad/s, but were read in deg/s", *_scaled(180 / math.pi), RATES),
     Reading("reversed rates", "The rates have the other sign", *_scaled(-1.0), RATES),
+    Reading(
+        "size of the rates",
+        "The attitudes are right, but the rates are {factor:.5g} times too large",
+        _rates(lambda w, factor: w / factor),
+        _rates(lambda w, factor: w * factor),
+        RATES,
+        both=True,
+        numbers=(Number("factor", 1.0),),
+    ),
+    Reading(
+        "bias of the rates",
+        "The attitudes are right, but the rates have a bias of ({bias_1:.4g}, {bias_2:.4g}, {bias_3:.4g}) rad/s",
+        _rates(lambda w, *bias: w - np.array(bias)),
+        _rates(lambda w, *bias: w + np.array(bias)),
+        RATES,
+        both=True,
+        numbers=tuple(Number(f"bias_{i}", unit="rad/s") for i in (1, 2, 3)),
+    ),
     Reading(
         "rates in turned axes",
         "The attitudes are right, but the rates are in axes that are turned by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",

@@ -255,7 +255,7 @@ def _near(part: Compared) -> bool:
     """Return whether the second row is as near as noise and digits of the first one let it be, so that a fit can help."""
     two = part.take(slice(0, 2))
     flow = linearise(two)[2][-1].reshape(2, 3, 2, 3)
-    growth = np.maximum(np.linalg.norm(flow, axis=(1, 3)), np.eye(2))  # noise of rates also turns attitudes
+    growth = np.maximum(np.linalg.norm(flow, 2, axis=(1, 3)), np.eye(2))  # noise of rates also turns attitudes
     return bool((two.error[:, -1] <= HOPELESS * growth @ two.noise).all())
 
 
