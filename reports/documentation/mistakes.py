@@ -26,6 +26,7 @@ from conservative.benchmarks.verification.explanation import Trial
 from conservative.benchmarks.verification.find_steps import by_step
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.attitudes import Rule
+from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED, BodyMistake, FittedBodyMistake
 from conservative.benchmarks.verification.mistakes.equations import EquationsMistake
 from conservative.benchmarks.verification.mistakes.habits import Habit, RowHabit
 from conservative.benchmarks.verification.mistakes.mistake import Mistake
@@ -52,7 +53,7 @@ NAMED, WITH_OTHERS, NOT_NAMED = "named", "with others", "not named"
 SHOWS = 1e-8
 """Smallest error that makes a difference, rad or relative: ten times what is allowed."""
 RATES = "recording, rates only"
-DOORS = ("recording", RATES, "program, engine or gate", "test files")
+DOORS = ("recording", RATES, "program, engine or gate", "test files", "model files")
 """The columns: a gate verifies both versions as programs. Programs are given exact motions, whose samples they answer."""
 UNSEEN = {
     "rows": "a program writes no rows",
@@ -60,6 +61,10 @@ UNSEEN = {
     "steps": "an error of the method, which the order shows",
 }
 """Kinds of mistakes that a program does not have, with the reason."""
+LOADERS = {each.key for each in (*LOADED, *FITTED)}
+"""Keys of mistakes of loaders of model files, which are named there (tests/benchmarks/verification/test_bodies.py)."""
+OF_LOADERS, NO_MOTION = "only a loader has it", "a model file has no motion"
+"""Reasons why a mistake cannot be seen in a motion, and in a model file."""
 PARTS, MOTIONS = 2, 6
 """Steps between two rows, and exact motions that a mistake of a program is planted in."""
 
@@ -90,6 +95,9 @@ NUMBERS: Mapping[str, float] = {
         "turn_3": 0.4,
         "factor": 0.9,
         "damping": 0.1,
+        "bias_1": 0.02,
+        "bias_2": -0.03,
+        "bias_3": 0.01,
     },
     **{"limit": 1.9, "band": 0.3, "time": 3.01},
 }
@@ -224,8 +232,15 @@ def planted(key: str) -> tuple[Scene, Rows] | None:
     return None
 
 
+def is_of_loaders(key: str) -> bool:
+    """Return whether only loaders of model files have a mistake. Dropped products of inertia are also a mistake of a motion."""
+    return isinstance(BY_KEY[key], BodyMistake | FittedBodyMistake)
+
+
 def in_recording(key: str, attitudes: bool = True) -> str:
     """Return whether the verification of a recording with rates names a planted mistake."""
+    if is_of_loaders(key):
+        return OF_LOADERS
     if (found := planted(key)) is None:
         return NOT_NAMED
     scene, (R, w) = found
@@ -250,6 +265,8 @@ def in_recording(key: str, attitudes: bool = True) -> str:
 def in_program(key: str) -> str:
     """Return whether the verification of a program names a mistake that is planted in up to `MOTIONS` exact motions."""
     mistake = BY_KEY[key]
+    if is_of_loaders(key):
+        return OF_LOADERS
     if mistake.kind not in PROGRAM_KINDS:
         return UNSEEN[mistake.kind]
 
@@ -273,6 +290,8 @@ def in_program(key: str) -> str:
 
 def in_test_files(key: str) -> str:
     """Return whether the test files of references/motions have the signature of a mistake."""
+    if is_of_loaders(key):
+        return OF_LOADERS
     if BY_KEY[key].kind not in PROGRAM_KINDS:
         return UNSEEN[BY_KEY[key].kind]
     return NAMED if key in _caught() else NOT_NAMED
@@ -285,7 +304,8 @@ def _caught() -> frozenset[str]:
 
 def row_of(key: str) -> list[str]:
     """Return the cells of a mistake: its key, and the answer of each door."""
-    return [f"`{key}`", in_recording(key), in_recording(key, attitudes=False), in_program(key), in_test_files(key)]
+    motions = in_recording(key), in_recording(key, attitudes=False), in_program(key), in_test_files(key)
+    return [f"`{key}`", *motions, NAMED if key in LOADERS else NO_MOTION]
 
 
 def read_rows(text: str) -> dict[str, list[str]]:
