@@ -63,7 +63,7 @@ REFITS = 4
 CLEAR = 2.0
 """Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
 LEAST = 0.1
-"""Smallest share of the failing motions that a second mistake explains: a mistake can resemble another one in a motion."""
+"""Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
@@ -226,7 +226,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
     searched = list(rest.values())
     for _ in range(ROUNDS):
         searched = [each for each in searched if each.motion.name in rest]
-        if not searched:
+        if not searched or (named and len(rest) < LEAST * len(failing)):
             break
         each = searched.pop(0)
         found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains][:CANDIDATES]
@@ -236,8 +236,6 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
         best = max(scored, key=lambda one: (one[2], -one[0].numbers))
         equal = [one for one in scored if (one[1], one[2], one[0].numbers) == (best[1], best[2], best[0].numbers)]
         names, before = best[1], named.get(keys := tuple(one[0].keys for one in equal))
-        if before is None and named and len(names) < LEAST * len(failing):
-            continue
         # Numbers of the first search stand: it had the motions that show them best.
         explanations = before.explanations if before else tuple(one[0] for one in equal)
         named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
