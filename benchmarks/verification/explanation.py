@@ -16,6 +16,7 @@ from .finding import Cause
 from .mistakes.mistake import Mistake, Number
 
 HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
+OWN_SHARE = 0.02  # of the error of a program with a mistake, that its steps may make
 OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
 
 
@@ -114,7 +115,9 @@ class Explanation:
         """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
         if self.trial is None or self.trial.anew is not None:
             return None
-        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers])
+        fitted = {each.name for each in self.trial.numbers}
+        known = {name: value for name, value in self.values.items() if name not in fitted}
+        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers], known=known)
 
 
 def explain(
@@ -135,12 +138,23 @@ def explain(
         plain.tolist(),
         float(error.max() / max(plain.max(), 1e-15)),
         case.size(error),
-        bool(case.passes(error / (1.0 if case.step is None else OWN_ERROR)) and rest < HALF),
+        _is_allowed(case, error, plain) and rest < HALF,
         len(values) if numbers is None else numbers,
         made,
         rest,
         trial,
     )
+
+
+def _is_allowed(case: Compared, error: Array, plain: Array) -> bool:
+    """Return whether a mistake may leave errors (2, n) of the errors `plain` (2,) without it.
+
+    A program with a mistake has an error of its steps as well: some tolerances, or a share of the error that is proportional to
+    the step, such as damping after each step.
+    """
+    if case.step is None:
+        return case.passes(error)
+    return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, OWN_SHARE * plain)).all())
 
 
 def attempt(

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from shutil import which
 from typing import TYPE_CHECKING, Any
@@ -221,20 +222,21 @@ def _verify_recordings(
 ) -> Iterator[Verification]:
     """Yield the verification of each recording; of two recordings one, which also compares them."""
     from .recordings import table, verdict
+    from .recordings.layout import Options
 
     if body is None:
         raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
     scene = registry.scene(body) if isinstance(body, str) else body
-    recordings = [(path.name, table.read(path, table.Options(**reading))) for path in files]
+    from_row = start == "row"
+    recordings = [(path.name, table.read(path, Options(**reading))) for path in files]
     if len(recordings) == 2:
         from .recordings.two import verify_two
 
-        yield verify_two(scene, *recordings, from_row=start == "row", error=error, tell=lambda what: tell(0.0, what))
+        first, second = recordings
+        yield verify_two(scene, first, second, from_row, error, partial(tell, 0.0))
         return
     for name, recording in recordings:
-        yield verdict.verify_recording(
-            scene, recording, start == "row", error, lambda what, name=name: tell(0.0, f"{name}: {what}"), name
-        )
+        yield verdict.verify_recording(scene, recording, from_row, error, partial(tell, 0.0), name)
 
 
 USED_BY: dict[str, tuple[Kind, ...]] = {

@@ -108,6 +108,7 @@ LISTS = ("only", "pairs", "engines")
 @click.pass_context
 def verify(
     ctx: click.Context,
+    /,
     subjects: tuple[str, ...],
     as_json: bool,
     junit: Path | None,

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification
 
 from ..document.cells import DASH, bound, listed
-from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
+from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
 from .bodies import body_blocks
 from .recording import recording_blocks, two_blocks
 
@@ -212,7 +212,7 @@ def _counts(verification: Verification) -> Table | None:
 
 
 def _cases(check: str, findings: Sequence[Finding]) -> Table:
-    body = [
+    body: list[Row] = [
         [
             each.case or each.subject,
             _verdict(each.verdict),
