@@ -24,6 +24,7 @@ from conservative.grid import Grid
 from conservative.method import Method
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.programs import UnusableProgram, program_class
 from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
@@ -430,7 +431,7 @@ def verify_program(
     checks: Sequence[str],
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
-    method: Method | None = None,
+    method: EngineMethod | None = None,
 ) -> Verification:
     """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
 
