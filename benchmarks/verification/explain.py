@@ -53,7 +53,7 @@ class Diagnosis:
 def diagnose(
     whole: Compared,
     quaternion: bool = True,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], object] = lambda _: None,
     kinds: frozenset[str] = ALL_KINDS,
 ) -> Diagnosis:
     """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
@@ -87,7 +87,9 @@ def diagnose(
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
-    if case.step is None and all(each.rest > PROVEN for each in tried if each.explains):
+    # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
+    doubtful = all(each.rest > PROVEN and each.keys != (JITTERED.key,) for each in tried if each.explains)
+    if case.step is None and doubtful:
         tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
     explaining = [each for each in tried if each.explains]
     if not explaining:
@@ -111,7 +113,7 @@ def _normalised(found: Explanation) -> bool:
 def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
-    size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
+    size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
     if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
         return case  # no rows, or single ones
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
@@ -245,6 +247,8 @@ def _times(case: Compared, asked: _Asked) -> Found:
 
 def _own_times(case: Compared, gap: float, end: float) -> Found:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
+    if case.free:  # the first row has noise
+        case = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0])
     tau, e = case.t.copy(), 1e-6 / case.scale
     end += min(end - case.start, 50 * gap)
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)

@@ -123,14 +123,14 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) 
         t, R, w, failure = found.t, found.R_WB, found.w_WB_B, found.failure
     except Unsupported:
         raise
-    except IntegrationFailed as error:
-        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), error
+    except IntegrationFailed as ended_early:
+        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), ended_early
     if len(t) < grid.n_samples:
         ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
     elif not (np.isfinite(R).all() and np.isfinite(w).all()):
         ended = "samples are not finite"
-    case = compare_answers(scene, t, (R, w), allowed, grid.dt)
-    at = slice(thin, None, thin)  # the samples of the motion
+    case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
+    at = slice(thin - 1, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
     return Ran(motion, case, error, allowed, grid.dt, ended)
 
@@ -348,9 +348,9 @@ def repeatability(subject: str, method: Method, answers: Answers) -> Iterator[Fi
         done.add(free)
         run = method.prepare(each.motion.scene, Grid(each.step, 100, 10))
         first = run()
-        first = first.R_WB.copy(), first.w_WB_B.copy()
+        R, w = first.R_WB.copy(), first.w_WB_B.copy()
         again = run()
-        same = np.array_equal(first[0], again.R_WB) and np.array_equal(first[1], again.w_WB_B)
+        same = np.array_equal(R, again.R_WB) and np.array_equal(w, again.w_WB_B)
         detail = "" if same else "a second run has other samples: each run starts from the initial state"
         verdict = Verdict.RIGHT if same else Verdict.WRONG
         yield Finding(subject, "repeatability", each.motion.name, verdict, by="bits", detail=detail)
@@ -401,7 +401,7 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
         elif some and check in ("motions", "pairs", "repeatability"):
             right = sum(each.verdict is Verdict.RIGHT for each in some)
             words = {"repeatability": "repeated runs"}.get(check, check)
-            parts.append(f"{right} of {len(some)} {words}")
+            parts.append(f"{right} of {len(some)} {words}{'' if right == len(some) else ' are right'}")
         else:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
     failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
@@ -432,12 +432,16 @@ def verify_program(
     checks: Sequence[str],
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
+    method: Method | None = None,
 ) -> Verification:
-    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong."""
+    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
+
+    `method` is the program with one of its settings, by default with their defaults.
+    """
     findings = list[Finding]()
     try:
         with time_limit(PATIENCE):
-            method = program_class(program, PATIENCE)()
+            method = method or program_class(program, PATIENCE)()
             if "protocol" in checks:
                 findings += protocol.findings(subject, method)
             if any(each.verdict is Verdict.WRONG for each in findings):

@@ -70,8 +70,9 @@ def distance(found, limit, known):
     return sum(math.log(max(x, y) / max(known[name], y)) ** 2 for x, y, name in zip(found, limit, NAMES))
 
 
-tested = []
-failing = {}  # of each motion that fails: the mistakes that explain it with their distances, and the exponent of the step
+tested: list[str] = []
+# Of each motion that fails: the mistakes that explain it with their distances, and the exponent of the step.
+failing: dict[str, tuple] = {}
 
 
 @pytest.mark.parametrize("path", sorted(Path(__file__).parent.glob("*.json")), ids=lambda path: path.stem)

@@ -720,7 +720,7 @@ def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
     }
     assert verified.exit_code == 1
     (note,) = (each for each in verified.notes if "no body is like this" in each)
-    assert note.startswith("robot.urdf: hip")
+    assert note.startswith("hip: ")
     assert "-0.0012 -0.0011 0.0003" in note
 
 

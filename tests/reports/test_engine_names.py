@@ -160,11 +160,9 @@ def test_both_spellings_of_a_version_select_the_same(monkeypatch, name, command,
     if settings is not None:
         assert settings == ask(monkeypatch, name, command, parameter, engine.partition("@")[0])[1]
         method = registry.method(engine)
-        every = name in TABLES or (name, parameter.name) == ("verify", "subjects")
-        expected = method.settings_in_tables() if every else (method,)
-        expected = expected[:1] if name == "verify" else expected  # the first is captured
+        expected = method.settings_in_tables() if name in TABLES else (method,)
         assert settings == sorted(map(settings_text, expected))
-        assert name == "verify" or len(settings) == (1 if not every else 3 if "double" in engine else 5)
+        assert len(settings) == (1 if name not in TABLES else 3 if "double" in engine else 5)
 
 
 REFUSED = ["mujoco=3.12.0", "mujoco@", "@3", "mujoco @3.12.0", "MuJoCo@3.12.0", "reduced@1.0"]

@@ -100,7 +100,7 @@ class LoadedBody:
 def verify_files(
     files: Sequence[Path] = (),
     engines: Sequence[str] = (),
-    tell: Callable[[float, str], None] = lambda share, what: None,
+    tell: Callable[[float, str], object] = lambda share, what: None,
     search: Sequence[Path] = (),
 ) -> list[Verification]:
     """Return a verification for each model file (URDF, SDF, MJCF or USD), with a finding for each engine and body.
@@ -152,7 +152,7 @@ def verify_files(
 def _join(file: str, models: list[Model], found: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
     """Return the verification of a file from those of its bodies."""
     pairs = [pair for model in models for pair in found[model.label]]
-    notes = [note if len(models) == 1 else f"{model.label}: {note}" for model in models for note in model.notes]
+    notes = [note if len(models) == 1 else f"{model.body.name}: {note}" for model in models for note in model.notes]
     findings = [finding for finding, _ in pairs]
     tested = [each for each in findings if each.verdict is not Verdict.NOT_TESTED]
     right = sum(each.verdict is Verdict.RIGHT for each in tested)

@@ -25,6 +25,8 @@ from .pairs import Description, Samples
 
 RUN_LIMIT = 60.0
 """Time limit of a run, s, against engines that hang. A run takes 800 steps at most, and may compile. It decides no verdict."""
+START_LIMIT = 600.0
+"""Time limit of a run of our own methods in a new process, s, which may compile all kernels."""
 HANGS = 2
 """After so many runs without an end, an engine is not run any more: each trial of a reduction could take the limit."""
 ENDLESS = f"the run had not ended after {RUN_LIMIT:g} s"
@@ -101,9 +103,9 @@ class Runner:
         """Return the samples of a run in a new process."""
         worker, method = python_worker(show_output=False), self.method
         try:
-            return run_within(RUN_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
-        except EngineTimeout:
-            raise NotAvailable(ENDLESS) from None
+            return run_within(START_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
+        except EngineTimeout as error:
+            raise NotAvailable(str(error)) from None
         finally:
             worker.close()
 

@@ -160,26 +160,26 @@ def test_the_command_replaces_no_other_file(tmp_path):
 
 @pytest.mark.parametrize("order", programs.ORDERS)
 def test_designs_have_their_order(order):
-    """Errors of attitudes fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within ORDER_MEASURED of the order."""
+    """Errors of attitudes fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.05 of the order."""
     motions = [CATALOGUE["world_tensor"], CATALOGUE["heavy"], CATALOGUE["damped_and_driven"]]
     scale, all_of = programs.sizes(motions), designs(order)
     assert {(each.attitude, each.variable) for each in all_of} == set(product(ATTITUDES, VARIABLES))
     for each in all_of[:: 1 if order < 4 else 5]:
         coarse, fine = (programs.errors(motions, scale, each.run(motions, parts)) for parts in (1, 10))
-        assert np.abs(np.log10(coarse / fine)[:, 0] - order).max() <= 0.2, each.name
+        assert np.abs(np.log10(coarse / fine)[:, 0] - order).max() <= 0.1, each.name
 
 
 @slow
-@pytest.mark.parametrize(("order", "single"), [(1, False), (2, False), (1, True), (2, True)])
-def test_all_designs_are_right_also_without_normalisation(order, single):
-    """Measured: see the docstring of `MARGIN`."""
+@pytest.mark.parametrize(("order", "single"), [(2, False), (1, True), (2, True), (4, True)])
+def test_all_designs_are_right(order, single):
+    """Measured: 0.5 in double precision, which is the margin."""
     motions = list(CATALOGUE.values())
     scale = programs.sizes(motions)
     limits = np.array([
         [row[name] + single * FILES[motion]["single"] for name in programs.QUANTITIES]
         for motion in CATALOGUE for row in FILES[motion]["tolerance"] if (row["order"], row["angle"]) == (order, 0.01)
     ])  # fmt: skip
-    for each in designs(order, single, every=True):
+    for each in designs(order, single)[:: 1 if order < 4 else 3]:
         assert (programs.errors(motions, scale, each.run(motions, 10)) / limits).max() <= 0.75, each.name
 
 
@@ -260,7 +260,7 @@ def test_lower_order_than_declared_is_measured(language, tmp_path):
 
 
 def test_right_program_above_a_tolerance_passes_with_a_note(tmp_path, monkeypatch):
-    """Tolerances of an eighth: 20 of the motions are above, and all errors fall as h^2."""
+    """With two per cent of the tolerances motions are above, and all errors fall as h^2."""
     lines = run("C", tmp_path, "", RK2, 2, share=0.02)
     assert summary(lines)[0] == 0
     assert len(lines) >= 10
@@ -300,7 +300,19 @@ def test_planted_mistakes_are_named_by_the_summary(language, mistake, tmp_path):
     assert explained[first] >= 0.65 * failing > 0
 
 
-@pytest.mark.parametrize("name", WRONG)
+NEVER_NAMED_BEFORE = {
+    "wrong side",
+    "factor 1/2",
+    "inertia inverted",
+    "damping 0.1",
+    "damping 0.02",
+    "limit",
+    "dead band",
+    "sleep",
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(each, marks=[slow] * (each not in NEVER_NAMED_BEFORE)) for each in WRONG])
 def test_wrong_programs_are_named_by_the_summary_in_python(name, monkeypatch):
     """Programs that share no code with the catalogue."""
     program, test = WRONG[name], load_test()
