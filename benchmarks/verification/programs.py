@@ -34,7 +34,7 @@ from . import protocol
 from .compare import Compared, compare_answers
 from .explain import PROGRAM_KINDS, diagnose
 from .explanation import HALF, OWN_ERROR, Explanation
-from .finding import Finding, Verdict, Verification
+from .finding import Finding, Verdict, Verification, uncapitalised
 from .motions.files import tolerance
 from .motions.motion import Motion, load
 from .motions.programs import ORDERS, PARTS
@@ -405,7 +405,7 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
     failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
     reasons = [
-        f"{' or '.join(one.cause.sentence for one in each.explanations)} "
+        f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
         f"(explains {len(each.motions)} of {failing} failing motions)"
         for each in named
     ]
