@@ -33,7 +33,7 @@ from conservative.benchmarks.verification.mistakes.mistake import Mistake
 from conservative.benchmarks.verification.mistakes.readings import Reading
 from conservative.benchmarks.verification.mistakes.scenes import SceneMistake
 from conservative.benchmarks.verification.mistakes.steps import Integrator
-from conservative.benchmarks.verification.mistakes.times import Time
+from conservative.benchmarks.verification.mistakes.times import RowTimes, Time
 from conservative.benchmarks.verification.motions import files
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.recordings.table import Recording
@@ -65,6 +65,8 @@ LOADERS = {each.key for each in (*LOADED, *FITTED)}
 """Keys of mistakes of loaders of model files, which are named there (tests/benchmarks/verification/test_bodies.py)."""
 OF_LOADERS, NO_MOTION = "only a loader has it", "a model file has no motion"
 """Reasons why a mistake cannot be seen in a motion, and in a model file."""
+NO_CLOCK = "a program has no clock: its samples are after steps"
+"""Reason why a program does not have a mistake of time stamps."""
 PARTS, MOTIONS = 2, 6
 """Steps between two rows, and exact motions that a mistake of a program is planted in."""
 
@@ -262,13 +264,21 @@ def in_recording(key: str, attitudes: bool = True) -> str:
     return NOT_NAMED if finding.verdict == "wrong" else str(finding.verdict)
 
 
-def in_program(key: str) -> str:
-    """Return whether the verification of a program names a mistake that is planted in up to `MOTIONS` exact motions."""
-    mistake = BY_KEY[key]
-    if is_of_loaders(key):
+def not_of_programs(mistake: Mistake) -> str:
+    """Return why a program does not have a mistake; "" if it can."""
+    if is_of_loaders(mistake.key):
         return OF_LOADERS
     if mistake.kind not in PROGRAM_KINDS:
         return UNSEEN[mistake.kind]
+    of_clock = isinstance(mistake, RowTimes) or (isinstance(mistake, Time) and not mistake.of_step and not mistake.unit)
+    return NO_CLOCK if of_clock else ""
+
+
+def in_program(key: str) -> str:
+    """Return whether the verification of a program names a mistake that is planted in up to `MOTIONS` exact motions."""
+    mistake = BY_KEY[key]
+    if reason := not_of_programs(mistake):
+        return reason
 
     done = list[str]()
 
@@ -290,10 +300,8 @@ def in_program(key: str) -> str:
 
 def in_test_files(key: str) -> str:
     """Return whether the test files of references/motions have the signature of a mistake."""
-    if is_of_loaders(key):
-        return OF_LOADERS
-    if BY_KEY[key].kind not in PROGRAM_KINDS:
-        return UNSEEN[BY_KEY[key].kind]
+    if reason := not_of_programs(BY_KEY[key]):
+        return reason
     return NAMED if key in _caught() else NOT_NAMED
 
 

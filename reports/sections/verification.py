@@ -49,7 +49,10 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     order = sorted(verifications, key=lambda each: DECIDING.index(each.verdict))
     models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
     listed_alone = [*others, *(models if len(models) == 1 else ())]
-    sentences = [Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in listed_alone]
+    sentences = [
+        Item(f"{each.sentence}.", each.subject * (each.kind == "recordings"), each.verdict is Verdict.WRONG)
+        for each in listed_alone
+    ]
     lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:

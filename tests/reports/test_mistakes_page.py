@@ -9,7 +9,7 @@ from conservative.reports.documentation import mistakes
 
 PAGE = mistakes.read_rows(mistakes.PAGE.read_text(encoding="utf-8"))
 REASONS = {
-    *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, "it does not change the rates",
+    *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, mistakes.NO_CLOCK, "it does not change the rates",
     "no exact motion shows it", "rates of a body in a field do not determine its motion",
 }  # fmt: skip
 QUICK = ("transposed", "rates in degrees", "no gyroscopic term", "wrong side", "held rows", "time in ms")
