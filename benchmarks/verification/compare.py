@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, to_quaternion
+from conservative.needs import IN_TIME
 from conservative.scene import Scene
 
 from .solution import ANGLE, Equations, States, closed, truth
@@ -25,6 +26,8 @@ SIGMAS = 7.0  # of noise, that the largest error may have
 ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 TINY = 1e-11  # of noise, which is round-off
+SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
+LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
 PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
@@ -69,6 +72,13 @@ def take_rows(data: States, rows: Any) -> States:
     return None if data[0] is None else data[0][rows], None if data[1] is None else data[1][rows]
 
 
+def weigh(scene: Scene) -> float:
+    """Return the work of a solution in a scene, relative to the work for a free body."""
+    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.needs & IN_TIME)
+    loads = (scene.torque, scene.damping and scene.damping.of_time)
+    return weight + 1.0 * bool(scene.loads) + 30.0 * any(each is not None and each.of_attitude for each in loads)
+
+
 def take_part(motion: tuple[Array, Array], of: States) -> States:
     """Return attitudes and rates of a motion as far as data have them."""
     R, w = (x if y is not None else None for x, y in zip(motion, of, strict=True))
@@ -102,7 +112,8 @@ class Compared:
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
-    alone decides, it is that. `step` is the step of a program, s; None if it is not known.
+    alone decides, it is that. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
+    which the quaternion of the file changes its sign; None if the file has no quaternions.
     """
 
     scene: Scene
@@ -118,6 +129,7 @@ class Compared:
     effort: Effort = field(default_factory=lambda: Effort(math.inf))
     rounded: tuple[float, float] = (0.0, 0.0)
     step: float | None = None
+    flipped: Any = None
 
     @property
     def from_row(self) -> bool:
@@ -126,7 +138,18 @@ class Compared:
 
     def take(self, rows: Any) -> Compared:
         """Return some of the rows."""
-        return replace(self, t=self.t[rows], data=take_rows(self.data, rows))
+        flipped = None if self.flipped is None else self.flipped[rows]
+        taken = replace(self, t=self.t[rows], data=take_rows(self.data, rows), flipped=flipped)
+        if "exact" in vars(self):
+            vars(taken)["exact"] = take_rows(self.exact, rows)
+        return taken
+
+    def change(self, **changes: Any) -> Compared:
+        """Return the case with other fields than scene, start and times, whose exact motion it keeps."""
+        changed = replace(self, **changes)
+        if "exact" in vars(self):
+            vars(changed)["exact"] = self.exact
+        return changed
 
     def first(self, angle: float, least: int) -> Compared:
         """Return the rows in which the body turns by an angle, rad, or at least so many."""
@@ -154,6 +177,17 @@ class Compared:
     def error(self) -> Array:
         """The errors (2, n) of the rows against the exact motion."""
         return self.errors(*self.exact)
+
+    @cached_property
+    def screen(self) -> Compared | None:
+        """The first rows, which already tell whether a mistake explains the error; None if all rows are needed."""
+        for angle in SCREENS:
+            some = self.first(angle, FEWEST_SCREENED)
+            if len(some.t) > 0.5 * len(self.t):
+                return None
+            if (np.sqrt((some.error**2).mean(axis=1)) > SCREENED * np.maximum(some.allowed, some.noise)).any():
+                return some
+        return None
 
     @property
     def turned(self) -> float:
@@ -202,13 +236,14 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        self.effort.spend((1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
+        self.effort.spend(weigh(self.scene) * (1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
         """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
         tolerance = float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8))
-        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, **changes)
+        most = LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
+        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=most, **changes)
 
     def deviations(self, motion: Solution, found: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""

@@ -19,7 +19,7 @@ from .find_steps import PARTS, STEPS_AT_MOST, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import RULES, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, ROWS, STANDSTILLS, RowHabit, Standstill
+from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -30,9 +30,10 @@ from .solution import Equations, closed, truth
 from .trials import by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500  # rows that are explained
-EFFORT = 10_000  # stretches, after which the search ends: about 20 s of an idle core
+EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle core
 MOST_BREAKS = 50  # of loads, if numbers are fitted
 STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
+LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
 SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
@@ -52,42 +53,43 @@ class Diagnosis:
 def diagnose(
     whole: Compared,
     quaternion: bool = True,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], object] = lambda _: None,
     kinds: frozenset[str] = ALL_KINDS,
 ) -> Diagnosis:
     """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
 
     A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
-    fewest numbers is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes that make
-    attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions can be
-    wrong. The work is counted, so that the answer is the same on a busy machine.
+    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes
+    that make attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions
+    can be wrong. The work is counted, so that the answer is the same on a busy machine.
     """
     whole = _before_divergence(whole)
     case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
-    case = replace(case.take(slice(None, None, stride)), stride=stride)
+    case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(EFFORT))
+    early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
         if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
             continue
         tell(name)
-        limited = replace(whole if search.whole else case, effort=Effort(EFFORT * search.share))
-        if search.whole:
-            limited = limited.first(LONGEST, FEWEST)
-        for each in search.find(limited, _Asked(quaternion, kinds, tuple(tried))):
+        case.effort.left = EFFORT * search.share
+        for each in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
             if each is not None:
                 tried.append(each)
-            if limited.effort.over:
+            if case.effort.over:
+                over = True
                 break
-        over |= limited.effort.over
         if search.ends and any(each.explains for each in tried):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
     tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
     tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
-    if case.step is None and all(each.rest > PROVEN for each in tried if each.explains):
+    # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
+    doubtful = all(each.rest > PROVEN and each.keys != (JITTERED.key,) for each in tried if each.explains)
+    if case.step is None and doubtful:
         tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
     explaining = [each for each in tried if each.explains]
     if not explaining:
@@ -97,8 +99,8 @@ def diagnose(
         return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)
     least = min(each.size for each in explaining)
     good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
-    fewest = min(each.numbers for each in good)
-    good = [each for each in good if each.numbers == fewest]
+    fewest = min((each.numbers, len(each.keys)) for each in good)
+    good = [each for each in good if (each.numbers, len(each.keys)) == fewest]
     named = [each for each in good if _normalised(each)] or good
     return Diagnosis(named, tried, _separate(case, named))
 
@@ -111,9 +113,9 @@ def _normalised(found: Explanation) -> bool:
 def _before_divergence(case: Compared) -> Compared:
     """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
-    size = np.zeros(1) if w is None else np.linalg.norm(w, axis=1)
-    if not size.max() > 3 * largest > 0 or size[0] > 3 * largest:
-        return case
+    size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
+    if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
+        return case  # no rows, or single ones
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
     return case.rescale(float(size[: len(case.t)].max()))
 
@@ -147,6 +149,8 @@ def _known(mistakes: Any) -> list[Any]:
 def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
     """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
     usable = [each for each in _known(READINGS) if fits(each, case) and (quaternion or not each.quaternions)]
+    if case.from_row and case.scene.free:  # whatever the axes of the world are
+        usable = [each for each in usable if not each.of_world]
     of = {name: [(), *((each,) for each in usable if each.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
     return pairs[1:] + [(each,) for each in usable if each.of == AXES]
@@ -213,6 +217,8 @@ def _moves(case: Compared, found: Explanation | None) -> bool:
     """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
     if found is None or found.made is None:
         return False
+    if not found.explains:
+        return True
     return bool((case.apart(found.made, _still(case)) > SHOWN * case.allowed).any())
 
 
@@ -241,6 +247,8 @@ def _times(case: Compared, asked: _Asked) -> Found:
 
 def _own_times(case: Compared, gap: float, end: float) -> Found:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
+    if case.free:  # the first row has noise
+        case = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0])
     tau, e = case.t.copy(), 1e-6 / case.scale
     end += min(end - case.start, 50 * gap)
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
@@ -411,27 +419,23 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     rest = ~off
     noise = np.maximum(np.sqrt((case.error[:, rest] ** 2).mean(axis=1)), 1e-13)
     allowed = np.maximum(1e-9, np.minimum(case.allowed, 10 * noise))
-    fine = replace(case, noise=noise, allowed=allowed)
-    places = np.flatnonzero(off)
-    q = to_quaternion(case.exact[0])
-    signs = np.flatnonzero((q[1:] * q[:-1]).sum(axis=1) < 0) + 1
-    near = bool(len(signs)) and all(np.abs(signs - k).min() <= 1 for k in places)
+    fine = case.change(noise=noise, allowed=allowed)
+    places, q = np.flatnonzero(off), to_quaternion(case.exact[0])
+    signs = (q[1:] * q[:-1]).sum(axis=1) < 0 if case.flipped is None else case.flipped[1:]  # the scalar is not negative
+    near = bool(signs.any()) and all(np.abs(np.flatnonzero(signs) + 1 - k).min() <= 1 for k in places)
     gaps = np.diff(places)
     periodic = len(places) > 2 and np.ptp(gaps) == 0
-    stride = case.stride
     for each in ROWS:
-        if each.periodic != periodic or (not each.periodic and not near):
-            continue
-        made = each.change(case.exact, case.data, off)
-        values = {"first": float(places[0] * stride + 1)}
-        values |= {"period": float(gaps[0] * stride)} if periodic else {"rows": float(len(places))}
-        if (np.maximum(*fine.errors(*made)) <= 1e9).all():
-            free = each.change is ROWS[-1].change
-            yield explain(fine, Trial((each,), _rows_again(each)), made, values, numbers=2 + 3 * free)
-
-
-def _rows_again(mistake: RowHabit) -> Callable[[Compared], Solution | None]:
-    return _nowhere
+        if periodic if each.periodic else near:
+            made = each.change(case.exact, case.data, off)
+            values = {"first": float(places[0] * case.stride + 1)}
+            values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
+            yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
+    if not periodic and not near:
+        worst = float(case.error[:, places[0]].max())
+        values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
+        made = ROWS[-1].change(case.exact, case.data, off)
+        yield explain(fine, Trial((BY_KEY["single rows"],), _nowhere), made, values, numbers=9)
 
 
 def _off_rows(error: Array) -> Any:
@@ -461,20 +465,26 @@ def _turned_axes(case: Compared, asked: _Asked) -> Found:
         for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
             U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
             C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
-            yield attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+            yield best and _shortest_turn(best)
+        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
+        size = float((w * right).sum() / ((right * right).sum() or 1.0))
+        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
     trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     found = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
-    best = min(
-        (each for each in found if each is not None),
-        key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])),
-    )
-    turn = Rotation.from_rotvec([*best.values.values()]).as_rotvec().tolist()
-    values = dict(zip(best.values, turn, strict=True))
-    yield replace(best, values=values, sentence=trial.sentence(values))
+    shortest = [_shortest_turn(each) for each in found if each is not None]
+    yield min(shortest, key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
+
+
+def _shortest_turn(found: Explanation) -> Explanation:
+    """Return an explanation by a turn of at most half a revolution."""
+    turn = Rotation.from_rotvec([*found.values.values()]).as_rotvec().tolist()
+    values, trial = dict(zip(found.values, turn, strict=True)), found.trial
+    return replace(found, values=values, sentence=found.sentence if trial is None else trial.sentence(values))
 
 
 def _bodies(case: Compared, asked: _Asked) -> Found:
@@ -565,35 +575,36 @@ def _other_body(case: Compared) -> Explanation:
 
 
 def _steps(case: Compared, asked: _Asked) -> Found:
-    """Yield integrators, also of the scene with the number that was fitted best."""
-    found = [*find_steps(case)]
-    yield from found
-    if any(each.explains for each in (*found, *asked.tried)):
-        return
-    sized = [
-        each for each in asked.tried if len(each.keys) == 1 and isinstance(BY_KEY[each.keys[0]], SceneMistake) and each.values
-    ]
-    for each in sorted(sized, key=lambda each: each.size)[:1]:
+    """Yield integrators, of the scene whose number was fitted best if it leaves little, or of the scene."""
+    sized = [each for each in asked.tried if each.keys[1:] == () and "factor" in each.values and each.rest < LITTLE]
+    for each in sorted(sized, key=lambda each: (each.size, each.keys))[:1]:
         mistake = BY_KEY[each.keys[0]]
-        assert isinstance(mistake, SceneMistake)
-        if each.rest > PROVEN:
+        if not isinstance(mistake, SceneMistake) or each.explains:
             continue
-        factor = each.values["factor"]
-        for rounded in (float(f"{factor:.{digits}g}") for digits in (2, 3, 4, 16)):
-            other = mistake.change(case.scene, rounded)
-            if other is None:
-                continue
-            both = list[Explanation]()
-            for one in find_steps(replace(case, scene=other)):
-                trial = one.trial
-                assert trial is not None
-                assert one.made is not None
-                joint = Trial((mistake, *trial.mistakes), _in_scene(mistake, rounded, trial))
-                some = case.take(slice(0, len(one.made[0])))
-                both.append(explain(some, joint, one.made, {"factor": rounded} | one.values))
-            yield from both
-            if any(one.explains for one in both):
-                return
+        factor = _round_factor(case, each)
+        other = mistake.change(case.scene, factor)
+        found = [*find_steps(replace(case, scene=other))] if other is not None else []
+        for one in found:
+            if one.trial is not None and one.made is not None:
+                both = Trial((mistake, *one.trial.mistakes), _in_scene(mistake, factor, one.trial))
+                yield explain(case.take(slice(0, len(one.made[0]))), both, one.made, {"factor": factor} | one.values)
+        if any(one.explains for one in found):
+            return
+    if not any(each.explains for each in asked.tried):
+        yield from find_steps(case)
+
+
+def _round_factor(case: Compared, found: Explanation) -> float:
+    """Return the factor with the fewest digits that leaves at most twice as much as the one that was fitted."""
+    factor, trial = found.values["factor"], found.trial
+    motion = None if trial is None else trial.build(case)
+    for digits in (1, 2, 3, 4) if motion is not None else ():
+        rounded = float(f"{factor:.{digits}g}")
+        if rounded != 1 and motion is not None:
+            R, w = case.evaluate(motion, np.append(np.zeros(6), rounded)[None])
+            if case.size(case.errors(R[0], w[0])) <= 2 * found.size:
+                return rounded
+    return factor
 
 
 def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[Compared], Solution | None]:
@@ -654,15 +665,15 @@ class Search:
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
-    "other readings": Search(_readings, frozenset({"readings"}), 0.1),
-    "habits": Search(_habits, frozenset({"habits"}), 0.2, least=2),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
-    "other times": Search(_times, frozenset({"times"}), 0.05),
-    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.1),
+    "other times": Search(_times, frozenset({"times"}), 0.1),
+    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
-    "integrators": Search(_steps, frozenset({"steps"}), 0.2, ends=True),
+    "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
-    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
-    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.2),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.15),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.15),
 }
 """Parts of the search by the work that they do, in their order."""

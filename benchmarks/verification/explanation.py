@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +16,7 @@ from .finding import Cause
 from .mistakes.mistake import Mistake, Number
 
 HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
+OWN_SHARE = 0.02  # of the error of a program with a mistake, that its steps may make
 OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
 
 
@@ -63,6 +64,7 @@ class Explanation:
     and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
     units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
     the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
+    `of_program` is True if a program answered, and not a file.
     """
 
     keys: tuple[str, ...]
@@ -77,6 +79,7 @@ class Explanation:
     made: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
     rest: float = 0.0
     trial: Trial | None = field(default=None, compare=False, repr=False)
+    of_program: bool = False
 
     @property
     def name(self) -> str:
@@ -87,7 +90,8 @@ class Explanation:
     def cause(self) -> Cause:
         """The mistakes as the cause of a finding, with the error of attitudes or rates, whichever is larger without them."""
         worst = int(np.argmax(self.plain))
-        remedies = [] if self.trial is None else [each.remedy for each in self.trial.mistakes if each.remedy]
+        mistakes = () if self.trial is None else self.trial.mistakes
+        remedies = filter(None, (each.remedy if self.of_program else each.option for each in mistakes))
         values = MappingProxyType(self.values)
         return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
 
@@ -110,6 +114,14 @@ class Explanation:
             return None
         return explain(case, self.trial, made, self.values, self.numbers)
 
+    def refit(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
+        if self.trial is None or self.trial.anew is not None:
+            return None
+        fitted = {each.name for each in self.trial.numbers}
+        known = {name: value for name, value in self.values.items() if name not in fitted}
+        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers], known=known)
+
 
 def explain(
     case: Compared,
@@ -129,12 +141,24 @@ def explain(
         plain.tolist(),
         float(error.max() / max(plain.max(), 1e-15)),
         case.size(error),
-        bool(case.passes(error / (1.0 if case.step is None else OWN_ERROR)) and rest < HALF),
+        _is_allowed(case, error, plain) and rest < HALF,
         len(values) if numbers is None else numbers,
         made,
         rest,
         trial,
+        case.step is not None,
     )
+
+
+def _is_allowed(case: Compared, error: Array, plain: Array) -> bool:
+    """Return whether a mistake may leave errors (2, n) of the errors `plain` (2,) without it.
+
+    A program with a mistake has an error of its steps as well: some tolerances, or a share of the error that is proportional to
+    the step, such as damping after each step.
+    """
+    if case.step is None:
+        return case.passes(error)
+    return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, OWN_SHARE * plain)).all())
 
 
 def attempt(
@@ -148,8 +172,20 @@ def attempt(
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
     `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
-    iterations. `known` are other numbers of the sentence, which `build` has. None if the mistakes cannot be applied.
+    iterations. Mistakes that explain too little of the first rows are not tried on all. `known` are other numbers of the
+    sentence, which `build` has. None if the mistakes cannot be applied.
     """
+    if case.screen is not None:
+        found = _attempt(case.screen, trial, start, small, most, known)
+        if found is None or (not found.explains and found.rest > HALF):
+            return found
+        start = [found.values[each.name] for each in trial.numbers]
+    return _attempt(case, trial, start, small, most, known)
+
+
+def _attempt(
+    case: Compared, trial: Trial, start: Sequence[float] | None, small: float, most: int, known: Mapping[str, float]
+) -> Explanation | None:
     motion = trial.build(case)
     if motion is None:
         return None
@@ -159,7 +195,7 @@ def attempt(
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
 
-    _, p, made = replace(case, free=()).fit(scaled, p, np.full(len(p), small), most)
+    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
     error = case.errors(*made)
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
         _, p, made = case.fit(scaled, p, np.full(len(p), small), most)

@@ -10,12 +10,13 @@ import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 
-from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise
+from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
 from .solution import Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
+ROWS, STEP_EFFORT = 400, 0.15  # rows that candidates are compared with, and the work of one step from all of them
 STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows
 
 
@@ -47,6 +48,7 @@ class Slope:
 def march(case: Compared, method: Step, parts: int) -> Solution:
     """Return the motion by a method with so many steps between two rows, which are equally far apart."""
     equations = Equations(case.scene)
+    weight = weigh(case.scene)
     f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
@@ -55,7 +57,7 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
         with np.errstate(all="ignore"):
             for number in range(last + 1):
                 if number % CHUNK == 0:
-                    case.effort.spend(CHUNK_EFFORT)
+                    case.effort.spend(CHUNK_EFFORT * weight)
                     if case.effort.over:
                         kept += [y * np.nan] * (n - len(kept))
                         break
@@ -144,7 +146,7 @@ class Linearised:
         self.wanted = differ(self.R, self.w, *data, case.scale)
         size = np.linalg.norm(self.wanted, axis=1)
         self.used = int(np.argmax(size > LINEAR)) if (size > LINEAR).any() else len(size)
-        self.used = max(self.used, min(len(size), 8))
+        self.used = min(max(self.used, min(len(size), 8)), ROWS)
         have = [x is not None for x in case.data]
         self.weights = np.repeat(np.array(have) / case.noise, 3)
         self.f, self.equations = Slope(equations), equations
@@ -159,6 +161,7 @@ class Linearised:
         if (id(method), parts) in self.made:
             return self.made[id(method), parts]
         case, n = self.case, self.used
+        case.effort.spend(STEP_EFFORT * parts * weigh(case.scene))
         if method.recurrent:
             R, w = march(case.take(slice(0, n)), method, parts)(self.R[:1], self.w[:1], np.zeros((1, 0)), n)
             self.made[id(method), parts] = found = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
@@ -202,17 +205,15 @@ class Linearised:
         found, parts = dict[int, float](), self.case.stride
         sizes = [np.linalg.norm(self.beside_start(self.errors(method, n))) for n in (parts, 2 * parts)]
         order = float(np.clip(np.log2(sizes[0] / (sizes[1] or 1.0) or 1.0), 1, method.order))  # a torque can lower it
-        while parts not in found and len(found) < 8:
+        while parts not in found and len(found) < 8 and not (found and self.case.effort.over):
             found[parts], factor = self.share(method, parts)
             if factor <= 0:
                 break
-            parts = int(
-                np.clip(
-                    np.rint(parts * max(factor, 1e-12) ** (-1 / order)),
-                    1,
-                    max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used)),
-                )
-            )
+            most = max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used))
+            wanted = parts * max(factor, 1e-12) ** (-1 / order)
+            if wanted > 2 * most:
+                break  # its errors are too large with the shortest step
+            parts = int(np.clip(np.rint(wanted), 1, most))
         return min((left, n) for n, left in found.items())
 
     def others(self, method: Step, parts: int) -> list[int]:
@@ -246,6 +247,7 @@ class RowByRow(Linearised):
         if method.past or method.recurrent:
             return np.zeros((self.used - 1, 6))
         if (id(method), parts) not in self.made:
+            self.case.effort.spend(STEP_EFFORT * parts)
             y = self.equations.pack(0.0, self.R[:-1], self.w[:-1])
             with np.errstate(all="ignore"):
                 for _ in range(parts):

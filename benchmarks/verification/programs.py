@@ -24,17 +24,18 @@ from conservative.grid import Grid
 from conservative.method import Method
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.programs import UnusableProgram, program_class
 from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from . import protocol
-from .compare import SIGMAS, Compared
-from .explain import diagnose
-from .explanation import Explanation
-from .finding import Finding, Verdict, Verification
-from .motions import files
+from .compare import Compared, compare_answers
+from .explain import PROGRAM_KINDS, diagnose
+from .explanation import HALF, OWN_ERROR, Explanation
+from .finding import Finding, Verdict, Verification, uncapitalised
+from .motions.files import tolerance
 from .motions.motion import Motion, load
 from .motions.programs import ORDERS, PARTS
 
@@ -56,8 +57,14 @@ RESOLVED = {"f64": 1e-11, "f32": 1e-4}
 """Smallest errors, rad, that show an order, above round-off in each precision."""
 ROUNDS = 5
 """Largest number of motions that are searched for mistakes."""
-KINDS = ("readings", "times", "scenes", "equations", "habits", "attitudes")
-"""Kinds of mistakes that a program can have; those of files and of steps are others."""
+CANDIDATES = 6
+"""Largest number of mistakes that explain one motion and are applied to the others."""
+REFITS = 4
+"""Largest number of motions that make the numbers of a mistake more precise."""
+CLEAR = 2.0
+"""Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
+LEAST = 0.1
+"""Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
@@ -106,7 +113,7 @@ def in_principal_axes(motion: Motion) -> Motion:
     )
 
 
-def run_motion(solve: Solve, motion: Motion, allowed: Array, scale: float, parts: int = FINE) -> Ran:
+def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) -> Ran:
     """Return a motion run with so many steps in 0.1 rad. Raise `Unsupported`."""
     every = motion.steps * parts
     thin = max(n for n in range(1, every + 1) if every % n == 0 and n * motion.samples <= max(ROWS, motion.samples))
@@ -117,25 +124,16 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, scale: float, parts
         t, R, w, failure = found.t, found.R_WB, found.w_WB_B, found.failure
     except Unsupported:
         raise
-    except IntegrationFailed as error:
-        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), error
+    except IntegrationFailed as ended_early:
+        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), ended_early
     if len(t) < grid.n_samples:
         ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
     elif not (np.isfinite(R).all() and np.isfinite(w).all()):
         ended = "samples are not finite"
-    case = _case(scene, t, R, w, scale, allowed)
-    at = slice(thin, None, thin)  # the samples of the motion
+    case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
+    at = slice(thin - 1, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
     return Ran(motion, case, error, allowed, grid.dt, ended)
-
-
-def _case(scene: Scene, t: Array, R: Array, w: Array, scale: float, allowed: Array) -> Compared:
-    return Compared(scene, t, (R, w), 0.0, scale, allowed, allowed / SIGMAS, rounded=tuple(allowed.tolist()))
-
-
-def _limits(motion: Motion, order: int | None, single: bool) -> tuple[Array, float]:
-    """Return the tolerances (2,) of attitude, rad, and relative rates at the smallest step, and the largest rate, rad/s."""
-    return np.array(files.tolerance(motion, order, single)), float(files.read(motion.name)["scale"]["rates"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,12 +168,12 @@ def run_motions(
     for every in load():
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
-        allowed, scale = _limits(motion, order, single)
+        allowed = np.array(tolerance(motion, order, single))
         if reason := unsupported(motion.scene):
             reasons[motion.name] = reason
             continue
         try:
-            ran.append(run_motion(solve, motion, allowed, scale))
+            ran.append(run_motion(solve, motion, allowed))
         except Unsupported as error:
             reasons[motion.name] = str(error)
     return Answers(solve, ran, reasons, order, single)
@@ -184,7 +182,7 @@ def run_motions(
 def _falls(answers: Answers, ran: Ran) -> float:
     """Return the exponent with which the error falls from the step to half of it; 0 if it is below the declared order."""
     with suppress(Unsupported):
-        again = run_motion(answers.solve, ran.motion, ran.allowed, ran.case.scale, 2 * FINE)
+        again = run_motion(answers.solve, ran.motion, ran.allowed, 2 * FINE)
         slope = float(np.log2(ran.ratio / max(again.ratio, 1e-300)))
         return slope if math.isfinite(slope) and slope >= (answers.order or 2) - SLOPE else 0.0
     return 0.0
@@ -200,7 +198,7 @@ def measure_order(answers: Answers) -> float:
         each for each in answers.ran if not each.motion.needs and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
     ]
     for each in free[:GENERIC]:
-        errors = [float(run_motion(answers.solve, each.motion, each.allowed, each.case.scale, n).error[0]) for n in LADDER]
+        errors = [float(run_motion(answers.solve, each.motion, each.allowed, n).error[0]) for n in LADDER]
         good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < 0.3]
         if len(good) > 1:
             (a, first), (b, last) = good[-2:]
@@ -216,37 +214,57 @@ class Named:
     motions: tuple[str, ...]
 
 
-def explain_motions(failing: Sequence[Ran]) -> list[Named]:
+def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[Named]:
     """Return the mistakes that explain failing motions, first the one that explains most.
 
     A mistake is searched in one motion, with numbers that are fitted to it. It is then applied to all others with the same
-    numbers. Motions that it does not explain are searched next, up to `ROUNDS` of them.
+    numbers, which the motions that it nearly explains make more precise. Of several mistakes the one is named that explains
+    most, less the `right` motions that it would make wrong. Motions that it does not explain are searched next, up to `ROUNDS`
+    of them.
     """
     rest = {each.motion.name: each for each in sorted(failing, key=_rank) if not each.ended}
-    named, rounds = list[Named](), 0
+    named: dict[tuple[tuple[str, ...], ...], Named] = {}
     searched = list(rest.values())
-    while rest and searched and rounds < ROUNDS:
-        each, rounds = searched.pop(0), rounds + 1
-        if each.motion.name not in rest:
-            rounds -= 1
+    for _ in range(ROUNDS):
+        searched = [each for each in searched if each.motion.name in rest]
+        if not searched or (named and len(rest) < LEAST * len(failing)):
+            break
+        each = searched.pop(0)
+        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains][:CANDIDATES]
+        scored = [(one, *_explained(one, list(rest.values()), right)) for one in found]
+        if not scored:
             continue
-        found = [one for one in diagnose(each.case, quaternion=True, kinds=KINDS, step=each.step).named if one.explains]
-        explained = {i: _explained(one, rest.values(), each) for i, one in enumerate(found)}
-        if not explained:
-            continue
-        most = max(map(len, explained.values()))
-        best = [i for i, names in explained.items() if len(names) == most]
-        fewest = min(found[i].numbers for i in best)
-        best = [i for i in best if found[i].numbers == fewest and explained[i] == explained[best[0]]]
-        named.append(Named(tuple(found[i] for i in best), tuple(explained[best[0]])))
-        for name in explained[best[0]]:
+        best = max(scored, key=lambda one: (one[2], -one[0].numbers))
+        equal = [one for one in scored if (one[1], one[2], one[0].numbers) == (best[1], best[2], best[0].numbers)]
+        names, before = best[1], named.get(keys := tuple(one[0].keys for one in equal))
+        # Numbers of the first search stand: it had the motions that show them best.
+        explanations = before.explanations if before else tuple(one[0] for one in equal)
+        named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
+        for name in names:
             del rest[name]
-    return sorted(named, key=lambda each: -len(each.motions))
+    return sorted(named.values(), key=lambda each: -len(each.motions))
 
 
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
-    """Return the place in the search: free bodies with three moments first, then by the error."""
-    return bool(ran.motion.needs), not _is_generic(ran.motion), -ran.ratio
+    """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
+    return bool(ran.motion.needs), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+
+
+def _explained(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> tuple[list[str], int]:
+    """Return the failing motions that a mistake explains, and their number less the right ones that it would make wrong."""
+    names, best, refits = list[str](), one, 0
+    for each in sorted(failing, key=lambda each: each.ratio):
+        again = best.again(each.case)
+        if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
+            refined, refits = best.refit(each.case), refits + 1
+            best, again = (refined, refined) if refined is not None and refined.explains else (best, again)
+        if again is not None and again.explains:
+            names.append(each.motion.name)
+    refuted = sum(
+        (again := best.again(each.case)) is not None and bool((np.array(again.left) > OWN_ERROR * each.allowed).any())
+        for each in right
+    )
+    return names, len(names) - refuted
 
 
 def _is_generic(motion: Motion) -> bool:
@@ -255,20 +273,11 @@ def _is_generic(motion: Motion) -> bool:
     return bool((np.diff(moments) > 1e-3 * moments[-1]).all())
 
 
-def _explained(one: Explanation, rest: Any, source: Ran) -> list[str]:
-    names = []
-    for each in rest:
-        again = one if each is source else one.again(each.case)
-        if again is not None and again.explains:
-            names.append(each.motion.name)
-    return names
-
-
 def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], float]:
     """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
     near = {each.motion.name: slope for each in answers.failing if each.ratio <= NEAR and (slope := _falls(answers, each))}
     failing = [each for each in answers.failing if each.motion.name not in near]
-    named = explain_motions(failing)
+    named = explain_motions(failing, [each for each in answers.ran if each not in failing])
     explained = {name: each for each in named for name in each.motions}
     # What converges as it declares, and is no known mistake, has a large error constant.
     rest = [each for each in failing if each.motion.name not in explained and not each.ended]
@@ -308,8 +317,7 @@ def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> d
         return {}
     found = {}
     for each in failing:
-        allowed, _ = _limits(each.motion, lower, answers.single)
-        if (each.error <= allowed).all():
+        if (each.error <= tolerance(each.motion, lower, answers.single)).all():
             found[each.motion.name] = f"within the tolerance of order {lower}"
     return found
 
@@ -339,9 +347,9 @@ def repeatability(subject: str, method: Method, answers: Answers) -> Iterator[Fi
         done.add(free)
         run = method.prepare(each.motion.scene, Grid(each.step, 100, 10))
         first = run()
-        first = first.R_WB.copy(), first.w_WB_B.copy()
+        R, w = first.R_WB.copy(), first.w_WB_B.copy()
         again = run()
-        same = np.array_equal(first[0], again.R_WB) and np.array_equal(first[1], again.w_WB_B)
+        same = np.array_equal(R, again.R_WB) and np.array_equal(w, again.w_WB_B)
         detail = "" if same else "a second run has other samples: each run starts from the initial state"
         verdict = Verdict.RIGHT if same else Verdict.WRONG
         yield Finding(subject, "repeatability", each.motion.name, verdict, by="bits", detail=detail)
@@ -378,7 +386,7 @@ def verify_method(
     if "pairs" in checks:
         from .pairs import verify_pairs
 
-        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"))
+        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"), subject)
     return Verification(subject, kind, findings, summary(findings, named))
 
 
@@ -392,12 +400,12 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
         elif some and check in ("motions", "pairs", "repeatability"):
             right = sum(each.verdict is Verdict.RIGHT for each in some)
             words = {"repeatability": "repeated runs"}.get(check, check)
-            parts.append(f"{right} of {len(some)} {words}")
+            parts.append(f"{right} of {len(some)} {words}{'' if right == len(some) else ' are right'}")
         else:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
     failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
     reasons = [
-        f"{' or '.join(one.cause.sentence for one in each.explanations)} "
+        f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
         f"(explains {len(each.motions)} of {failing} failing motions)"
         for each in named
     ]
@@ -423,12 +431,16 @@ def verify_program(
     checks: Sequence[str],
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
+    method: EngineMethod | None = None,
 ) -> Verification:
-    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong."""
+    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
+
+    `method` is the program with one of its settings, by default with their defaults.
+    """
     findings = list[Finding]()
     try:
         with time_limit(PATIENCE):
-            method = program_class(program, PATIENCE)()
+            method = method or program_class(program, PATIENCE)()
             if "protocol" in checks:
                 findings += protocol.findings(subject, method)
             if any(each.verdict is Verdict.WRONG for each in findings):

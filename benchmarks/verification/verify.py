@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from shutil import which
 from typing import TYPE_CHECKING, Any
@@ -178,7 +179,7 @@ def verify(
         results += _verify_recordings(tables, body, start, error, tell, reading)
     for each in found:
         if each.kind is Kind.PROGRAM:
-            results.append(_verify_program(each.text, only, pairs, tell))
+            results += _verify_program(each.text, only, pairs, tell)
         elif each.kind in (Kind.ENGINE, Kind.METHOD):
             from ..studies.selection import methods as select  # here: recordings need no kernels
 
@@ -192,13 +193,28 @@ def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Seque
     return verify_method(method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell)
 
 
-def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
-    from conservative.references.environments.programs import find_program, read_program
+def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Iterator[Verification]:
+    """Yield the verification of a program with each of its settings; the protocol and the times are verified once."""
+    from conservative.references.environments.programs import UnusableProgram, find_program, read_program
 
+    from ..studies.selection import methods as select
     from .programs import verify_program
 
     checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
-    return verify_program(text, find_program(text) or read_program(text, "program"), checks, pairs, tell)
+    program = find_program(text.partition(":")[0])
+    if program is None:  # the command line of a program that is not registered
+        yield verify_program(text, read_program(text, "program"), checks, pairs, tell)
+        return
+    try:
+        first, *others = list[Any](select([text]))
+    except UnusableProgram:  # which is a finding
+        yield verify_program(text, program, checks, pairs, tell)
+        return
+    rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]
+    others = others if rest else []
+    yield verify_program(first.name if others else text, program, checks, pairs, tell, first)
+    for method in others:
+        yield _verify_method(method, Kind.PROGRAM, rest, pairs, tell)
 
 
 def _verify_recordings(
@@ -206,20 +222,21 @@ def _verify_recordings(
 ) -> Iterator[Verification]:
     """Yield the verification of each recording; of two recordings one, which also compares them."""
     from .recordings import table, verdict
+    from .recordings.layout import Options
 
     if body is None:
         raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
     scene = registry.scene(body) if isinstance(body, str) else body
-    recordings = [(path.name, table.read(path, table.Options(**reading))) for path in files]
+    from_row = start == "row"
+    recordings = [(path.name, table.read(path, Options(**reading))) for path in files]
     if len(recordings) == 2:
         from .recordings.two import verify_two
 
-        yield verify_two(scene, *recordings, from_row=start == "row", error=error, tell=lambda what: tell(0.0, what))
+        first, second = recordings
+        yield verify_two(scene, first, second, from_row, error, partial(tell, 0.0))
         return
     for name, recording in recordings:
-        yield verdict.verify_recording(
-            scene, recording, start == "row", error, lambda what, name=name: tell(0.0, f"{name}: {what}"), name
-        )
+        yield verdict.verify_recording(scene, recording, from_row, error, partial(tell, 0.0), name)
 
 
 USED_BY: dict[str, tuple[Kind, ...]] = {

@@ -1,4 +1,4 @@
-"""Versions of a project: the gate judges errors, drifts, orders and counts, as against a baseline; times are measured in turn.
+"""Versions of a project: the gate compares errors, drifts, orders and counts, as with a baseline; times are in turn.
 
 This process measures the errors of all versions against its own reference solution, and computes the drifts. A version only
 integrates, and reports the outcome of its runs.
@@ -141,7 +141,7 @@ class ProjectSide:
                 method.solve(point.scene, point.grid)
                 if monotonic() - spent > SLOW:
                     self.few.add(row.id)
-            return judge_values(row, *points.measure(point, row.id in self.few))
+            return decide_values(row, *points.measure(point, row.id in self.few))
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
@@ -230,7 +230,7 @@ def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = descrip
     return points.define(answer["invariants"], points.arrange(answer))
 
 
-def judge_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
+def decide_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
     nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
     if reason := "; ".join(filter(None, [find_runaway(values), *nonsense])):
@@ -287,14 +287,14 @@ def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]
     return [name for name in methods if name.partition(":")[0] not in families]
 
 
-def judge(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
+def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
     """Return the verdict on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
     both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
     before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
-    verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
+    verdict = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
     others = {(each.scene, each.method) for each in moved.values()}
     violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]

@@ -1,1 +1,1 @@
-"""How engines read a model: the body of a file, the body that an engine has after loading it, and the mistake between them."""
+"""Model files (URDF, SDF, MJCF, USD): the body of a file by two readers, and the loaders of engines."""

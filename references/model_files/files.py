@@ -31,15 +31,22 @@ class Unread(ValueError):
     """Something in a file that no reader takes. The message is a part of a sentence."""
 
 
+class RefusedFile(BadInput):
+    """A file that is refused because `what` is in it."""
+
+    def __init__(self, path: Path, what: str, allowed: str) -> None:
+        super().__init__("file", f"{str(path)!r} with {what}", allowed)
+        self.what = what
+
+
 def refuse(path: Path, what: str, allowed: str) -> BadInput:
     """Return the exception for a file with `what`."""
-    return BadInput("file", f"{str(path)!r} with {what}", allowed)
+    return RefusedFile(path, what, allowed)
 
 
 def reason(error: BadInput) -> str:
     """Return what is wrong with a file, without its path."""
-    text = str(error.got)
-    return text.partition(" with ")[2] or text
+    return error.what if isinstance(error, RefusedFile) else str(error.got)
 
 
 def kind_of(path: Path) -> str:
@@ -93,7 +100,7 @@ def read_bytes(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def find(path: Path, name: str, search: Sequence[Path]) -> Path:
+def find(path: Path, name: str, search: Sequence[Path], what: str = "file") -> Path:
     """Return the file that a model refers to by a relative path or URI, in the model's folder or a search path.
 
     Raise `Unread` with the reason if it is not there, or elsewhere after links are followed.
@@ -104,10 +111,10 @@ def find(path: Path, name: str, search: Sequence[Path]) -> Path:
     tails = [plain] if scheme in ("", "file://") else [plain, plain.partition("/")[2]]
     found = [place for folder in folders for tail in tails if tail and (place := folder / tail).is_file()]
     if not found:
-        raise Unread(f"the file {name!r}, which is not there")
+        raise Unread(f"the {what} {name!r}, which is not there")
     inside = [each for each in found if any(each.resolve().is_relative_to(folder.resolve()) for folder in folders)]
     if not inside:
-        raise Unread(f"the file {name!r}, which is outside the folder of the model and the search paths")
+        raise Unread(f"the {what} {name!r}, which is outside the folder of the model and the search paths")
     return inside[0]
 
 
@@ -115,10 +122,10 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
     """Return vertices (n, 3) and triangles (m, 3) of the mesh of a model. Raise `BadInput` and `MissingExtra`."""
     allowed = f"meshes of the type {', '.join(MESHES)} in the folder of the file or in one of --search"
     try:
-        place = find(path, name, search)
+        place = find(path, name, search, "mesh")
         data, kind = read_bytes(place), place.suffix.lower().removeprefix(".")
     except (OSError, ValueError) as error:
-        raise refuse(path, f"{error}".replace("the file", "the mesh", 1), allowed) from None
+        raise refuse(path, str(error), allowed) from None
     if kind not in MESHES:
         raise refuse(path, f"the mesh {name!r}", allowed)
     require_extra("a mesh", "models", "trimesh")

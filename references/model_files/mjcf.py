@@ -93,8 +93,6 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
         place, sizes = _pose(geom, options), geom.size
         if kind in ("plane", "hfield") or geom.mass == 0:
             return []
-        if int(geom.typeinertia):
-            raise NotRead("shellinertia='true' of <geom>")
         if geom.meshname:
             shape: Any = _mesh(mujoco, spec, geom, kind, path, search)
         elif kind in _HALF:
@@ -107,7 +105,7 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
             shape = shape[0] if kind == "sphere" else shape
         else:
             raise NotRead(f"a geometry of type {kind!r}")
-        (part,) = weigh(kind, shape, place, float(geom.density))
+        (part,) = (_shell if int(geom.typeinertia) else weigh)(kind, shape, place, float(geom.density))
         return [part] if np.isnan(geom.mass) else [part.scale(geom.mass / part.mass)]
 
     def read(body: Any, pose: Array) -> list[Link]:
@@ -136,6 +134,19 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
         factor = options.settotalmass / join_links(links).mass
         return [replace(k, mass=factor * k.mass, inertia=factor * k.inertia, geometry=k.geometry.scale(factor)) for k in links]
     return links
+
+
+def _shell(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
+    """Return the surface of a box or a sphere as `weigh`, with a density in kg/m^2. MuJoCo approximates other shells."""
+    if kind not in ("box", "sphere"):
+        raise NotRead(f"shellinertia='true' of a geometry of type {kind!r}")
+    sides = np.broadcast_to(sizes, 3)
+    if kind == "sphere":
+        mass, second = density * 4 * math.pi * sides[0] ** 2, sides**2 / 3
+    else:
+        areas = 2 * np.prod(sides) / sides  # of both faces normal to each axis
+        mass, second = density * areas.sum(), (areas.sum() / 12 + areas / 6) / areas.sum() * sides**2
+    return [Piece(mass, np.zeros(3), mass * (second.sum() * np.eye(3) - np.diag(second))).place(pose)]
 
 
 def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequence[Path]) -> list[Array]:

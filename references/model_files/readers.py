@@ -1,6 +1,6 @@
 """The readers of a model file: the reference reader of its format, and this package's. Both run in a worker with limits.
 
-The references are urdfdom (in Pinocchio), MuJoCo, usd-core and libsdformat (in Drake, see `compare`). Where the two readers
+The references are urdfdom (in Pinocchio), MuJoCo, usd-core and libsdformat (in Drake, see `verify_files`). Where both readers
 disagree about a body, no engine can be called wrong.
 """
 

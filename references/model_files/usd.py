@@ -78,12 +78,12 @@ class Stage:
         return make_pose(self.metre * world[:3, 3], R), R.T @ world[:3, :3]
 
     def colliders(self, body: Any) -> list[Any]:
-        """Return the enabled colliders of a body, without those of bodies below it."""
+        """Return the enabled colliders of a body, without those of enabled bodies below it."""
         from pxr import Usd
 
         found, prims, api = [], iter(Usd.PrimRange(body, Usd.TraverseInstanceProxies())), self.physics.CollisionAPI
         for prim in prims:
-            if prim != body and prim.HasAPI(self.physics.RigidBodyAPI):
+            if prim != body and prim in self.bodies:
                 prims.PruneChildren()
             elif prim.HasAPI(api) and api(prim).GetCollisionEnabledAttr().Get() is not False:
                 found.append(prim)
@@ -121,13 +121,17 @@ class Stage:
         return (axes * np.array(moments, float)) @ axes.T * self.kilogram * self.metre**2
 
     def authored(self, prim: Any) -> tuple[float | None, float | None, Array | None, Array | None]:
-        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for what it does not have."""
+        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for what it does not have.
+
+        A density that is not positive is not one, by OpenUSD. Nor is such a mass, if the body has colliders.
+        """
         names = ("mass", "density", "centerOfMass", "diagonalInertia", "principalAxes")
         attributes = [prim.GetAttribute(f"physics:{name}") for name in names]
         mass, density, com, moments, q = (each.Get() if each and each.HasAuthoredValue() else None for each in attributes)
         com = None if com is None or not np.isfinite(com).all() else self.metre * np.array(com, float)
         inertia = self.tensor(moments, q) if moments and any(moments) else None
-        return mass and mass * self.kilogram, density and density * self.kilogram / self.metre**3, com, inertia
+        density = density * self.kilogram / self.metre**3 if density and density > 0 else None
+        return mass and mass * self.kilogram, density, com, inertia
 
     def density_of_material(self, prim: Any) -> float | None:
         """Return the density of the material that is bound to a prim, kg/m^3, or None."""
@@ -216,11 +220,12 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
         convex = points is not None and stage.form(prim, np.eye(4), 1.0).mass > ConvexHull(np.array(points)).volume * (1 - 1e-6)
         if wanted not in (None, "none") and not convex and not (own and its_inertia is not None):
             reading.doubts.append(f"{prim.GetPath()} asks for the approximation {wanted!r}, whose volume differs")
-        part = part.scale(own / part.mass) if own else part
+        part = part.scale(own / part.mass) if own and own > 0 else part
         centre = part.com if its_com is None else its_scale @ its_com
         tensor = part.inertia if its_inertia is None else its_inertia
         forms.append(Piece(part.mass, centre, tensor).place(np.linalg.inv(pose) @ place))
     whole = join(forms)
+    mass = None if whole.mass and mass and mass < 0 else mass
     whole = whole.scale(mass / whole.mass) if mass and whole.mass else whole
     link = Link(pose, geometry=whole, name=str(body.GetPath())).filled(whole)
     frame = link.frame if com is None else make_pose(scale @ com)

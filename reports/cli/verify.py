@@ -89,8 +89,8 @@ LISTS = ("only", "pairs", "engines")
     show_default=True,
     help="Recordings: the motion starts in the first row, or at the scene's t = 0.",
 )
-@click.option("--from", "first", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
-@click.option("--until", "last", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
+@click.option("--from", "start_time", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
+@click.option("--until", "end_time", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
 @error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: by digits and noise]")
 @names_option("only", "Checks to run: motions, order, repeatability, pairs, protocol, times.  [default: all]", "CHECKS")
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
@@ -108,6 +108,7 @@ LISTS = ("only", "pairs", "engines")
 @click.pass_context
 def verify(
     ctx: click.Context,
+    /,
     subjects: tuple[str, ...],
     as_json: bool,
     junit: Path | None,

@@ -33,6 +33,7 @@ def verify_methods(methods: Sequence[Method], step: Step, checks: Sequence[str] 
         def tell(share: float, what: str, i: int = i) -> None:
             step((i + share) / len(methods), what)
 
+        findings: tuple[Finding, ...]
         if isinstance(method, Missing):
             findings = (Finding(method.name, checks[0], "", Verdict.NOT_TESTED, detail=str(method.error)),)
         else:

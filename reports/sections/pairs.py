@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from conservative.benchmarks.verification.finding import Finding, Verdict
 from conservative.benchmarks.verification.pairs.verify import PairFinding, Relation
 
 from ..document.cells import DASH, number
-from ..document.model import Block, Cell, Grade, Item, Items, Paragraph, Table, filled
+from ..document.model import Block, Cell, Grade, Item, Items, Paragraph, Row, Table, filled
 
 TERMS = (
     "A pair is two descriptions of one motion of a body. Both motions have to be equal: bit for bit where the arithmetic is "
@@ -20,6 +19,7 @@ TERMS = (
     "the difference goes away with the step: the engine has two schemes for one body."
 )
 """Explanation of the tables."""
+SCRIPTS = "With `--scripts FOLDER`, the command writes the pairs that differ as scripts in the engine's own language."
 NOT_RUN = (Relation.NOT_AVAILABLE, Relation.UNSUPPORTED, Relation.NOT_RUN)
 """Relations that tables show as a dash."""
 GRADES = {Verdict.RIGHT: Grade.GOOD, Verdict.WRONG: Grade.BAD, Verdict.UNDECIDED: Grade.FAIR, Verdict.NOT_TESTED: Grade.NONE}
@@ -33,13 +33,12 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
     other = {f"{each.subject}: {each.case}": each.detail for each in some if each.relation not in (*NOT_RUN, *PLAIN)}
-    scripts = [Item(each.script, each.script_file) for each in some if each.script]
     return filled(
         Items([Item(group[0].detail, _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
         *(_table(engine, [each for each in some if each.subject == engine]) for engine in engines),
         Items([Item(text, what) for what, text in other.items()]),
-        Items(scripts),
+        Paragraph(SCRIPTS) if any(each.script for each in some) else None,
         Paragraph(TERMS) if some else None,
     )
 
@@ -69,11 +68,12 @@ def command(finding: PairFinding) -> str:
 def _table(engine: str, findings: Sequence[PairFinding]) -> Table:
     bodies = list(dict.fromkeys(each.body for each in findings))
     cells = {(each.pair, each.body): _cell(each) for each in findings}
-    rows = [
-        [pair, *(cells.get((pair, body), Cell("")) for body in bodies)]
-        for pair in dict.fromkeys(each.pair for each in findings)
-    ]
-    return Table(["pair", *bodies], [row for row in rows if any(str(cell) not in ("", DASH) for cell in row[1:])], engine)
+    rows = list[Row]()
+    for pair in dict.fromkeys(each.pair for each in findings):
+        row = [cells.get((pair, body), Cell("")) for body in bodies]
+        if any(str(cell) not in ("", DASH) for cell in row):
+            rows.append([pair, *row])
+    return Table(["pair", *bodies], rows, engine)
 
 
 def _cell(finding: PairFinding) -> Cell:
@@ -91,20 +91,3 @@ def _reduced(finding: PairFinding) -> list[str]:
     scale = number(finding.scale) if finding.scale else DASH
     steps = f"{one.n_steps} x {number(one.dt)}"
     return [finding.subject, finding.pair, moments, number(one.mass), field, rates, steps, scale, command(finding)]
-
-
-def changes(versions: Sequence[tuple[str, Sequence[tuple[str, Iterable[Finding]]]]]) -> list[str]:
-    """Return a sentence for each pair that began or ceased to differ from one version of an engine to the next.
-
-    `versions` are names with, for each setting in the same order, its text and the findings on it.
-    """
-    texts = []
-    for (before, old), (after, new) in pairwise(versions):
-        for (_, were), (setting, are) in zip(old, new, strict=True):
-            verdicts = {each.case: each.verdict for each in were if isinstance(each, PairFinding)}
-            for now in are:
-                was = verdicts.get(now.case)
-                if isinstance(now, PairFinding) and was and (was is Verdict.WRONG) != (now.verdict is Verdict.WRONG):
-                    what = now.detail if now.verdict is Verdict.WRONG else now.relation.value
-                    texts.append(f"{setting or 'default'}: {now.case}, {before} → {after}: {what}")
-    return texts

@@ -9,22 +9,23 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification, join_verdicts
+from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification
 
 from ..document.cells import DASH, bound, listed
-from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Section, Table, filled
+from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
 from .bodies import body_blocks
-from .pairs import pair_blocks
 from .recording import recording_blocks, two_blocks
 
 Key = TypeVar("Key")
 SIGNS = {
+    Verdict.RIGHT: ("✓", Grade.GOOD),
     Verdict.WRONG: ("✗", Grade.BAD),
     Verdict.UNDECIDED: ("?", Grade.FAIR),
-    Verdict.RIGHT: ("✓", Grade.GOOD),
     Verdict.NOT_TESTED: (DASH, Grade.NONE),
 }
-"""Symbol and grade of each verdict; what decides comes first."""
+"""Symbol and grade of each verdict."""
+DECIDING = (Verdict.WRONG, Verdict.UNDECIDED, Verdict.NOT_TESTED, Verdict.RIGHT)
+"""Verdicts in the order in which they decide the verdict on several subjects: only right ones together are right."""
 LISTED = 4
 """Cases that an item of a list names."""
 TERMS = (
@@ -45,10 +46,13 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
     Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
     """
-    order = sorted(verifications, key=lambda each: list(SIGNS).index(each.verdict))
+    order = sorted(verifications, key=lambda each: DECIDING.index(each.verdict))
     models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
     listed_alone = [*others, *(models if len(models) == 1 else ())]
-    sentences = [Item(f"{each.sentence}.", marked=each.verdict is Verdict.WRONG) for each in listed_alone]
+    sentences = [
+        Item(f"{each.sentence}.", each.subject * (each.kind == "recordings"), each.verdict is Verdict.WRONG)
+        for each in listed_alone
+    ]
     lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
@@ -62,7 +66,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         brief=blocks(summary, [each for each in others if len(order) == 1 or each.verdict is not Verdict.RIGHT]),
         data={
             "verified": [each.subject for each in verifications],
-            "verdict": join_verdicts(each.verdict for each in verifications),
+            "verdict": order[0].verdict,
             "made": dict(made or {}),
             "subjects": [content(each) for each in verifications],
         },
@@ -72,9 +76,8 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:
-    """Return the exit code of a command: that of a wrong subject before that of an undecided one, and of a right one."""
-    codes = {each.exit_code for each in verifications}
-    return next(EXIT_CODES[verdict] for verdict in SIGNS if EXIT_CODES[verdict] in codes)
+    """Return the exit code of a command: of a wrong subject if there is one, otherwise of an undecided or untested one."""
+    return EXIT_CODES[min((each.verdict for each in verifications), key=DECIDING.index)]
 
 
 def content(verification: Verification) -> dict[str, Any]:
@@ -107,8 +110,8 @@ def summary(verification: Verification) -> list[Block]:
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
-    differ = pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
-    return filled(mistakes(others), _open(others), _counts(verification), *differ, Items.of(verification.notes))
+    differ = _pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
+    return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
 
 
 def details(verification: Verification) -> list[Block]:
@@ -117,8 +120,16 @@ def details(verification: Verification) -> list[Block]:
         return summary(verification)
     pairs, others = _pairs(verification)
     tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
-    right = pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
+    right = _pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
     return filled(*summary(verification), *tables, *right)
+
+
+def _pair_blocks(findings: Sequence[Finding]) -> list[Block]:
+    if not findings:
+        return []
+    from .pairs import pair_blocks  # here: it needs kernels, which recordings do without
+
+    return pair_blocks(findings)
 
 
 def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
@@ -159,12 +170,10 @@ def _sentence(verifications: Sequence[Verification]) -> str:
     if len(verifications) == 1:
         return f"{verifications[0].sentence}."
     counts = Counter(each.verdict for each in verifications)
+    if len(counts) == 1:
+        return f"All {len(verifications)} subjects are {verifications[0].verdict}."
     words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
-    return (
-        f"All {len(verifications)} {words[0].partition(' ')[2]}."
-        if len(counts) == 1
-        else f"Of {len(verifications)} subjects, {listed(words)}."
-    )
+    return f"Of {len(verifications)} subjects, {listed(words)}."
 
 
 def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
@@ -186,9 +195,11 @@ def _cases_of(findings: Sequence[Finding]) -> str:
     return ", ".join(names[:LISTED]) + more
 
 
-def _open(findings: Iterable[Finding]) -> Items:
-    undecided = [each for each in findings if each.verdict is Verdict.UNDECIDED]
-    groups = grouped(undecided, lambda each: (each.check, explanation(each)))
+def _remarks(findings: Sequence[Finding]) -> Items:
+    """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
+    told = (each for each in findings if each.verdict is Verdict.RIGHT and each.detail and each.check != "order")
+    undecided = (each for each in findings if each.verdict is Verdict.UNDECIDED)
+    groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
     return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
 
 
@@ -204,7 +215,7 @@ def _counts(verification: Verification) -> Table | None:
 
 
 def _cases(check: str, findings: Sequence[Finding]) -> Table:
-    body = [
+    body: list[Row] = [
         [
             each.case or each.subject,
             _verdict(each.verdict),

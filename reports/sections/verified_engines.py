@@ -22,7 +22,7 @@ def section(verified: Sequence[Verified]) -> Section:
         name = display_name(each.names["family"], each.names["version"], each.names["setting"])
         for check, findings in grouped(each.findings, lambda finding: finding.check):
             body.append([name, check, *numbers(findings), _mistakes(findings)])
-    table = Table(["engine", "check", *SIGNS, "mistakes, with the cases that each explains"], body, "Verification")
+    table = Table(["engine", "check", *SIGNS, "mistakes, with the cases that each explains"], body, "Cases of each check")
     return Section("Verification", [Paragraph(TERMS), table], "verification")
 
 

@@ -1,11 +1,11 @@
-"""Recordings with a planted mistake, or none, for `conservative judge`: a scene, a simulator, a layout, noise and a length.
+"""Recordings with a planted mistake, or none, for `conservative verify`: a scene, a simulator, a layout, noise and a length.
 
-Nothing here comes from the judge or an integrator of the package: right-hand side, steps and layouts are its own. A state is
-(q, w): a quaternion, scalar first, body to world, and rates, rad/s, body axes.
+Nothing here comes from the package: right-hand side, steps and layouts are its own. A state
+is (q, w): a quaternion, scalar first, body to world, and rates, rad/s, body axes.
 
     q' = q (0, w) / 2        J w' = (J w + h) x w + T - h'
 
-The generator decides before the judge runs. `grain` is the root mean square of noise, digits or single precision in a row, at
+The generator decides before the verification. `grain` is the root mean square of noise, digits or single precision in a row, at
 least 1e-9. A file is wrong if it differs from the exact motion by more than 3 grains (root mean square over the rows,
 against the initial state that fits best unless the first row is exact). A planted mistake that differs by less proves nothing.
 A mistake is identifiable if it differs by more than 10, also from its rivals: other mistakes of its kind with as few fitted
@@ -492,7 +492,7 @@ def draw_case(draw: Draw) -> tuple[Case, float]:
 
 @dataclass(eq=False)
 class Planted:
-    """A file and what it is, decided before it is judged.
+    """A file and what it is, decided before it is verified.
 
     `expected` is "right" or "wrong", or "" if the file is wrong by less than noise allows. `same` are mistakes with its rows.
     """

@@ -1,7 +1,7 @@
-"""`conservative judge` against files with a planted mistake, or none, whose answers are decided before it runs.
+"""`conservative verify` of files with a planted mistake, or none, whose answers are decided before it runs.
 
 No right file is called wrong, no wrong file right, and no diagnosis that is called proven is false. Of the mistakes that are
-identifiable 99 of 100 are named. `pytest` judges 60 files, `pytest --attack` 1,000, and writes the tables of the page
+identifiable 99 of 100 are named. `pytest` verifies 60 files, `pytest --attack` 1,000, and writes the tables of the page
 `reports/documentation/planted_files.md`. An interrupted attack goes on where it was, unless the code has changed. By hand:
 
     python -m tests.attack.test_recordings results.jsonl 0 1000
@@ -34,7 +34,7 @@ KINDS = {
     "another reading of attitudes or rates": [*READINGS],
     "times": [*TIMES],
     "damping, body, axes, or rows that are off": [*FITTED],
-    "two mistakes, which the judge does not know": [PAIR],
+    "two mistakes, which the search does not know": [PAIR],
 }
 QUICK = (
     1, 2, 3, 6, 7, 8, 10, 11, 12, 13, 14, 15, 17, 19, 20, 22, 30, 32, 34, 36, 38, 39, 40, 42,
@@ -46,7 +46,7 @@ FALSE = ("right called wrong", "wrong called right", "false proof")
 
 
 def outcome(seed, folder):
-    """Return the planted mistake, the answer of the judge, and the complaint about it, for the file of a seed."""
+    """Return the planted mistake, the verdict, and the complaint about it, for the file of a seed."""
     began = time.process_time()
     made = plant(seed)
     path = Path(folder) / "run.csv"
@@ -81,7 +81,7 @@ def complaint(row):
 
 
 def run(path, start, end):
-    """Return the rows of files with seeds from start to end: those in `path`, and others, which are judged and appended."""
+    """Return the rows of files with seeds from start to end: those in `path`, and others, which are verified and appended."""
     path = Path(path)
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     done = {row["seed"] for row in rows}
@@ -123,7 +123,7 @@ def tables(rows):
     seconds = sorted(row["seconds"][1] for row in rows)
     lines += [
         "",
-        f"A judgement took {seconds[len(seconds) // 2]:.1f} s of processor time in the median, {seconds[-1]:.0f} s at most.",
+        f"A verification took {seconds[len(seconds) // 2]:.1f} s of processor time in the median, {seconds[-1]:.0f} s at most.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -90,10 +90,10 @@ def test_it_names_the_version_since_which_an_error_is_the_same(pages):
 
 
 def test_it_has_the_findings_on_the_engine(pages):
-    rows = tables(pages["engine_a"])["Verification"]
+    rows = tables(pages["engine_a"])["Cases of each check"]
     named = "no gyroscopic term (1)"
-    assert rows == [["a 2 Euler", "motions", "1", "0", "1", "0", named], ["a 2 RK4", "motions", "1", "0", "2", "1", named]]
-    assert "Verification" not in tables(pages["engine_b"])
+    assert rows == [["a 2 Euler", "motions", "1", "1", "0", "0", named], ["a 2 RK4", "motions", "2", "1", "0", "1", named]]
+    assert "Cases of each check" not in tables(pages["engine_b"])
 
 
 def test_commands_repeat_it(pages):

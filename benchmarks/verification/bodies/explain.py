@@ -10,7 +10,7 @@ import numpy as np
 from conservative.references.model_files.pieces import Link, Piece, distance, join_links
 
 from ..finding import Cause
-from ..mistakes.bodies import BODIES, FITTED, BodyMistake
+from ..mistakes.bodies import FITTED, LOADED, BodyMistake
 
 EQUAL = 10.0
 """Explanations that leave up to so many times the error of the best one explain a body equally well."""
@@ -28,7 +28,7 @@ def find_causes(links: list[Link], seen: Piece, tolerance: float) -> tuple[Cause
     for count in (1, 2):
         found = [
             cause
-            for mistakes in combinations(BODIES, count)
+            for mistakes in combinations(LOADED, count)
             if (cause := _try(links, mistakes, seen, tolerance)) and cause.left < tolerance
         ]
         if found:
@@ -36,7 +36,7 @@ def find_causes(links: list[Link], seen: Piece, tolerance: float) -> tuple[Cause
             return tuple(each for each in found if each.left <= allowed)
     for mistake in FITTED:
         numbers, part = mistake.fit(wanted, seen)
-        cause = _compare((mistake.key,), mistake.state(numbers), wanted, part, seen)
+        cause = _compare((mistake.key,), mistake.sentence.format(**numbers), wanted, part, seen)
         if cause.left < tolerance:
             return (replace(cause, numbers=numbers),)
     return ()

@@ -100,7 +100,7 @@ class LoadedBody:
 def verify_files(
     files: Sequence[Path] = (),
     engines: Sequence[str] = (),
-    tell: Callable[[float, str], None] = lambda share, what: None,
+    tell: Callable[[float, str], object] = lambda share, what: None,
     search: Sequence[Path] = (),
 ) -> list[Verification]:
     """Return a verification for each model file (URDF, SDF, MJCF or USD), with a finding for each engine and body.
@@ -152,7 +152,7 @@ def verify_files(
 def _join(file: str, models: list[Model], found: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
     """Return the verification of a file from those of its bodies."""
     pairs = [pair for model in models for pair in found[model.label]]
-    notes = [note if len(models) == 1 else f"{model.label}: {note}" for model in models for note in model.notes]
+    notes = [note if len(models) == 1 else f"{model.body.name}: {note}" for model in models for note in model.notes]
     findings = [finding for finding, _ in pairs]
     tested = [each for each in findings if each.verdict is not Verdict.NOT_TESTED]
     right = sum(each.verdict is Verdict.RIGHT for each in tested)
@@ -184,13 +184,13 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     differs = [name for name, each in far.items() if not each < tolerance]
     error = max(0.0, *far.values())
     doubt = model.doubt(engine, differs) or (DIGITS if wanted.excess and prints and not flaw else "")
-    has = f"it has {describe(body)}" if body else f"{seen.value}"
+    has = seen.value if isinstance(seen, NoBody) else f"it has {describe(seen)}"
     changes = f"in file and engine: {', '.join(differing(wanted, body, tolerance))}" if body else ""
     printed = f" (it prints: {prints})" if prints else ""
     if not differs and not (flaw or model.disagree or model.invalid):
         return Opinion(Verdict.RIGHT, error=error)
-    if body and (asked := model.asked_for(engine, body, tolerance)):
-        return Opinion(Verdict.RIGHT, f"as the file asks: {asked}")
+    if body and (options := model.asked_for(engine, body, tolerance)):
+        return Opinion(Verdict.RIGHT, f"as the file asks: {options}")
     if doubt and not (flaw and not differs):
         return Opinion(Verdict.UNDECIDED, f"{doubt}; {has}{printed}")
     if flaw:
@@ -266,20 +266,18 @@ class Program:
             if isinstance(loaded.seen, Piece)
             else None
         )
-        measured = {
-            "error": opinion.error,
-            "allowed": self.tolerance,
-            "by": "single precision" if self.single else "double precision",
-        }
+        compared = math.isfinite(opinion.error)
         finding = Finding(
             self.label,
             "bodies",
             model.label,
             opinion.verdict,
-            unit="relative",
-            causes=opinion.causes,
-            detail=opinion.detail,
-            **(measured if np.isfinite(opinion.error) else {}),
+            opinion.error,
+            self.tolerance if compared else math.nan,
+            "relative",
+            ("single precision" if self.single else "double precision") if compared else "",
+            opinion.causes,
+            opinion.detail,
         )
         return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen)
 

@@ -20,6 +20,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from .attitudes import RULES
+from .bodies import FITTED, LOADED
 from .equations import EQUATIONS
 from .habits import HABITS, OTHER_ROWS, ROWS, STANDSTILLS
 from .mistake import Mistake
@@ -41,6 +42,7 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 
 BY_KEY = table_of([
     *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES,
-    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS,
+    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *FITTED,
+    *(each for each in LOADED if each.key not in {other.key for other in SCENES}),
 ])  # fmt: skip
-"""All mistakes by key."""
+"""All mistakes by key. Dropped products of inertia are one mistake with two effects, on a scene and on the links of a file."""

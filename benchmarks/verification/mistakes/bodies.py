@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,32 +16,29 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array
 from conservative.references.model_files.pieces import Link, Piece, join_links, make_pose, steiner
 
+from .mistake import Mistake, Number
+from .scenes import SCENES
+
 Links = list[Link]
 
 
 @dataclass(frozen=True)
-class BodyMistake:
-    """A mistake of a loader: its key, its sentence, and the change from the links of a file to those that the loader makes."""
+class BodyMistake(Mistake):
+    """A mistake of a loader: the change from the links of a file to those that the loader makes."""
 
-    key: str
-    sentence: str
+    kind: ClassVar[str] = "bodies"
     change: Callable[[Links], Links]
 
 
 @dataclass(frozen=True)
-class FittedBodyMistake:
-    """A mistake with numbers: its key, its sentence as a format of them, and the fit.
+class FittedBodyMistake(Mistake):
+    """A mistake of a loader with numbers.
 
     `fit` returns the numbers that turn the body of a file into the one that an engine has, in SI units, and the body with them.
     """
 
-    key: str
-    sentence: str
+    kind: ClassVar[str] = "bodies"
     fit: Callable[[Piece, Piece], tuple[Mapping[str, float], Piece]]
-
-    def state(self, numbers: Mapping[str, float]) -> str:
-        """Return the sentence with its numbers."""
-        return self.sentence.format(**{name.replace(" ", "_"): f"{value:.6g}" for name, value in numbers.items()})
 
 
 def _all(change: Callable[[Link], dict[str, Any]]) -> Callable[[Links], Links]:
@@ -101,7 +98,12 @@ def _other_angles(factor: float) -> Callable[[Links], Links]:
     return _all(lambda k: {"frame": turn(k.frame), "pose": turn(k.pose)})
 
 
-BODIES: tuple[BodyMistake, ...] = (
+def _of_scenes(key: str, change: Callable[[Links], Links]) -> BodyMistake:
+    """Return a mistake that scenes have as well, with its effect on links."""
+    return BodyMistake(key, next(each.sentence for each in SCENES if each.key == key), change)
+
+
+LOADED: tuple[BodyMistake, ...] = (
     BodyMistake(
         "inertial frame not turned",
         "The rotation of the inertial frame is ignored",
@@ -117,16 +119,8 @@ BODIES: tuple[BodyMistake, ...] = (
         "The rotation of the inertial frame is inverted",
         _all(lambda k: {"frame": make_pose(k.frame[:3, 3], k.frame[:3, :3].T)}),
     ),
-    BodyMistake(
-        "no products of inertia",
-        "The products of inertia are dropped",
-        _all(lambda k: {"inertia": np.diag(np.diag(k.inertia))}),
-    ),
-    BodyMistake(
-        "sign of the products of inertia",
-        "The products of inertia have the other sign",
-        _all(lambda k: {"inertia": 2 * np.diag(np.diag(k.inertia)) - k.inertia}),
-    ),
+    _of_scenes("no products of inertia", _all(lambda k: {"inertia": np.diag(np.diag(k.inertia))})),
+    _of_scenes("sign of the products of inertia", _all(lambda k: {"inertia": 2 * np.diag(np.diag(k.inertia)) - k.inertia})),
     BodyMistake("principal axes transposed", "The principal axes are transposed", _all(_transposed)),
     *(
         BodyMistake(
@@ -217,7 +211,7 @@ def _fit_factors(wanted: Piece, seen: Piece) -> tuple[Mapping[str, float], Piece
     square = wanted.com @ wanted.com
     centre = float(seen.com @ wanted.com / square) if square else 1.0
     mass, inertia = seen.mass / wanted.mass, float(np.trace(seen.inertia) / np.trace(wanted.inertia))
-    numbers = {"mass factor": mass, "centre factor": centre, "inertia factor": inertia}
+    numbers = {"mass": mass, "centre": centre, "inertia": inertia}
     return numbers, replace(wanted, mass=seen.mass, com=centre * wanted.com, inertia=inertia * wanted.inertia)
 
 
@@ -226,7 +220,7 @@ def _fit_raised(wanted: Piece, seen: Piece) -> tuple[Mapping[str, float], Piece]
     moments, axes = np.linalg.eigh(wanted.inertia)
     floor = float(np.diag(axes.T @ seen.inertia @ axes).min())
     raised = np.maximum(moments, floor)
-    return {"smallest moment": floor}, replace(wanted, inertia=(axes * raised) @ axes.T)
+    return {"moment": floor}, replace(wanted, inertia=(axes * raised) @ axes.T)
 
 
 def _fit_equal(wanted: Piece, seen: Piece) -> tuple[Mapping[str, float], Piece]:
@@ -235,13 +229,17 @@ def _fit_equal(wanted: Piece, seen: Piece) -> tuple[Mapping[str, float], Piece]:
     return {"moment": moment}, replace(wanted, inertia=moment * np.eye(3))
 
 
+_MOMENT = (Number("moment", 0.0, "kg m^2"),)
 FITTED: tuple[FittedBodyMistake, ...] = (
-    FittedBodyMistake("moments raised", "Small principal moments are raised to {smallest_moment} kg m^2", _fit_raised),
-    FittedBodyMistake("equal moments", "The moment about all axes is {moment} kg m^2", _fit_equal),
+    FittedBodyMistake(
+        "moments raised", "Small principal moments are raised to {moment:.6g} kg m^2", _fit_raised, numbers=_MOMENT
+    ),
+    FittedBodyMistake("equal moments", "The moment about all axes is {moment:.6g} kg m^2", _fit_equal, numbers=_MOMENT),
     FittedBodyMistake(
         "factors",
-        "The mass is multiplied by {mass_factor}, the centre of mass by {centre_factor}, the inertia by {inertia_factor}",
+        "The mass is multiplied by {mass:.6g}, the centre of mass by {centre:.6g}, the inertia by {inertia:.6g}",
         _fit_factors,
+        numbers=(Number("mass", 1.0), Number("centre", 1.0), Number("inertia", 1.0)),
     ),
 )
 """Mistakes whose numbers follow from the body that an engine has, those with fewer numbers first."""

@@ -54,11 +54,14 @@ class RowHabit(Mistake):
     periodic
         True if each n-th row is off; False if the rows are off in which the quaternion, with a scalar that is not negative,
         changes its sign.
+    any
+        True if the rows that are off may have any values.
     """
 
     kind: ClassVar[str] = "rows"
     change: Callable[[States, States, Array], States]
     periodic: bool = True
+    any: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,8 +134,8 @@ def _conjugated(right: States, data: States, off: Array) -> States:
 
 
 def _one_component(right: States, data: States, off: Array) -> States:
-    R, w = right
-    return R, None if w is None else _every((None, w), off, lambda x: np.repeat(x[:, :1], 3, axis=1))[1]
+    R, w = right[0], data[1]
+    return R, None if w is None else _every((None, right[1]), off, lambda _: np.repeat(w[:, :1], 3, axis=1))[1]
 
 
 def _unknown(right: States, data: States, off: Array) -> States:
@@ -204,10 +207,10 @@ ROWS = (
     ),
     RowHabit(
         "one component in some rows",
-        "Each {period:.0f}. row has the first component of the rates in all three, from row {first:.0f} on",
+        "Each {period:.0f}. row has one number in all components of the rates, from row {first:.0f} on",
         _one_component,
     ),
-    RowHabit("some rows", "Each {period:.0f}. row is off, from row {first:.0f} on; the others agree", _unknown),
+    RowHabit("some rows", "Each {period:.0f}. row is off, from row {first:.0f} on; the others agree", _unknown, any=True),
     RowHabit(
         "rates at sign changes",
         "The rates are spoiled in {rows:.0f} rows in which the quaternion changes its sign, the first of them row {first:.0f}",

@@ -32,6 +32,8 @@ class Reading(Mistake):
         True if only quaternions can have it.
     both
         True if attitudes and rates are needed.
+    of_world
+        True if only the axes of the world differ.
     """
 
     kind: ClassVar[str] = "readings"
@@ -40,6 +42,7 @@ class Reading(Mistake):
     of: str
     quaternions: bool = False
     both: bool = False
+    of_world: bool = False
 
 
 def attitude(change: Callable[..., Array]) -> Change:
@@ -95,21 +98,23 @@ READINGS = (
     ),
     Reading(
         "order xyzw",
-        "The quaternions are in the order xyzw, but were read as wxyz: --quaternion, or the names of the columns",
+        "The quaternions are in the order xyzw, but were read as wxyz",
         _rolled(1),
         _rolled(-1),
         ATTITUDES,
         quaternions=True,
         remedy="write the scalar first",
+        option="--quaternion xyzw, or name the columns",
     ),
     Reading(
         "order wxyz",
-        "The quaternions are in the order wxyz, but were read as xyzw: --quaternion, or the names of the columns",
+        "The quaternions are in the order wxyz, but were read as xyzw",
         _rolled(-1),
         _rolled(1),
         ATTITUDES,
         quaternions=True,
         remedy="write the scalar last",
+        option="--quaternion wxyz, or name the columns",
     ),
     Reading(
         "world y up",
@@ -117,6 +122,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP.T @ R),
         attitude(lambda R: TO_Y_UP @ R),
         ATTITUDES,
+        of_world=True,
         remedy="attitudes are relative to W, whose third axis is up",
     ),
     Reading(
@@ -125,6 +131,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP @ R),
         attitude(lambda R: TO_Y_UP.T @ R),
         ATTITUDES,
+        of_world=True,
         remedy="attitudes are relative to W, whose third axis is up",
     ),
     Reading(
@@ -137,21 +144,23 @@ READINGS = (
     ),
     Reading(
         "world rates",
-        "The rates are in world axes; --rates world converts them",
+        "The rates are in world axes",
         to_body,
         to_world,
         RATES,
         both=True,
         remedy="`w` is in F, `w_W` is in W",
+        option="--rates world",
     ),
     Reading(
         "body rates",
-        "The rates are in body axes, but were read in world axes: --rates body",
+        "The rates are in body axes, but were read in world axes",
         to_world,
         to_body,
         RATES,
         both=True,
         remedy="`w` is in F, `w_W` is in W",
+        option="--rates body",
     ),
     Reading(
         "rates in degrees", "The rates are in deg/s, but were read in rad/s", *_scaled(math.pi / 180), RATES,
@@ -159,6 +168,24 @@ READINGS = (
     ),
     Reading("rates in radians", "The rates are in rad/s, but were read in deg/s", *_scaled(180 / math.pi), RATES),
     Reading("reversed rates", "The rates have the other sign", *_scaled(-1.0), RATES),
+    Reading(
+        "size of the rates",
+        "The attitudes are right, but the rates are {factor:.5g} times too large",
+        _rates(lambda w, factor: w / factor),
+        _rates(lambda w, factor: w * factor),
+        RATES,
+        both=True,
+        numbers=(Number("factor", 1.0),),
+    ),
+    Reading(
+        "bias of the rates",
+        "The attitudes are right, but the rates have a bias of ({bias_1:.4g}, {bias_2:.4g}, {bias_3:.4g}) rad/s",
+        _rates(lambda w, *bias: w - np.array(bias)),
+        _rates(lambda w, *bias: w + np.array(bias)),
+        RATES,
+        both=True,
+        numbers=tuple(Number(f"bias_{i}", unit="rad/s") for i in (1, 2, 3)),
+    ),
     Reading(
         "rates in turned axes",
         "The attitudes are right, but the rates are in axes that are turned by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",

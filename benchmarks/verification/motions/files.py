@@ -14,13 +14,16 @@ from conservative.attitude import Array
 from conservative.files import make_folder, write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import ANGLES, FACTOR, MISTAKES, ORDERS, PARTS, QUANTITIES, Measured, compare, measure
+from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
+from .signatures import Found, signatures
 
-NEAR = 0.5
-"""Largest sum of the squares of the logarithms of four ratios of errors, of a mistake that is named."""
+FACTOR = 2.0
+"""Smallest error of a mistake that is listed, over the tolerance of order 2 at the smallest step."""
+ROUND_OFF = 1e-11
+"""Errors that depend on the machine."""
 
 
-def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
+def describe(motion: Motion, measured: Measured, found: dict[str, Found]) -> dict[str, Any]:
     """Return a motion as the keys and values of its JSON file; README.md of references/motions explains them."""
     exact = motion.exact
     parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
@@ -41,18 +44,20 @@ def describe(motion: Motion, measured: Measured) -> dict[str, Any]:
             {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
             for at, ((order, angle), values) in enumerate(measured.tolerances.items())
         ],
-        "single": _short(2e-5 + 1e-6 * motion.steps * motion.samples * PARTS[-1]),
-        "catches": [
-            {"mistake": name, "factor": dict(zip(map(str, ORDERS), map(_short, factors), strict=True)), **_named(error)}
-            for name, (factors, error) in sorted(measured.catches.items(), key=_rank)
-            if factors[1] >= FACTOR
-        ],
+        "single": _short(single(motion)),
+        "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], found),
     }
 
 
-def _rank(item: tuple[str, tuple[Any, Any]]) -> tuple[float, int]:
-    """Return the place in a file: by factors. Of mistakes with the same effect the later one is first: it is more special."""
-    return -_short(item[1][0][1]), -list(MISTAKES).index(item[0])
+def catches(motion: Motion, allowed: Array, found: dict[str, Found]) -> list[dict[str, Any]]:
+    """Return the mistakes that the tolerances of order 2 show, with their errors, first the one with the largest error."""
+    (scale,) = sizes([motion])
+    made = {name: error(motion, scale, samples) for name, samples in found.items()}
+    made = {name: np.where(each < ROUND_OFF, 0.0, each) for name, each in made.items() if (each / allowed).max() >= FACTOR}
+    return [
+        {"mistake": name, **_named(each)}
+        for name, each in sorted(made.items(), key=lambda item: -float(f"{item[1].max():.1e}"))
+    ]
 
 
 def _short(x: float) -> float:
@@ -98,8 +103,8 @@ def as_json(keys: dict[str, Any]) -> str:
 def contents() -> Iterator[tuple[str, str]]:
     """Yield the names and texts of the files of all motions."""
     motions = load()
-    for motion, measured in zip(motions, measure(motions), strict=True):
-        keys = describe(motion, measured)
+    for motion, measured, found in zip(motions, measure(motions), signatures(motions), strict=True):
+        keys = describe(motion, measured, found)
         yield f"{motion.name}.json", as_json(keys)
         yield f"{motion.name}.csv", as_csv(keys)
 
@@ -108,19 +113,6 @@ def read(name: str) -> dict[str, Any]:
     """Return a motion from its file in this package."""
     folder = Path(conservative.__file__).parent / "references" / "motions"
     return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-
-
-def verdict(motion: dict[str, Any], order: int, angle: float, single: bool, R: Array, w: Array) -> tuple[float, str]:
-    """Return the largest error over its tolerance of samples (n, 3, 3), (n, 3), and the mistake with such errors, or ""."""
-    arm = motion.get("weight", 0.0) * np.array(motion.get("com_B", [0.0, 0.0, 0.0]))
-    found = compare(motion["inertia_B"], motion.get("rotor_momentum_B"), arm, motion, motion["scale"].values(), R, w)
-    (row,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (order, angle))
-    allowed = np.array([row[name] + single * motion["single"] for name in QUANTITIES])
-    if (found <= allowed).all():
-        return float((found / allowed).max()), ""
-    known = np.array([[each[name] for name in QUANTITIES] for each in motion["catches"]])
-    apart = (np.log(np.maximum(found, allowed) / np.maximum(known, allowed)) ** 2).sum(axis=1)
-    return float((found / allowed).max()), motion["catches"][apart.argmin()]["mistake"] if apart.min() < NEAR else ""
 
 
 def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[float, float]:

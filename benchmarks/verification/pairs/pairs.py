@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,12 @@ USUAL = "body", "top"
 """Names of a free body and of one about a fixed point, with all pairs that are not about the inertia."""
 Samples = tuple[Array, Array]
 """Attitudes (s, 3, 3), F to W, and rates (s, 3), rad/s, axes F."""
+
+
+@cache
+def _without_fields() -> dict[str, Any]:
+    """Return the numbers of some request, in which the numbers of fields are 0."""
+    return describe(principal_axes(Scene("pair", RigidBody((1, 1, 1)), np.eye(3), (1, 0, 0), 1.0)), Grid(1.0, 1, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +86,14 @@ class Description:
 
         `moments` are the diagonal of `joint_inertia`: with the variant "frame" only, they are not the principal moments.
         """
-        w0_W, x0 = self.R0 @ self.w0, self.R0 @ self.com
+        w0_W, x0, grid = self.R0 @ self.w0, self.R0 @ self.com, self.grid
         moments, axes = np.diag(self.inertia).copy(), np.eye(3)
         if np.count_nonzero(self.inertia - np.diag(moments)):
-            moments, axes = RigidBody(self.inertia).moments, RigidBody(self.inertia).R_BP
-        # Fields that the scene does not have are 0.
-        others = describe(principal_axes(Scene("pair", RigidBody((1, 1, 1)), np.eye(3), (1, 0, 0), 1.0)), self.grid)
+            body = RigidBody(self.inertia)
+            moments, axes = body.moments, body.R_BP
         return {
-            **others,
+            **_without_fields(),
+            **{"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "steps": grid.steps.astype(int)},
             **{"moments": np.diag(self.joint_inertia).copy(), "inertia_com": self.inertia},
             **{"moments_com": moments, "q_com": to_quaternion(axes)},
             **{"mass": self.mass, "com": self.com, "q0": self.sign * to_quaternion(self.R0), "R0": self.R0, "w0": self.w0},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from .pairs import Description, Samples
 
 RUN_LIMIT = 60.0
 """Time limit of a run, s, against engines that hang. A run takes 800 steps at most, and may compile. It decides no verdict."""
+START_LIMIT = 600.0
+"""Time limit of a run of our own methods in a new process, s, which may compile all kernels."""
 HANGS = 2
 """After so many runs without an end, an engine is not run any more: each trial of a reduction could take the limit."""
 ENDLESS = f"the run had not ended after {RUN_LIMIT:g} s"
@@ -42,10 +44,10 @@ class Runner:
     """An engine or method that integrates descriptions.
 
     Attributes: `method`; `precision`, the relative one of its numbers, or the tolerance of its steps if that is larger;
-    `resolution`, the relative one of its samples, 0 if they have all digits; `adaptive`, True if it chooses its steps.
+    `digits`, the digits of its answers, None before the first answer; `adaptive`, True if it chooses its steps.
     """
 
-    resolution = 0.0
+    digits: Digits | None = None
 
     def __init__(self, method: Method) -> None:
         self.method, self.adaptive, self._tolerances = method, method.order is None, tuple[str, ...]()
@@ -101,9 +103,9 @@ class Runner:
         """Return the samples of a run in a new process."""
         worker, method = python_worker(show_output=False), self.method
         try:
-            return run_within(RUN_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
-        except EngineTimeout:
-            raise NotAvailable(ENDLESS) from None
+            return run_within(START_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
+        except EngineTimeout as error:
+            raise NotAvailable(str(error)) from None
         finally:
             worker.close()
 
@@ -154,8 +156,9 @@ class EngineRunner(Runner):
                 raise answer
             states = read_states(answer, shape)
             n, s, _ = states.values.shape
-            precision, resolution = find_digits(states.values)
-            self.precision, self.resolution = max(self.precision, precision), max(self.resolution, resolution)
+            if self.digits is None:
+                self.digits = find_digits(states.values)
+                self.precision = max(self.precision, float(np.finfo("f4" if self.digits.single else "f8").eps))
             R, w, _ = to_body_axes(np.empty(s), states, np.broadcast_to(np.eye(3), (n, 3, 3)))
             return R, w
 
@@ -188,21 +191,40 @@ class EngineRunner(Runner):
             self._worker.close()
 
 
-def find_digits(values: Array) -> tuple[float, float]:
-    """Return the relative precision of the numbers in samples, and the resolution of written ones, 0 if all digits are there.
+class Digits(NamedTuple):
+    """Digits with which an engine answers.
 
-    A program may compute in single precision, or write few digits, without a declaration.
+    Attributes: `single`, True if numbers were rounded to single precision; `significant`, the number of significant digits,
+    and `decimals`, the number of decimals, 0 if numbers have all digits of double precision.
     """
-    ends = values[..., -1, :].ravel()
-    ends = ends[np.isfinite(ends) & (ends != 0)]
-    if len(ends) < FEW:
-        return 0.0, 0.0
+
+    single: bool = False
+    significant: int = 0
+    decimals: int = 0
+
+    def resolution(self, samples: Samples) -> float:
+        """Return the relative resolution of samples: rad, and relative to the largest rate."""
+        largest = float(np.abs(samples[1]).max())
+        decimals = 10.0**-self.decimals / min(1.0, largest) if self.decimals and largest else 0.0
+        return max(10.0 ** (1 - self.significant) if self.significant else 0.0, decimals)
+
+
+def find_digits(values: Array) -> Digits:
+    """Return the digits of the last sample. A program need not declare that it rounds to single precision or writes few."""
+    end = values[..., -1, :].reshape(-1)
+    parts = [part[np.isfinite(part) & (part != 0)] for part in (end[:-3], end[-3:])]
+    both = np.concatenate(parts).tolist()
     with np.errstate(all="ignore"):
-        single = ends.astype(np.float32).astype(float)
-    if all(f"{one:.{PROBE}g}" == f"{other:.{PROBE}g}" for one, other in zip(ends, single, strict=True)):
-        return float(np.finfo("f4").eps), 0.0
-    written = next((digits for digits in range(3, 15) if all(float(f"{one:.{digits}g}") == one for one in ends)), 0)
-    return 0.0, 10.0 ** (1 - written) if written else 0.0
+        single = any(len(part) > 2 and _written(part.astype(np.float32), PROBE) == _written(part, PROBE) for part in parts)
+    if len(both) < FEW or single:
+        return Digits(single)
+    significant = next((n for n in range(3, 15) if all(float(f"{x:.{n}g}") == x for x in both)), 0)
+    decimals = next((n for n in range(3, 15) if all(round(x, n) == x for x in both)), 0)
+    return Digits(False, significant, decimals)
+
+
+def _written(values: Array, digits: int) -> list[str]:
+    return [f"{value:.{digits}g}" for value in values.tolist()]
 
 
 def runner_of(method: Method) -> Runner:
@@ -211,9 +233,9 @@ def runner_of(method: Method) -> Runner:
 
 
 def _others(one: Description, n: int) -> list[Description]:
-    """Return n bodies unlike the given one, with the same steps."""
+    """Return n bodies unlike the given one, with the same axes and steps."""
     factors = np.random.default_rng(7).uniform(0.8, 1.2, (n, 4))
-    return [replace(one, w0=one.w0 * factor[:3], inertia=one.inertia * factor[3]) for factor in factors]
+    return [replace(one, w0=one.w0 * f[:3], mass=one.mass * f[3], inertia=one.inertia * f[3]) for f in factors]
 
 
 def run(runner: Runner, first: Description, one: Description, how: str, model: Callable[[], Samples]) -> Samples:

@@ -42,8 +42,8 @@ BODIES = {"body": BODY, "top": TOP, "needle": NEEDLE, "thin rod": ROD, "rod abou
 """Motions that are not chaotic, in principal axes."""
 PERTURBED = 4
 """Number of starts that are perturbed to measure how an error of rounding grows."""
-ROUNDING = 4.0
-"""Errors of rounding that a step may add, in units of that growth. Right engines differ by at most 0.88 times the sum."""
+ROUNDING = 10.0
+"""Errors of rounding that a step may add, in units of that growth. Right engines and programs add at most 3.2."""
 DIGITS = 10.0
 """Difference of two motions, in units of the resolution with which a program writes its samples."""
 LATER = 1000.0
@@ -51,7 +51,7 @@ LATER = 1000.0
 HALVINGS = 12
 """Halvings of the interval, in powers of ten, that contains a threshold: to 1 % for an interval of nine powers."""
 OWN_SHARE = 1e-3
-"""Share of the error of the step below which a difference is undecided: an iteration that ends at a tolerance may leave it."""
+"""Share of the error of the step below which a difference is negligible."""
 
 
 class Relation(StrEnum):
@@ -64,14 +64,14 @@ class Relation(StrEnum):
     DIFFERS = "differs"
     CRASHES = "crashes"
     """The engine crashes with the second description, and runs the first one."""
-    SMALL = "small"
-    """The difference is not rounding, and is a small share of the error of the step."""
+    NEGLIGIBLE = "negligible"
+    """The difference is a small share of the error of the step: an iteration that ends at a tolerance may leave it."""
     UNKNOWN = "tolerance unknown"
     """The motions differ, and the tolerance with which the engine chooses its steps is not known."""
     REFUSED = "refused"
     """The engine answers with an error."""
     LOST = "lost"
-    """Both motions end early or gain a lot of energy."""
+    """The first motion ends early or gains energy, and the second one as well or ends early: the step is too long."""
     NOT_RUN = "not run"
     """The first description does not run, so that nothing can be compared."""
     UNSUPPORTED = "unsupported"
@@ -80,9 +80,9 @@ class Relation(StrEnum):
 
 VERDICTS: Mapping[Relation, Verdict] = MappingProxyType(
     {
-        **dict.fromkeys((Relation.SAME_BITS, Relation.EQUAL, Relation.SAME_LIMIT), Verdict.RIGHT),
+        **dict.fromkeys((Relation.SAME_BITS, Relation.EQUAL, Relation.SAME_LIMIT, Relation.NEGLIGIBLE), Verdict.RIGHT),
         **dict.fromkeys((Relation.DIFFERS, Relation.CRASHES), Verdict.WRONG),
-        **dict.fromkeys((Relation.SMALL, Relation.UNKNOWN), Verdict.UNDECIDED),
+        Relation.UNKNOWN: Verdict.UNDECIDED,
         **dict.fromkeys((Relation.REFUSED, Relation.LOST, Relation.NOT_RUN), Verdict.NOT_TESTED),
         **dict.fromkeys((Relation.UNSUPPORTED, Relation.NOT_AVAILABLE), Verdict.NOT_TESTED),
     }
@@ -196,7 +196,7 @@ class Engine:
             with suppress(NotAvailable, IntegrationFailed):
                 largest = max(largest, difference(samples, frame_back(R_FG)(self.runner.model(moved)())))
         steps = math.sqrt(one.n_steps) if self.runner.adaptive else one.n_steps
-        return ROUNDING * largest * steps + DIGITS * self.runner.resolution
+        return ROUNDING * largest * steps
 
 
 @dataclass(frozen=True)
@@ -215,15 +215,26 @@ class Apart:
 
 
 LOST = Apart(math.nan, math.nan)
-"""Nothing can be compared: both motions end early or gain a lot of energy."""
+"""Nothing can be compared: the first motion ends early or gains energy, and the second one may."""
 WILD = 100.0
 """A motion is lost if its rates exceed so many times the largest one at the start."""
+GAIN = 0.5
+"""Share of its energy that a motion may gain; otherwise the step is too long, and a lost second motion shows nothing."""
 
 
 def _kept(one: Description, samples: Samples) -> bool:
     with np.errstate(invalid="ignore"):
         bounded = np.abs(samples[1]).max() < WILD * np.abs(one.w0).max()  # False for nan
     return bool(bounded) and bool(np.isfinite(samples[0]).all())
+
+
+def _stable(one: Description, samples: Samples) -> bool:
+    """Whether a motion that is kept gains little energy, so that the step is not too long for the scheme."""
+    R, w = samples
+    kinetic = np.einsum("ni,ij,nj->n", w, one.joint_inertia, w) / 2
+    weight = one.mass * one.gravity
+    energy = kinetic + weight * (R @ one.com)[:, 2]
+    return bool(energy.max() - energy[0] <= GAIN * (kinetic[0] + weight * np.linalg.norm(one.com)))
 
 
 def _scaled(scale: float | None) -> tuple[float, ...]:
@@ -235,7 +246,7 @@ def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) ->
     first = engine.first(one)
     second = pair.second(one, *_scaled(scale))
     samples, allowed = first.samples, first.allowed
-    lost = not _kept(one, samples)
+    lost = not _kept(one, samples) or not _stable(one, samples)
     try:
         raw = run(engine.runner, one, second, pair.run, first.model)
     except EngineError:
@@ -245,15 +256,16 @@ def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) ->
         return LOST if lost else Apart(math.inf, allowed, str(failure), scale, crashed)
     if pair.variant == "zero" and not lost and not np.isfinite(raw[1]).all():
         raise EngineError("numbers that are not finite")
-    if lost or not _kept(second, raw):
-        only = "the first motion is lost, and the second is not" if lost else "the second motion is lost"
-        return Apart(math.inf, allowed, only, scale) if lost == _kept(second, raw) else LOST
+    if not _kept(one, samples) or not _kept(second, raw):
+        return LOST if lost else Apart(math.inf, allowed, "the second motion is lost", scale)
     apart = difference(samples, pair.back(raw, *_scaled(scale)))
     if pair.same_bits:
         return Apart(apart)
+    if engine.runner.digits:
+        allowed += DIGITS * max(engine.runner.digits.resolution(each) for each in (samples, raw))
     if pair.variant == "time":  # which is rounded, and so is each step
         allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(one.w0)) * one.n_steps
-    if allowed < apart and pair.variant in OF_INERTIA:
+    if allowed < 10 * apart and pair.variant in OF_INERTIA:
         allowed = max(allowed, engine.rounding(second, raw))
     return Apart(apart, allowed, "", scale)
 
@@ -268,6 +280,7 @@ class _Pair:
 
     engine: Engine
     method: Method
+    subject: str
     body: str
     pair: Pair
     one: Description
@@ -275,13 +288,13 @@ class _Pair:
     def finding(self, relation: Relation, apart: Apart = LOST, detail: str = "", **repeat: object) -> PairFinding:
         by = "bits" if self.pair.same_bits else "rounding"
         return PairFinding(
-            self.method.name,
+            self.subject,
             "pairs",
             f"{self.body}: {self.pair.name}",
             VERDICTS[relation],
             apart.value,
             apart.allowed,
-            by={Relation.SAME_LIMIT: "order"}.get(relation, by),
+            by="order" if relation in (Relation.SAME_LIMIT, Relation.NEGLIGIBLE) else by,
             detail=detail,
             body=self.body,
             pair=self.pair.name,
@@ -308,7 +321,7 @@ class _Pair:
         if worst.wrong:
             return self.explain(worst)
         if math.isnan(worst.value):
-            return self.finding(Relation.LOST, detail="both motions are lost")
+            return self.finding(Relation.LOST, detail="the step is too long: the first motion is lost or gains energy")
         relation = Relation.EQUAL if worst.value else Relation.SAME_BITS
         return self.finding(relation, worst, relation.value)
 
@@ -338,8 +351,8 @@ class _Pair:
         if adaptive:
             return self.with_tolerance(apart)
         if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, one)):
-            detail = f"a difference of {apart.value:.2g} is not rounding, and the error of the step is {own:.2g}"
-            return self.finding(Relation.SMALL, apart, detail, threshold=threshold)
+            detail = f"the difference of {apart.value:.2g} is a small share of the error of the step, {own:.2g}"
+            return self.finding(Relation.NEGLIGIBLE, replace(apart, allowed=OWN_SHARE * own), detail, threshold=threshold)
         first = _reduce(one, lambda each: wrong(each) and stays(each))
         motion = apart.failure or _describe_motion(engine, pair, first, scale)
         return self.wrong(apart, first, motion, threshold)
@@ -448,13 +461,11 @@ def select_pairs(names: Sequence[str]) -> tuple[Pair, ...]:
     return tuple(pair for pair in PAIRS if not names or pair.name in names)
 
 
-def count_pairs(names: Sequence[str] = ()) -> int:
-    """Return the number of findings on one engine."""
-    return sum(len(pair.bodies) for pair in select_pairs(names))
-
-
 def verify_pairs(
-    method: Method, names: Sequence[str] = (), tell: Callable[[str], object] = lambda what: None
+    method: Method,
+    names: Sequence[str] = (),
+    tell: Callable[[str], object] = lambda what: None,
+    subject: str = "",
 ) -> Iterator[PairFinding]:
     """Yield the finding on every pair of every body in an engine, program or method. No verdict depends on times of runs.
 
@@ -466,6 +477,8 @@ def verify_pairs(
         Names of pairs, by default all.
     tell
         Function that is called with a text before each pair.
+    subject
+        Name in the findings, by default the name of the method.
 
     Raises
     ------
@@ -480,6 +493,6 @@ def verify_pairs(
         for body, one in BODIES.items():
             for pair in pairs:
                 if body in pair.bodies:
-                    tell(f"{method.name}: {body}, {pair.name}")
-                    yield _Pair(engine, method, body, pair, one).compare()
+                    tell(f"{body}, {pair.name}")
+                    yield _Pair(engine, method, subject or method.name, body, pair, one).compare()
             engine.forget()

@@ -68,7 +68,7 @@ def verify_two(
     second: Named,
     from_row: bool = True,
     error: float | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], object] = lambda _: None,
 ) -> Verification:
     """Verify two recordings of one scene, and compare them with each other.
 

@@ -126,7 +126,7 @@ def verify_recording(
     recording: Recording,
     from_row: bool = True,
     error: float | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], object] = lambda _: None,
     name: str = "",
 ) -> Verification:
     """Verify that a recording is a motion of a scene. The result has one finding, and `Details`.

@@ -80,7 +80,7 @@ def exponential(turn):
 def matrix(q):
     """Return the matrix of a quaternion of any norm."""
     w, x, y, z = q
-    n = w * w + x * x + y * y + z * z
+    n = w * w + x * x + y * y + z * z or math.nan  # rates that overflow
     M = [[w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
          [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
          [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]]  # fmt: skip

@@ -17,7 +17,8 @@ from conservative.benchmarks.verification.bodies.explain import find_causes
 from conservative.benchmarks.verification.bodies.identify import accelerations, identify, make_cases
 from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
 from conservative.benchmarks.verification.finding import EXIT_CODES, Verdict
-from conservative.benchmarks.verification.mistakes.bodies import BODIES, FITTED
+from conservative.benchmarks.verification.mistakes import BY_KEY
+from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED
 from conservative.errors import BadInput, MissingEngine
 from conservative.references.model_files import loaders
 from conservative.references.model_files.pieces import Piece, distance, join_links, weigh
@@ -139,7 +140,7 @@ def test_accelerations_obey_momentum_and_give_the_body_back():
         assert distance(part, identify(cases, found, near)) < 1e-12  # measured: 1.1e-14
 
 
-@pytest.mark.parametrize("mistake", BODIES, ids=lambda mistake: mistake.key)
+@pytest.mark.parametrize("mistake", LOADED, ids=lambda mistake: mistake.key)
 def test_a_loader_with_a_mistake_is_named(mistake):
     """The mistakes leave up to 2e-14 of errors of 0.02 and more."""
     path = CATALOGUE / ("shape_that_disagrees.urdf" if "geometry" in mistake.key else GENERIC.name)
@@ -187,9 +188,17 @@ def test_numbers_of_a_mistake_are_fitted():
     assert not find_causes(links, replace(wanted, com=wanted.com + 0.01 * np.array([1, -2, 3])), 1e-6)
 
 
-def test_each_mistake_has_one_key_and_one_sentence():
-    keys, sentences = zip(*((each.key, each.sentence) for each in (*BODIES, *FITTED)), strict=True)
-    assert len(set(keys)) == len(set(sentences)) == len(keys)
+def test_the_error_of_an_engine_is_relative_to_the_inertia_that_it_has():
+    """Newton raises 1e-12 to 1e-6 kg m^2 in single precision, with an error as large as the inertia of the file."""
+    links = read_links(CATALOGUE / "moments_1e-12.urdf")
+    wanted = join_links(links)
+    (cause,) = find_causes(links, replace(wanted, inertia=1e-6 * np.eye(3) + wanted.inertia), 1e-2)
+    assert cause.keys == ("moments raised",)
+
+
+def test_mistakes_of_loaders_are_in_the_table_of_all():
+    for each in (*LOADED, *FITTED):
+        assert BY_KEY[each.key].sentence == each.sentence
 
 
 # ----------------------------------------------------------------------------------------------------------------- engines

@@ -19,7 +19,7 @@ class WrongSide(Program):
 
 
 class FactorForgotten(Program):
-    key = "factor 1/2"
+    key = "factor one half"
 
     def turning(self, a, w):
         return product(a, [0.0, *w])
@@ -40,7 +40,7 @@ class GyroscopicSign(Program):
 
 
 class InertiaInverted(Program):
-    key = "inertia inverted"
+    key = "inverted inertia"
 
     def setup(self, body, R0):
         super().setup(body, R0)
@@ -169,7 +169,7 @@ def wrong_programs():
         "inertia of the start": InWorldAxes("inertia of the start", *rk2),
         "damping 0.1": Changed("damping", lambda w, h: [x * math.exp(-0.1 * h) for x in w], *rk2),
         "damping 0.02": Changed("damping", lambda w, h: [x * (1 - 0.02 * h) for x in w], *rk2),
-        "limit": Changed("limit", limited, *rk2),
+        "limit": Changed("rate limit", limited, *rk2),
         "dead band": Changed("dead band", lambda w, h: [x if abs(x) >= 0.01 else 0.0 for x in w], *rk2),
         "sleep": Changed("sleep", asleep, *rk2),
         "transposed": Answering("transposed", lambda q, w: ([q[0], -q[1], -q[2], -q[3]], w), *rk2),

@@ -4,7 +4,7 @@ typedef float real;
 #else
 typedef double real;
 #endif
-#define BOTH "no gyroscopic term and damping 0.05"
+#define BOTH "no gyroscopic term + damping 0.05"
 #define IS(name) (!strcmp(MISTAKE, name))
 static const double tableau[] = {METHOD};
 
@@ -44,6 +44,9 @@ static void turning(const real *q, const real *w, real *out) {
   out[1] = (q[0] * w[0] + q[2] * w[2] - q[3] * w[1]) / 2;
   out[2] = (q[0] * w[1] + q[3] * w[0] - q[1] * w[2]) / 2;
   out[3] = (q[0] * w[2] + q[1] * w[1] - q[2] * w[0]) / 2;
+  for (int i = 0; i < 3; i++)
+    if (IS("wrong side")) out[1 + i] = q[0] * w[i] - out[1 + i]; /* w q for q w */
+  for (int i = 0; i < 4; i++) out[i] *= IS("factor one half") ? 2 : 1;
 }
 static void slope(real t, const real *y, real *out) {
   real R[9], back[9], J[9], K[9], G[9], A[9], L[3], T[3], a[3], b[3], sign = IS("no gyroscopic term") || IS(BOTH) ? 0 : IS("sign of the gyroscopic term") ? -1 : 1;
@@ -102,11 +105,10 @@ static void step(real t, real h, real *y) {
   }
   normalise(y);
   real speed = (real)sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6]), scale = 1;
-  if (IS("damping 0.01")) scale = (real)exp(-0.01 * h);
-  if (IS("damping 0.05") || IS(BOTH)) scale = (real)exp(-0.05 * h);
-  if (IS("clamp") && speed > 100) scale = 100 / speed;
+  if (strstr(MISTAKE, "damping 0")) scale = (real)exp(-atof(strstr(MISTAKE, "damping 0") + 8) * h);
+  if (strstr(MISTAKE, "rate limit") && speed > (real)atof(MISTAKE + 10)) scale = (real)atof(MISTAKE + 10) / speed;
   if (IS("sleep") && speed < 0.5f) scale = 0;
-  for (int i = 4; i < 7; i++) y[i] *= scale;
+  for (int i = 4; i < 7; i++) y[i] *= strstr(MISTAKE, "dead band") && fabs(y[i]) < atof(MISTAKE + 9) ? 0 : scale;
 }
 static void load(const char *key, real *out, int n, double factor) {
   double found[9] = {0};
@@ -129,6 +131,7 @@ static void simulate(double h, int steps, int samples, double state[][7]) {
   if (IS("smallest moments") && body.J[0] == (real)1e-6)
     for (int i = 0; i < 9; i++) body.J[i] = i % 4 ? 0 : body.J[i];
   inverse(body.J, body.K), matrix(y, body.R0);
+  if (IS("inverted inertia")) memcpy(R, body.J, sizeof R), memcpy(body.J, body.K, sizeof R), memcpy(body.K, R, sizeof R);
   for (int i = 0; i < samples; i++) {
     for (int n = 0; n < steps; n++) {
       real size = (real)h * (IS("half a step late") && n + i == 0 ? (real)0.5 : 1);

@@ -1,6 +1,6 @@
 const METHOD = [];
 const MISTAKE = "";
-const BOTH = "no gyroscopic term and damping 0.05";
+const BOTH = "no gyroscopic term + damping 0.05";
 const FLOAT = false;
 const transpose = (A) => A[0].map((_, i) => A.map((row) => row[i]));
 const apply = (A, v) => A.map((row) => dot(row, v));
@@ -14,6 +14,7 @@ function inverse(A) {
 }
 const matrix = (q) => transpose(one.map((e) => rotate(q.map((x) => x / Math.hypot(...q)), e)));
 const turning = (q, w) => [-dot(q.slice(1), w), ...add(w.map((x) => q[0] * x), cross(q.slice(1), w))].map((x) => x / 2);
+const wrongly = (q, w) => (MISTAKE === "wrong side" ? [-dot(q.slice(1), w), ...add(w.map((x) => q[0] * x), cross(w, q.slice(1)))].map((x) => x / 2) : turning(q, w));
 function slope(body, t, y) {
   const q = y.slice(0, 4), w = y.slice(4), R = matrix(q), back = transpose(R), n = body.orbit;
   let J = body.J;
@@ -29,7 +30,7 @@ function slope(body, t, y) {
   const field = sign("without the field", "sign of the field"), angle = MISTAKE === "turning of the field" ? 0 : n * t;
   const u = apply(back, [Math.cos(angle), Math.sin(angle), 0]);
   T = add(add(T, cross(R[2], body.arm), field), cross(u, apply(body.J, u)), field * 3 * n * n);
-  return [...turning(q, w), ...apply(K, T)];
+  return [...wrongly(q, w), ...apply(K, T)];
 }
 function step(body, t, h, y) {
   const s = METHOD[0], A = Array.from({ length: s }, (_, i) => METHOD.slice(1 + i * s, 1 + i * s + s)), b = METHOD.slice(1 + s * s);
@@ -45,8 +46,8 @@ function step(body, t, h, y) {
     y = [...q.map((x, i) => Math.cos(half) * x + ((Math.sin(half) * h) / half) * turn[i]), ...y.slice(4)];
   }
   const size = Math.hypot(...y.slice(0, 4)), speed = Math.hypot(...y.slice(4));
-  let scale = MISTAKE === "damping 0.01" ? Math.exp(-0.01 * h) : MISTAKE === "damping 0.05" || MISTAKE === BOTH ? Math.exp(-0.05 * h) : 1;
-  if (MISTAKE === "clamp" && speed > 100) scale = 100 / speed;
+  let scale = Math.exp(-h * Number(MISTAKE.match(/damping (0.*)/)?.[1] ?? 0));
+  if (MISTAKE === "rate limit 100" && speed > 100) scale = 100 / speed;
   if (MISTAKE === "sleep" && speed < 0.5) scale = 0;
   y = y.map((x, i) => (i < 4 ? x / size : x * scale));
   return FLOAT ? y.map(Math.fround) : y;

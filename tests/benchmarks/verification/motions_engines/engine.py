@@ -3,7 +3,7 @@ import array
 METHOD = []
 MISTAKE = ""
 FLOAT = False
-BOTH = "no gyroscopic term and damping 0.05"
+BOTH = "no gyroscopic term + damping 0.05"
 
 
 def multiply(A, B):
@@ -34,6 +34,12 @@ def matrix(q):
 
 
 def turning(q, w):
+    q = [q[0], *(-x for x in q[1:])] if MISTAKE == "wrong side" else q
+    turn = right_turning(q, w)
+    return [-turn[0], *turn[1:]] if MISTAKE == "wrong side" else turn
+
+
+def right_turning(q, w):
     return [-dot(q[1:], w) / 2, *(x / 2 for x in add([q[0] * x for x in w], cross(q[1:], w)))]
 
 
@@ -78,10 +84,8 @@ def step(body, t, h, y):
         turn = turning(old[:4], old[4:])
         y = [math.cos(h * speed / 2) * a + math.sin(h * speed / 2) * 2 / speed * c for a, c in zip(old, turn)] + y[4:]
     size, speed = math.hypot(*y[:4]), math.hypot(*y[4:])
-    scale = {"damping 0.01": math.exp(-0.01 * h), "damping 0.05": math.exp(-0.05 * h), BOTH: math.exp(-0.05 * h)}.get(
-        MISTAKE, 1
-    )
-    if MISTAKE == "clamp" and speed > 100:
+    scale = math.exp(-h * float(MISTAKE.partition("damping 0")[2] or 0)) if "damping 0" in MISTAKE else 1
+    if MISTAKE == "rate limit 100" and speed > 100:
         scale = 100 / speed
     if MISTAKE == "sleep" and speed < 0.5:
         scale = 0

@@ -1,7 +1,7 @@
 const METHOD: &[Real] = &[];
 const MISTAKE: &str = "";
 type Real = f64;
-const BOTH: &str = "no gyroscopic term and damping 0.05";
+const BOTH: &str = "no gyroscopic term + damping 0.05";
 type V = [Real; 3];
 type M = [V; 3];
 const ONE: M = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -29,7 +29,7 @@ fn matrix(y: &[Real; 7]) -> M {
 }
 fn turning(y: &[Real; 7], w: &V) -> [Real; 4] {
     let u = [y[1], y[2], y[3]];
-    let c = cross(&u, w);
+    let c = if is("wrong side") { cross(w, &u) } else { cross(&u, w) };
     [-dot(&u, w) / 2.0, (y[0] * w[0] + c[0]) / 2.0, (y[0] * w[1] + c[1]) / 2.0, (y[0] * w[2] + c[2]) / 2.0]
 }
 fn slope(body: &Body, t: Real, y: &[Real; 7]) -> [Real; 7] {
@@ -75,8 +75,9 @@ fn step(body: &Body, t: Real, h: Real, start: &[Real; 7]) -> [Real; 7] {
         for n in 0..4 { y[n] = start[n] * (h * speed / 2.0).cos() + turn[n] * 2.0 / speed * (h * speed / 2.0).sin(); }
     }
     let (size, speed) = ((y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]).sqrt(), (y[4] * y[4] + y[5] * y[5] + y[6] * y[6]).sqrt());
-    let mut scale = if is("damping 0.01") { (-0.01 * h).exp() } else if is("damping 0.05") || is(BOTH) { (-0.05 * h).exp() } else { 1.0 };
-    if is("clamp") && speed > 100.0 { scale = 100.0 / speed; }
+    let damping: Real = MISTAKE.split("damping 0").nth(1).map_or(0.0, |x| x.parse().unwrap());
+    let mut scale = (-damping * h).exp();
+    if is("rate limit 100") && speed > 100.0 { scale = 100.0 / speed; }
     if is("sleep") && speed < 0.5 { scale = 0.0; }
     for n in 0..7 { if n < 4 { y[n] /= size } else { y[n] *= scale } }
     y
