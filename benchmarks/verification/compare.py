@@ -41,7 +41,7 @@ def weigh(scene: Scene) -> float:
     weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.needs & IN_TIME)
     varying = None if scene.damping is None else scene.damping.of_time
     slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
-    return weight + 1.0 * bool(scene.loads) + 30.0 * slow  # functions of attitude are called for each state
+    return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state
 
 
 def take_part(motion: tuple[Array, Array], of: States) -> States:

@@ -175,6 +175,7 @@ def _changes(case: Compared, asked: _Asked) -> Found:
     """Yield motions of scenes and equations with a mistake."""
     known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
     several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
+    known.sort(key=lambda each: each[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
     for mistakes in (*known, *(several if "scenes" in asked.kinds else ())):
         yield attempt(case, compose(*mistakes))
 
@@ -429,7 +430,7 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     periodic = len(places) > 2 and np.ptp(gaps) == 0
     for each in ROWS:
         if periodic if each.periodic else near:
-            made = each.change(case.exact, case.data, off)
+            made: Any = each.change(case.exact, case.data, off)
             values = {"first": float(places[0] * case.stride + 1)}
             values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
             yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
@@ -640,7 +641,7 @@ def _several(case: Compared, asked: _Asked) -> Found:
         for third in readings:
             a, b = R, w
             for each in third:
-                a, b = each.write(a, b)  # type: ignore[assignment]
+                a, b = each.write(a, b)
             if len(mistakes := (*first, *second, *third)) > 1:
                 ranked.append((len(mistakes), case.size(case.errors(a, b)), mistakes))
     allowed = float((case.allowed / case.noise).max())
@@ -666,7 +667,7 @@ class Search:
 
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
-    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
+    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
@@ -675,7 +676,7 @@ SEARCHES = {
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
-    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.15),
-    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.15),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.1),
 }
 """Parts of the search by the work that they do, in their order."""

@@ -22,11 +22,12 @@ from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from ..mistakes import BY_KEY
+from ..mistakes import BY_KEY as _BY_KEY
 from ..mistakes.steps import STEPS, TURNED, Step
 from ..solution import Equations
 from .motion import Motion
 
+BY_KEY: Any = _BY_KEY  # each mistake here has the effect of its kind
 ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)  # declared orders; |w| h, and steps in 0.1 rad
 LEAST = {1: 1e-6, 2: 1e-6, 4: 1e-10}
 """Errors that are allowed in addition, by order: implicit steps are iterated to a tolerance."""
