@@ -34,6 +34,7 @@ EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle 
 MOST_BREAKS = 50  # of loads, if numbers are fitted
 STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
 LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
+SHRUNK = 1e-3  # of the exact motion: a motion in other units of time that is smaller stands still
 SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
@@ -220,9 +221,10 @@ def _moves(case: Compared, found: Explanation | None) -> bool:
     """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
     if found is None or found.made is None:
         return False
-    if not found.explains:
-        return True
-    return bool((case.apart(found.made, _still(case)) > SHOWN * case.allowed).any())
+    some = case.take(slice(0, len(found.made[0])))
+    still = _still(some)
+    least = np.maximum(SHOWN * some.allowed, SHRUNK * some.apart(some.exact, still))
+    return bool((some.apart(found.made, still) > least).any())
 
 
 def _still(case: Compared) -> tuple[Array, Array]:

@@ -50,7 +50,9 @@ def fits(mistake: Mistake, case: Compared) -> bool:
     return True
 
 
-def equations_of(mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], **limits: float) -> Equations | None:
+def equations_of(
+    mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], tolerance: float, most: float
+) -> Equations | None:
     """Return the equations with mistakes in the scene and in the equations; None if a mistake makes no difference."""
     changes: dict[str, Any] = {}
     for each in mistakes:
@@ -69,7 +71,7 @@ def equations_of(mistakes: Sequence[Mistake], scene: Scene, values: dict[str, An
             if made is None:
                 return None
             changes |= {name: getattr(made, name) for name, value in _DEFAULTS.items() if getattr(made, name) is not value}
-    return Equations(scene, **changes, **limits)
+    return Equations(scene, tolerance=tolerance, most=most, **changes)
 
 
 def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
@@ -100,7 +102,7 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
         else:  # one reading for each motion
             at = [numbers.index(number) for number in each.numbers]
             many = [(each.read if back else each.write)(R[i], w[i], *row[at]) for i, row in enumerate(p)]
-            made = tuple(np.stack(list(x)) for x in zip(*many, strict=True))  # type: ignore[assignment,arg-type]
+            made = tuple(np.stack(list(x)) for x in zip(*many, strict=True))  # type: ignore[assignment]
         return made  # type: ignore[return-value]
 
     def solve(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
