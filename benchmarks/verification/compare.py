@@ -75,8 +75,9 @@ def take_rows(data: States, rows: Any) -> States:
 def weigh(scene: Scene) -> float:
     """Return the work of a solution in a scene, relative to the work for a free body."""
     weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.needs & IN_TIME)
-    loads = (scene.torque, scene.damping and scene.damping.of_time)
-    return weight + 1.0 * bool(scene.loads) + 30.0 * any(each is not None and each.of_attitude for each in loads)
+    varying = None if scene.damping is None else scene.damping.of_time
+    slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
+    return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state
 
 
 def take_part(motion: tuple[Array, Array], of: States) -> States:

@@ -34,6 +34,7 @@ EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle 
 MOST_BREAKS = 50  # of loads, if numbers are fitted
 STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
 LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
+SHRUNK = 1e-3  # of the exact motion: a motion in other units of time that is smaller stands still
 SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
@@ -173,6 +174,7 @@ def _changes(case: Compared, asked: _Asked) -> Found:
     """Yield motions of scenes and equations with a mistake."""
     known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
     several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
+    known.sort(key=lambda each: each[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
     for mistakes in (*known, *(several if "scenes" in asked.kinds else ())):
         yield attempt(case, compose(*mistakes))
 
@@ -217,9 +219,10 @@ def _moves(case: Compared, found: Explanation | None) -> bool:
     """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
     if found is None or found.made is None:
         return False
-    if not found.explains:
-        return True
-    return bool((case.apart(found.made, _still(case)) > SHOWN * case.allowed).any())
+    some = case.take(slice(0, len(found.made[0])))
+    still = _still(some)
+    least = np.maximum(SHOWN * some.allowed, SHRUNK * some.apart(some.exact, still))
+    return bool((some.apart(found.made, still) > least).any())
 
 
 def _still(case: Compared) -> tuple[Array, Array]:
@@ -427,7 +430,7 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     periodic = len(places) > 2 and np.ptp(gaps) == 0
     for each in ROWS:
         if periodic if each.periodic else near:
-            made = each.change(case.exact, case.data, off)
+            made: Any = each.change(case.exact, case.data, off)
             values = {"first": float(places[0] * case.stride + 1)}
             values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
             yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
@@ -638,7 +641,7 @@ def _several(case: Compared, asked: _Asked) -> Found:
         for third in readings:
             a, b = R, w
             for each in third:
-                a, b = each.write(a, b)  # type: ignore[assignment]
+                a, b = each.write(a, b)
             if len(mistakes := (*first, *second, *third)) > 1:
                 ranked.append((len(mistakes), case.size(case.errors(a, b)), mistakes))
     allowed = float((case.allowed / case.noise).max())
@@ -664,7 +667,7 @@ class Search:
 
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
-    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
+    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
@@ -673,7 +676,7 @@ SEARCHES = {
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
-    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.15),
-    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.15),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.1),
 }
 """Parts of the search by the work that they do, in their order."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -49,7 +50,9 @@ def fits(mistake: Mistake, case: Compared) -> bool:
     return True
 
 
-def equations_of(mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], **limits: float) -> Equations | None:
+def equations_of(
+    mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], tolerance: float, most: float
+) -> Equations | None:
     """Return the equations with mistakes in the scene and in the equations; None if a mistake makes no difference."""
     changes: dict[str, Any] = {}
     for each in mistakes:
@@ -68,7 +71,7 @@ def equations_of(mistakes: Sequence[Mistake], scene: Scene, values: dict[str, An
             if made is None:
                 return None
             changes |= {name: getattr(made, name) for name, value in _DEFAULTS.items() if getattr(made, name) is not value}
-    return Equations(scene, **changes, **limits)
+    return Equations(scene, tolerance=tolerance, most=most, **changes)
 
 
 def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
@@ -99,7 +102,7 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
         else:  # one reading for each motion
             at = [numbers.index(number) for number in each.numbers]
             many = [(each.read if back else each.write)(R[i], w[i], *row[at]) for i, row in enumerate(p)]
-            made = np.stack([a for a, _ in many]), np.stack([b for _, b in many])  # type: ignore[type-var]
+            made = tuple(np.stack(list(x)) for x in zip(*many, strict=True))  # type: ignore[assignment]
         return made  # type: ignore[return-value]
 
     def solve(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
@@ -186,7 +189,7 @@ def by_habit(habit: Habit, step: float | None) -> Trial:
         def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
             last = rows[n - 1] + 1
             made = [
-                _with_habit(case, equations, points[:last], a, b, lambda rates, numbers=numbers: habit.after(rates, *numbers))
+                _with_habit(case, equations, points[:last], a, b, partial(_after, habit, numbers))
                 for a, b, numbers in zip(R, w, p, strict=True)
             ]
             return np.stack([a[rows[:n]] for a, _ in made]), np.stack([b[rows[:n]] for _, b in made])
@@ -194,6 +197,10 @@ def by_habit(habit: Habit, step: float | None) -> Trial:
         return motion
 
     return Trial((habit,), build, habit.numbers)
+
+
+def _after(habit: Habit, numbers: Array, rates: Array) -> Array:
+    return habit.after(rates, *numbers)
 
 
 def _points(case: Compared, step: float | None) -> tuple[Array, Any]:

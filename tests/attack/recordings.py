@@ -379,8 +379,8 @@ def integrate(rule: Any, q: Any, w: Any, h: float, parts: int) -> Any:
 READINGS = (
     *("transposed", "order xyzw", "order wxyz", "rates in degrees", "rates in radians", "world rates", "reversed rates"),
 )
-TIMES = ("time shift", "phase drift", "time in 0.001 s", "jittered times", "dropped rows", "rates at other times")
-FITTED = ("damped", "another body", "body axes", "first row", "single rows")
+TIMES = ("time shift", "phase drift", "time in ms", "jittered times", "dropped rows", "rates at other times")
+FITTED = ("damping", "another body", "body axes", "first row", "single rows")
 PAIR = "two mistakes"
 
 # Layouts: a header, its columns of q (n, 4) and w (n, 3), the factor from their rounding to angles, and how they are read
@@ -564,7 +564,7 @@ def plant(seed: int) -> Planted:
     case = made.case
     exact = Simulator(case)
     Y, rounding = simulate(draw, made, kind, t, parts, rate)
-    t = np.arange(len(Y)) * gap if mistake != "time in 0.001 s" else t
+    t = np.arange(len(Y)) * gap if mistake != "time in ms" else t
     t, Y = t[cut:], Y[cut:]
     write(draw, made, t, Y, rounding)
     decide(made, kind, exact, t, Y)
@@ -590,7 +590,7 @@ def simulate(draw: Draw, made: Planted, kind: str, t: Any, parts: int, rate: flo
         Y = np.hstack([integrate(ATTITUDES[name], Y[0, :4], Y[:, 4:], gap / parts, parts), Y[::parts, 4:]])
     elif kind == "time":
         Y = simulate_times(draw, made, exact, t, gap)
-    elif name == "damped":
+    elif name == "damping":
         D = rate * draw.between(1e-4, 0.03) * case.J + (0.0 if case.damping is None else case.damping)
         Y = Simulator(replace(case, damping=D)).solve(t)
     elif name in ("another body", PAIR):
@@ -666,7 +666,7 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any, single: float) -> None:
     ]
     off = [np.sqrt(((a.reshape(b.shape) - b) ** 2).sum(axis=1).mean()) for a, b in zip(read, blocks, strict=True)]
     origin = 1.7e18 if made.layout == "ROS" else 0.0
-    second = 1e3 if made.mistake == "time in 0.001 s" else layout.second
+    second = 1e3 if made.mistake == "time in ms" else layout.second
     ticks = np.round(t * second) + origin if layout.second > 1 else t * second
     times = [f"{x:.0f}" if layout.second > 1 else f"{x:.12g}" for x in ticks]
     late = float(np.sqrt(np.mean(((ticks - origin) / second - t) ** 2))) + (6e-8 if origin else 0.0)
@@ -724,7 +724,7 @@ def compare(made: Planted, exact: Simulator, t: Any, Y: Any, inexact: bool) -> R
 def decide(made: Planted, kind: str, exact: Simulator, t: Any, Y: Any) -> None:
     """Decide whether a file is right, whether its mistake is identifiable, and which others make the same rows."""
     made.expected = "right" if kind == "right" else "wrong"
-    if kind in ("right", "reading") or made.mistake == "time in 0.001 s":  # what these change is as large as the motion
+    if kind in ("right", "reading") or made.mistake == "time in ms":  # what these change is as large as the motion
         made.identifiable = kind != "right" and made.turns > 0.5
         return
     rows = compare(made, exact, t, Y, made.noise != "none" or made.single or made.layout in ("ROS", "EuRoC"))
@@ -758,4 +758,4 @@ def rivals(made: Planted, kind: str, exact: Simulator, rows: Rows) -> dict[str, 
         return {name: [rows.off(np.hstack([q, E[:, 4:]]))] for name, q in turned.items()}
     if made.mistake in ("another body", "body axes"):
         return {"phase drift": [late, (np.arange(len(t))[:, None] * late.reshape(len(t), -1)).ravel()]}
-    return {"time shift": [late]} if made.mistake in ("damped", "phase drift") else {}
+    return {"time shift": [late]} if made.mistake in ("damping", "phase drift") else {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def limit(w: Array, most: float) -> Array:
     return w * np.minimum(1.0, most / np.maximum(speed, 1e-300))
 
 
-def _equal(values: Array, most: float) -> Array:
+def _equal(values: Array, most: float) -> Any:
     return np.abs(values - most) <= 1e-3 * most
 
 

@@ -179,7 +179,8 @@ RECORDED = {
 def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key):
     make, values = RECORDED[key]
     data, allowed = make(), np.full(2, 1e-9)
-    case = Compared(SCENE, T, data, 0.0, float(np.linalg.norm(W, axis=1).max()), allowed, np.full(2, 1e-13))
+    scale = float(np.linalg.norm(W, axis=1).max())
+    case = Compared(SCENE, T, data, 0.0, scale, allowed, np.full(2, 1e-13)).read(*data)
     for some in (case, case.take(slice(0, 301))):
         found = diagnose(some).named
         assert [each.name for each in found if each.explains] == [key]
