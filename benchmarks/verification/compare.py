@@ -27,6 +27,7 @@ ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 TINY = 1e-11  # of noise, which is round-off
 SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
+LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
 PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 HOPELESS = 30.0  # of noise, that no other first row explains
@@ -241,7 +242,8 @@ class Compared:
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
         """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
         tolerance = float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8))
-        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, **changes)
+        most = LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
+        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=most, **changes)
 
     def deviations(self, motion: Solution, found: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""

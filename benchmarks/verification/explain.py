@@ -665,7 +665,7 @@ class Search:
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.15),
-    "other readings": Search(_readings, frozenset({"readings"}), 0.1),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),

@@ -64,6 +64,7 @@ class Explanation:
     and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
     units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
     the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
+    `of_program` is True if a program answered, and not a file.
     """
 
     keys: tuple[str, ...]
@@ -78,6 +79,7 @@ class Explanation:
     made: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
     rest: float = 0.0
     trial: Trial | None = field(default=None, compare=False, repr=False)
+    of_program: bool = False
 
     @property
     def name(self) -> str:
@@ -88,7 +90,8 @@ class Explanation:
     def cause(self) -> Cause:
         """The mistakes as the cause of a finding, with the error of attitudes or rates, whichever is larger without them."""
         worst = int(np.argmax(self.plain))
-        remedies = [] if self.trial is None else [each.remedy for each in self.trial.mistakes if each.remedy]
+        mistakes = () if self.trial is None else self.trial.mistakes
+        remedies = filter(None, (each.remedy if self.of_program else each.option for each in mistakes))
         values = MappingProxyType(self.values)
         return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
 
@@ -143,6 +146,7 @@ def explain(
         made,
         rest,
         trial,
+        case.step is not None,
     )
 
 

@@ -24,6 +24,7 @@ from conservative.grid import Grid
 from conservative.method import Method
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.programs import UnusableProgram, program_class
 from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
@@ -33,7 +34,7 @@ from . import protocol
 from .compare import Compared, compare_answers
 from .explain import PROGRAM_KINDS, diagnose
 from .explanation import HALF, OWN_ERROR, Explanation
-from .finding import Finding, Verdict, Verification
+from .finding import Finding, Verdict, Verification, uncapitalised
 from .motions.files import tolerance
 from .motions.motion import Motion, load
 from .motions.programs import ORDERS, PARTS
@@ -63,7 +64,7 @@ REFITS = 4
 CLEAR = 2.0
 """Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
 LEAST = 0.1
-"""Smallest share of the failing motions that a second mistake explains: a mistake can resemble another one in a motion."""
+"""Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
@@ -226,7 +227,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
     searched = list(rest.values())
     for _ in range(ROUNDS):
         searched = [each for each in searched if each.motion.name in rest]
-        if not searched:
+        if not searched or (named and len(rest) < LEAST * len(failing)):
             break
         each = searched.pop(0)
         found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains][:CANDIDATES]
@@ -236,8 +237,6 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
         best = max(scored, key=lambda one: (one[2], -one[0].numbers))
         equal = [one for one in scored if (one[1], one[2], one[0].numbers) == (best[1], best[2], best[0].numbers)]
         names, before = best[1], named.get(keys := tuple(one[0].keys for one in equal))
-        if before is None and named and len(names) < LEAST * len(failing):
-            continue
         # Numbers of the first search stand: it had the motions that show them best.
         explanations = before.explanations if before else tuple(one[0] for one in equal)
         named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
@@ -406,7 +405,7 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
     failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
     reasons = [
-        f"{' or '.join(one.cause.sentence for one in each.explanations)} "
+        f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
         f"(explains {len(each.motions)} of {failing} failing motions)"
         for each in named
     ]
@@ -432,7 +431,7 @@ def verify_program(
     checks: Sequence[str],
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
-    method: Method | None = None,
+    method: EngineMethod | None = None,
 ) -> Verification:
     """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
 

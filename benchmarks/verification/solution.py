@@ -40,7 +40,7 @@ class Equations:
     and q'; `damping` is an additional one, 1/s. Each but `reaction` is a number, or (B,). `spinning` (3, 3) is the inertia of
     the gyroscopic term. `fixed` (3, 3) is a tensor, kg m^2, whose components are kept in world axes, so that it does not turn
     with the body. With `half_turned` the inertia in world axes is R J instead of R J R'. With `left` q' = w q / 2. `tolerance`
-    is the error of solutions in a stretch.
+    is the error of solutions in a stretch, and `most` the number of stretches after which a motion ends.
     """
 
     scene: Scene
@@ -54,6 +54,7 @@ class Equations:
     left: bool = False
     spinning: Array | None = None
     half_turned: bool = False
+    most: float = math.inf
 
     def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Callable[[Array], Array]:
         """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
@@ -163,7 +164,9 @@ class Equations:
         with np.errstate(all="ignore"):
             size = max(size, float(np.sqrt(np.abs(self.at(np.array([start]))(y[:, :, None])[4:]).max())))
             length = first = min(ANGLE / size, max(end - start, 1e-300), smooth.step)
-            while a < end:
+            left = self.most
+            while a < end and left > 0:
+                left -= 1
                 after = breaks[0] if breaks else math.inf
                 b = min(a + length, after, end)
                 b = min(after, end) if min(after, end) - b < 0.01 * length else b

@@ -27,7 +27,7 @@ from .solution import Equations, truth
 
 SLOWEST, FASTEST = 0.5, 1.1  # times are scaled by at least, and at most
 AHEAD = 8  # steps that a motion runs ahead of a habit
-_DEFAULTS = {each.name: each.default for each in fields(Equations) if each.name not in ("scene", "tolerance")}
+_DEFAULTS = {each.name: each.default for each in fields(Equations) if each.name not in ("scene", "tolerance", "most")}
 
 
 def compose(*mistakes: Mistake, remark: str = "") -> Trial:
@@ -49,9 +49,7 @@ def fits(mistake: Mistake, case: Compared) -> bool:
     return True
 
 
-def equations_of(
-    mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], tolerance: float | None = None
-) -> Equations | None:
+def equations_of(mistakes: Sequence[Mistake], scene: Scene, values: dict[str, Any], **limits: float) -> Equations | None:
     """Return the equations with mistakes in the scene and in the equations; None if a mistake makes no difference."""
     changes: dict[str, Any] = {}
     for each in mistakes:
@@ -70,7 +68,7 @@ def equations_of(
             if made is None:
                 return None
             changes |= {name: getattr(made, name) for name, value in _DEFAULTS.items() if getattr(made, name) is not value}
-    return Equations(scene, **changes) if tolerance is None else Equations(scene, tolerance=tolerance, **changes)
+    return Equations(scene, **changes, **limits)
 
 
 def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
@@ -82,10 +80,11 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
     own = any(each.numbers for each in mistakes if isinstance(each, SceneMistake))
     numbers = [number for each in mistakes for number in each.numbers]
     starts = any(isinstance(each, SceneMistake) and each.start for each in mistakes)
-    tolerance = case.equations().tolerance
+    exactly = case.equations()
 
     def equations(p: Array) -> Equations | None:
-        return equations_of(moved, case.scene, dict(zip((number.name for number in numbers), p, strict=True)), tolerance)
+        return equations_of(moved, case.scene, dict(zip((number.name for number in numbers), p, strict=True)),
+                            tolerance=exactly.tolerance, most=exactly.most)  # fmt: skip
 
     probe = np.array([number.start + 0.5 for number in numbers])  # at the start the scene does not change
     if any(each.numbers and each.change(case.scene, *(number.start + 0.5 for number in each.numbers)) is None

@@ -206,7 +206,7 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
         yield verify_program(text, read_program(text, "program"), checks, pairs, tell)
         return
     try:
-        first, *others = select([text])
+        first, *others = list[Any](select([text]))
     except UnusableProgram:  # which is a finding
         yield verify_program(text, program, checks, pairs, tell)
         return

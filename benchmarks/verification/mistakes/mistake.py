@@ -32,6 +32,8 @@ class Mistake:
         Numbers that are fitted.
     remedy
         What an author of a program changes; "" if the sentence says it.
+    option
+        What a reader of a file changes in the command; "" if there is nothing.
     kind
         Name of the kind, which is the name of the module, except for rows (`habits`).
     """
@@ -41,3 +43,4 @@ class Mistake:
     sentence: str
     numbers: tuple[Number, ...] = field(default=(), kw_only=True)
     remedy: str = field(default="", kw_only=True)
+    option: str = field(default="", kw_only=True)

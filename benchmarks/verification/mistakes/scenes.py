@@ -237,6 +237,6 @@ class OtherBody(Mistake):
 
 
 BODIES = (
-    OtherBody("other moments", "It is the motion of another body. {text}. Correct --body"),
-    OtherBody("another body", "It is the motion of another body, with {text}. Correct --body"),
+    OtherBody("other moments", "It is the motion of another body. {text}", option="correct --body"),
+    OtherBody("another body", "It is the motion of another body, with {text}", option="correct --body"),
 )

@@ -116,7 +116,7 @@ def _find_sizes(path: Path, layout: Layout, kind: str, names: Sequence[str], opt
 def _find_looks(layout: Layout) -> list[str]:
     """Return the columns that are not used and look like parts of the motion."""
     found, whole = list[str](), {name: split_name(name)[0] for name in layout.unused}
-    sets = Counter(key[:-1] for key in whole.values() if re.fullmatch("q[a-z]*[wxyz0-4]", key))
+    sets = Counter(key[:-1] for key in whole.values() if re.fullmatch("q(?!pos|vel)[a-z]*[wxyz0-4]", key))
     for name, key in whole.items():
         last = split_name(re.split(r"[./:]", name)[-1])[0]
         last = last if len(last) > 2 else key

@@ -34,6 +34,7 @@ from .table import Recording
 MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
 ROUND_OFF = 2e-15  # of an exact motion
 ROWS_OF_NOISE = 4000  # rows that noise is estimated from
+CLEARLY = 2.0  # times what is allowed, that half of the single rows that are off have as their error
 QUARTER = math.pi / 2  # rad from row to row, above which differences of high order of a motion do not fall
 
 
@@ -305,8 +306,11 @@ def _late(case: Compared) -> bool:
 
 def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple[int, float, float]]:
     """Return number, time and error of rows that are off while at least 98 of 100 others agree."""
-    off = np.flatnonzero((errors > case.allowed[:, None]).any(axis=0))
-    if not 0 < len(off) <= 0.02 * len(case.t) or 0 in off:
+    wrong = (errors > case.allowed[:, None]).any(axis=0)
+    off, rest = np.flatnonzero(wrong), case.take(~wrong)
+    if not 0 < len(off) <= 0.02 * len(case.t) or 0 in off or not rest.passes(errors[:, ~wrong]) or _late(rest):
+        return []
+    if np.median((errors[:, off] / case.allowed[:, None]).max(axis=0)) < CLEARLY:
         return []
     return [(recording.number(k), float(case.t[k]), float(errors[:, k].max())) for k in off]
 

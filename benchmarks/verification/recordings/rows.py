@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Cleaner:
 
     def continue_times(self, values: Array) -> tuple[Array, Array]:
         """Return rows whose times go on where a counter began again, with the time as one number, and their numbers."""
-        numbers = self.rows + 1 + np.arange(len(values))
+        numbers: Array = self.rows + 1 + np.arange(len(values))
         self.rows += len(values)
         values = self.layout.join_time(values)
         timed = ~np.isnan(values[:, 0])
@@ -80,7 +81,7 @@ class Cleaner:
             inside &= t <= self.options.end_time
         self.left[OUTSIDE] += int((~inside).sum())
         values, numbers = values[inside], numbers[inside]
-        gaps = np.isnan(values[:, :width]).any(axis=1)
+        gaps: Array = np.isnan(values[:, :width]).any(axis=1)
         self.left[GAP] += int(gaps.sum())
         if len(gaps):
             trailing = int(np.argmin(gaps[::-1])) if not gaps.all() else len(gaps)
@@ -101,12 +102,13 @@ class Cleaner:
         rest, kind = values[:, 1 + len(self.layout.used["rates"]) :], self.layout.attitude
         none = np.zeros(len(values), bool)
         with np.errstate(all="ignore"):
-            return {
+            bad: dict[str, Any] = {
                 "a value that is not a finite number": ~np.isfinite(values).all(axis=1),
                 f"a value beyond {LARGEST:g}": (np.abs(values) > LARGEST).any(axis=1),
                 "a quaternion of norm 0": np.linalg.norm(rest, axis=1) < 1e-3 if kind == "quaternion" else none,
                 "a matrix that is not a rotation": (np.linalg.det(rest.reshape(-1, 3, 3)) < 1e-3 if kind == "matrix" else none),
             }
+        return bad
 
     def _refuse(self, values: Array, numbers: Array) -> None:
         """Raise `BadInput` for a row without a motion, or a time that is not later than the one before."""

@@ -188,6 +188,14 @@ def test_numbers_of_a_mistake_are_fitted():
     assert not find_causes(links, replace(wanted, com=wanted.com + 0.01 * np.array([1, -2, 3])), 1e-6)
 
 
+def test_the_error_of_an_engine_is_relative_to_the_inertia_that_it_has():
+    """Newton raises 1e-12 to 1e-6 kg m^2 in single precision, with an error as large as the inertia of the file."""
+    links = read_links(CATALOGUE / "moments_1e-12.urdf")
+    wanted = join_links(links)
+    (cause,) = find_causes(links, replace(wanted, inertia=1e-6 * np.eye(3) + wanted.inertia), 1e-2)
+    assert cause.keys == ("moments raised",)
+
+
 def test_mistakes_of_loaders_are_in_the_table_of_all():
     for each in (*LOADED, *FITTED):
         assert BY_KEY[each.key].sentence == each.sentence

@@ -1,4 +1,4 @@
-"""The limits of verdicts, each from both sides. A limit that is moved by a factor of two fails here, unless another one is noted.
+"""The limits of verdicts, each from both sides: one that is moved by a factor of two fails here.
 
 Recordings start as the scene does, so that no fit hides what was added to the exact motion, and mistakes are not searched for.
 """
@@ -46,7 +46,7 @@ def moved(size, rows=slice(None)):
     return out
 
 
-def noise(size, n=len(T), seed=5):
+def noise(size, n=501, seed=5):
     """Noise of rates, relative to the largest, in each axis."""
     return size * SCALE * np.random.default_rng(seed).normal(size=(n, 3))
 

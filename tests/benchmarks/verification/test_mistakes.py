@@ -1,14 +1,20 @@
 """Mistakes of programs, planted into equations that SciPy integrates, are named on short motions, and again on others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
+import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
-from conservative.benchmarks.verification.compare import compare_answers
+from conservative.benchmarks.verification.compare import Compared, compare_answers
 from conservative.benchmarks.verification.explain import PROGRAM_KINDS, diagnose
 from conservative.benchmarks.verification.mistakes import BY_KEY, table_of
 from conservative.benchmarks.verification.motions.motion import load
+from conservative.benchmarks.verification.trials import compose
+from conservative.references.exact.method import free_body
 
 MOTIONS = {each.name: each for each in load()}
 NAMES = ("golden_9", "golden_4", "products")
@@ -129,3 +135,54 @@ def test_a_planted_mistake_of_a_program_is_named(name, key):
 def test_a_key_is_there_once():
     with pytest.raises(ValueError, match="'transposed' twice"):
         table_of([*BY_KEY.values(), BY_KEY["transposed"]])
+
+
+def test_a_named_mistake_explains_another_motion_with_the_same_number():
+    first = diagnose(answers(MOTIONS["golden_9"], damping=0.1), kinds=PROGRAM_KINDS).named[0]
+    again = first.again(answers(MOTIONS["golden_4"], damping=0.1))
+    assert (again.cause.key, again.explains, again.values) == ("damping", True, first.values)
+    assert max(again.left) < 1e-9 < 1e-3 < max(again.plain)  # measured: 2e-11 of 0.009
+    other = first.again(answers(MOTIONS["golden_4"], turn=2.0))
+    assert not other.explains
+    missing = replace(first, trial=compose(BY_KEY["without the field"]), values={})
+    assert missing.again(answers(MOTIONS["golden_9"])) is None  # a free body has no field
+
+
+T = np.linspace(0, 8, 401)
+BODY = cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.0, 0.3], [-0.2, 0.3, 4.0]])
+SCENE = cv.Scene("recorded", BODY, Rotation.from_rotvec([0.4, -0.7, 0.3]), [0.7, -1.1, 1.6], 8.0)
+R, W = free_body(BODY, SCENE.R_WB0, SCENE.w_WB_B0, T)
+TURN = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+STOP = 150
+EVEN = (np.arange(len(T)) % 2 == 1)[:, None]
+
+
+def still():
+    k = np.minimum(np.arange(len(T)), STOP)
+    return R[k], np.where(np.arange(len(T))[:, None] < STOP, W, 0.0)
+
+
+RECORDED = {
+    "sleep": (still, {"time": T[STOP]}),
+    "held rows": (lambda: (R[2 * (np.arange(len(T)) // 2)], W[2 * (np.arange(len(T)) // 2)]), {"first": 2, "period": 2}),
+    "one component in some rows": (lambda: (R, np.where(EVEN, W[:, :1], W)), {"first": 2, "period": 2}),
+    "order xyzw in some rows": (lambda: (np.where(EVEN[:, None], rolled(R, W)[0], R), W), {"first": 2, "period": 2}),
+    "rates in turned axes": (lambda: (R, W @ TURN), dict(zip(("turn_1", "turn_2", "turn_3"), (0.3, -0.8, 0.5), strict=True))),
+    "rates in mirrored axes": (lambda: (R, W * (1, 1, -1)), {"turn_1": 0.0, "turn_2": 0.0, "turn_3": np.pi}),
+    "bias of the rates": (lambda: (R, W + np.array([0.01, 0.02, -0.03])), {"bias_1": 0.01, "bias_2": 0.02, "bias_3": -0.03}),
+    "frozen motion": (lambda: (0 * R + R[0], 0 * W + W[0]), {}),
+    "no gyroscopic term": (lambda: (None, 0 * W + W[0]), {}),
+}
+
+
+@pytest.mark.parametrize("key", RECORDED)
+def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key):
+    make, values = RECORDED[key]
+    data, allowed = make(), np.full(2, 1e-9)
+    case = Compared(SCENE, T, data, 0.0, float(np.linalg.norm(W, axis=1).max()), allowed, np.full(2, 1e-13))
+    for some in (case, case.take(slice(0, 301))):
+        found = diagnose(some).named
+        assert [each.name for each in found if each.explains] == [key]
+        assert {name: abs(x) for name, x in found[0].values.items()} == pytest.approx(
+            {name: abs(x) for name, x in values.items()}, rel=1e-6, abs=1e-9
+        )

@@ -17,7 +17,7 @@ def read(start: Start) -> Table | None:
         return None
     separator, fields = _separate(lines[first]) or (",", [])
     comma = separator != "," and any(re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", each) for each in fields)
-    names, before = [], [line.strip() for line in lines[:first] if line.strip()]
+    names, before = list[str](), [line.strip() for line in lines[:first] if line.strip()]
     for line in reversed(before):
         header = words(line.lstrip("#% "), separator)
         if len(header) == len(fields) + (line.lstrip().startswith(("#", "%")) and header[:1] == [""]):
