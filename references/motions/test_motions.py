@@ -72,7 +72,7 @@ def distance(found, limit, known):
 
 tested: list[str] = []
 # Of each motion that fails: the mistakes that explain it with their distances, and the exponent of the step.
-failing: dict[str, tuple] = {}
+failing: dict[str, tuple[dict[str, float], float]] = {}
 
 
 @pytest.mark.parametrize("path", sorted(Path(__file__).parent.glob("*.json")), ids=lambda path: path.stem)

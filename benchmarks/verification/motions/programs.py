@@ -56,7 +56,7 @@ def single(motion: Motion) -> float:
     """
     exact, J = motion.exact, np.linalg.eigvalsh(motion.inertia_B)
     momentum = np.linalg.norm(exact["momentum_W"], axis=1).max() / np.linalg.norm(exact["w_WB_B"], axis=1).max()
-    return float(2e-5 + 1e-6 * motion.steps * motion.samples * PARTS[-1] * max(1.0, momentum / J[0] / 3))
+    return float(2e-5 + 1e-6 * motion.steps * motion.samples * PARTS[-1] * (1 + momentum / J[0] / 3))
 
 
 def _round_up(x: Array) -> Array:

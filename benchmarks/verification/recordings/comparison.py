@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -145,6 +146,8 @@ def _find_noise(
     t, data, *_ = next(recording.stream())
     t, data = t[:ROWS_OF_NOISE], take_rows(data, slice(0, ROWS_OF_NOISE))
     sizes = np.array([1.0, scale])
+    resolved: Any
+    other: Any
     noise, resolved = estimate_noise(t, data)
     if (SIGMAS * noise / sizes > digits).any() and len(t) >= 14:
         n = len(t) if closed(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))

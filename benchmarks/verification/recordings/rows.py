@@ -45,9 +45,9 @@ class Cleaner:
     before: float = -math.inf  # the last time of the file, with its wraps
     last: Array = field(default_factory=lambda: np.empty(0))  # the last row that is kept
 
-    def continue_times(self, values: Array) -> tuple[Array, Array]:
+    def continue_times(self, values: Array) -> tuple[Array, Any]:
         """Return rows whose times go on where a counter began again, with the time as one number, and their numbers."""
-        numbers: Array = self.rows + 1 + np.arange(len(values))
+        numbers: Any = self.rows + 1 + np.arange(len(values))
         self.rows += len(values)
         values = self.layout.join_time(values)
         timed = ~np.isnan(values[:, 0])
@@ -67,7 +67,7 @@ class Cleaner:
             self.offset, self.before = float(moved[-1]), float(values[-1, 0])
         return values, numbers
 
-    def choose(self, values: Array, numbers: Array) -> tuple[Array, Array]:
+    def choose(self, values: Array, numbers: Any) -> tuple[Array, Any]:
         """Return the rows that are compared, of those that `continue_times` returned, and their numbers.
 
         Raises `BadInput` for a row that is no gap and has no motion.
@@ -81,7 +81,7 @@ class Cleaner:
             inside &= t <= self.options.end_time
         self.left[OUTSIDE] += int((~inside).sum())
         values, numbers = values[inside], numbers[inside]
-        gaps: Array = np.isnan(values[:, :width]).any(axis=1)
+        gaps: Any = np.isnan(values[:, :width]).any(axis=1)
         self.left[GAP] += int(gaps.sum())
         if len(gaps):
             trailing = int(np.argmin(gaps[::-1])) if not gaps.all() else len(gaps)
@@ -110,7 +110,7 @@ class Cleaner:
             }
         return bad
 
-    def _refuse(self, values: Array, numbers: Array) -> None:
+    def _refuse(self, values: Array, numbers: Any) -> None:
         """Raise `BadInput` for a row without a motion, or a time that is not later than the one before."""
         layout, allowed = self.layout, "a file in which that row is repaired or removed"
         names = np.array([", ".join(layout.used["time"]), *layout.columns[len(layout.used["time"]) :]])

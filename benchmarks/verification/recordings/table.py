@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class Recording:
     layout: Layout = field(default_factory=lambda: Layout([]))
     options: Options = field(default_factory=Options)
     path: Path | None = None
-    numbers: Array | None = None
+    numbers: Any = None
     left: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     ended: int = 0
     others: Sequence[Other] = ()
@@ -58,9 +59,9 @@ class Recording:
         """Return a description of rows after the name of the file."""
         return text if self.path is None else f"{self.path}: {text}"
 
-    def number(self, row: int) -> int:
+    def number(self, row: Any) -> int:
         """Return the number in the file, from 1, of a row that is kept."""
-        return row + 1 if self.numbers is None else int(self.numbers[row])
+        return int(row) + 1 if self.numbers is None else int(self.numbers[row])
 
     def doubt(self, error: float | None) -> str:
         """Return the sentence on parts of the file that were not compared, or that differ from those that were; or ""."""
@@ -72,7 +73,7 @@ class Recording:
                 return f"{', '.join(other.names)} are {other.text}, and not the attitude that is compared. --columns decides"
         return self.layout.doubt
 
-    def stream(self) -> Iterator[tuple[Array, States, Array | None, Array]]:
+    def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
         """Yield times, motion, shape and numbers of all rows, in chunks."""
         if self.path is None or self.rows == len(self.t):
             numbers = 1 + np.arange(len(self.t)) if self.numbers is None else self.numbers

@@ -87,11 +87,9 @@ def verify_two(
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
         try:
             rows[name] = prepare(rotation_only(started), recording, from_row, error)
-            made[name] = verify_recording(
-                started, recording, from_row, error, lambda what, of=name: tell(f"{of}: {what}"), name
-            )
+            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
         except BadInput as refused:
-            if refused.argument != "run" or name in refused.got:
+            if refused.argument != "run" or name in str(refused.got):
                 raise
             raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
     tell("difference")
@@ -149,6 +147,10 @@ def _reason(a: Verification, b: Verification, found: Difference) -> str:
 def _order(each: Verification) -> bool:
     """Sort the right one before the other one."""
     return each.verdict is not Verdict.RIGHT
+
+
+def _labelled(tell: Callable[[str], None], name: str) -> Callable[[str], None]:
+    return lambda what: tell(f"{name}: {what}")
 
 
 def _missing(named: Named) -> int:
