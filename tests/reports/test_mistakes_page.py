@@ -12,29 +12,34 @@ REASONS = {
     *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, mistakes.NO_CLOCK, "it does not change the rates",
     "no exact motion shows it", "rates of a body in a field do not determine its motion",
 }  # fmt: skip
-QUICK = ("transposed", "rates in degrees", "no gyroscopic term", "wrong side", "held rows", "time in ms")
+QUICK = ("transposed", "no gyroscopic term", "held rows")
 
 
 def test_the_page_has_a_row_for_each_mistake_of_the_catalogue_and_a_cell_for_each_door():
     assert list(PAGE) == list(BY_KEY)
     assert {len(row) for row in PAGE.values()} == {1 + len(mistakes.DOORS)}
-    answers = {mistakes.NAMED, mistakes.WITH_OTHERS, mistakes.NOT_NAMED, "right", "undecided"} | REASONS
+    answers = {mistakes.NAMED, mistakes.WITH_OTHERS, mistakes.NOT_NAMED, mistakes.NOT_MEASURED, "right", "undecided"} | REASONS
     other = {cell for row in PAGE.values() for cell in row[1:]} - answers
     assert {key for cell in other for key in re.fullmatch(r"as `(.*)`", cell)[1].split(" + ")} <= set(BY_KEY)
 
 
 def test_test_files_name_what_the_page_says():
-    assert {key: row[4] for key, row in PAGE.items()} == {key: mistakes.in_test_files(key) for key in BY_KEY}
+    found = {key: row[4] for key, row in PAGE.items() if row[4] != mistakes.NOT_MEASURED}
+    assert found == {key: mistakes.in_test_files(key) for key in found}
 
 
 @pytest.mark.parametrize("key", [pytest.param(key, marks=[pytest.mark.slow] * (key not in QUICK)) for key in BY_KEY])
 def test_a_planted_mistake_is_named_in_a_recording_as_the_page_says(key):
-    assert [mistakes.in_recording(key), mistakes.in_recording(key, attitudes=False)] == PAGE[key][1:3]
+    for cell, attitudes in zip(PAGE[key][1:3], (True, False), strict=True):
+        if cell != mistakes.NOT_MEASURED:
+            assert mistakes.in_recording(key, attitudes) == cell
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", BY_KEY)
 def test_a_planted_mistake_is_named_in_a_program_as_the_page_says(key):
+    if PAGE[key][3] == mistakes.NOT_MEASURED:
+        pytest.skip("not measured")
     assert mistakes.in_program(key) == PAGE[key][3]
 
 
