@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array, to_quaternion
 
 from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
-from .explanation import PROVEN, Explanation, Trial, attempt, explain
+from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import RULES, align, integrate
@@ -216,13 +216,18 @@ def _units(case: Compared, asked: _Asked) -> Found:
 
 
 def _moves(case: Compared, found: Explanation | None) -> bool:
-    """Return whether a motion differs from standing still: what only shrinks the motion explains nothing."""
+    """Return whether a motion differs from standing still: what only shrinks the motion explains nothing.
+
+    The error of a program is proportional to what it moves, however little its tolerance tells.
+    """
     if found is None or found.made is None:
         return False
     some = case.take(slice(0, len(found.made[0])))
     still = _still(some)
-    least = np.maximum(SHOWN * some.allowed, SHRUNK * some.apart(some.exact, still))
-    return bool((some.apart(found.made, still) > least).any())
+    moved, whole = some.apart(found.made, still), some.apart(some.exact, still)
+    if case.step is None:
+        return bool((moved > np.maximum(SHOWN * some.allowed, SHRUNK * whole)).any())
+    return bool(((moved > SHRUNK / 2 * whole) & (np.array(found.left) < HALF * moved)).any())
 
 
 def _still(case: Compared) -> tuple[Array, Array]:
@@ -630,7 +635,7 @@ def _several(case: Compared, asked: _Asked) -> Found:
     ranked = []
     start = case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t)
     for first, second in product(moved, times):
-        if second and second[0].unit and case.turned * second[0].unit > LONGEST:
+        if second and second[0].unit and not case.allowed.max() < case.turned * second[0].unit <= LONGEST:
             continue
         motion = compose(*first, *second).build(case) if first or second else exact(case)
         if motion is None:
@@ -673,7 +678,7 @@ SEARCHES = {
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
-    "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.05, ends=True),
+    "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
     "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),

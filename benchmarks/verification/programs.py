@@ -63,6 +63,8 @@ REFITS = 4
 """Largest number of motions that make the numbers of a mistake more precise."""
 CLEAR = 2.0
 """Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
+ALIKE, ROUNDED = 3.0, 1e-9
+"""Mistakes explain equally well if they leave shares within this factor; smaller shares are rounding."""
 LEAST = 0.1
 """Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
 Solve = Callable[[Scene, Grid], Trajectory]
@@ -230,15 +232,18 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
         if not searched or (named and len(rest) < LEAST * len(failing)):
             break
         each = searched.pop(0)
-        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains][:CANDIDATES]
-        scored = [(one, *_explained(one, list(rest.values()), right)) for one in found]
-        if not scored:
+        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains]
+        found = sorted(found, key=lambda one: (one.numbers, len(one.keys), one.share))[:CANDIDATES]  # the simplest first
+        applied = [_apply(one, list(rest.values()), right) for one in found]
+        if not applied or max(one.score for one in applied) <= 0:
             continue
-        best = max(scored, key=lambda one: (one[2], -one[0].numbers))
-        equal = [one for one in scored if (one[1], one[2], one[0].numbers) == (best[1], best[2], best[0].numbers)]
-        names, before = best[1], named.get(keys := tuple(one[0].keys for one in equal))
+        best = max(applied, key=lambda one: one.rank)
+        good = [one for one in applied if (one.motions, one.rank) == (best.motions, best.rank)]
+        least = min(one.share for one in good)
+        equal = [one for one in good if one.share <= ALIKE * max(least, ROUNDED)]
+        names, before = best.motions, named.get(keys := tuple(one.explanation.keys for one in equal))
         # Numbers of the first search stand: it had the motions that show them best.
-        explanations = before.explanations if before else tuple(one[0] for one in equal)
+        explanations = before.explanations if before else tuple(one.explanation for one in equal)
         named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
         for name in names:
             del rest[name]
@@ -250,9 +255,27 @@ def _rank(ran: Ran) -> tuple[bool, bool, float]:
     return bool(ran.motion.needs), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
 
 
-def _explained(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> tuple[list[str], int]:
-    """Return the failing motions that a mistake explains, and their number less the right ones that it would make wrong."""
-    names, best, refits = list[str](), one, 0
+@dataclass(frozen=True)
+class Applied:
+    """A mistake that was applied to all motions: the failing ones that it explains, and the mean share of the errors it leaves.
+
+    `score` is the number of these motions, less the right ones that it would make wrong.
+    """
+
+    explanation: Explanation
+    motions: tuple[str, ...]
+    score: int
+    share: float
+
+    @property
+    def rank(self) -> tuple[int, int, int]:
+        """What explains more is better, then fewer fitted numbers, then fewer mistakes."""
+        return self.score, -self.explanation.numbers, -len(self.explanation.keys)
+
+
+def _apply(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> Applied:
+    """Return a mistake that was found in one motion, applied to all."""
+    names, shares, best, refits = list[str](), list[float](), one, 0
     for each in sorted(failing, key=lambda each: each.ratio):
         again = best.again(each.case)
         if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
@@ -260,11 +283,12 @@ def _explained(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -
             best, again = (refined, refined) if refined is not None and refined.explains else (best, again)
         if again is not None and again.explains:
             names.append(each.motion.name)
+            shares.append(again.share)
     refuted = sum(
         (again := best.again(each.case)) is not None and bool((np.array(again.left) > OWN_ERROR * each.allowed).any())
         for each in right
     )
-    return names, len(names) - refuted
+    return Applied(best, tuple(names), len(names) - refuted, float(np.mean(shares)) if shares else math.inf)
 
 
 def _is_generic(motion: Motion) -> bool:
