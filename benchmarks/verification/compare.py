@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.needs import IN_TIME
 from conservative.scene import Scene
 
@@ -303,6 +303,15 @@ class Compared:
         """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
         R0, w0 = self.scene.R_WB0 @ Rotation.from_rotvec(initial[:3]).as_matrix(), self.scene.w_WB_B0 + initial[3:] * self.scale
         return replace(self, scene=self.scene.rename(self.scene.name, R_WB0=R0, w_WB_B0=w0))
+
+
+def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
+    """Return the largest angle of attitudes (n, 3, 3), rad, or difference of rates (n, 3) over the largest rate; inf for nan."""
+    scale = float(np.linalg.norm(one[1], axis=1).max()) or 1.0
+    with np.errstate(all="ignore"):
+        rates = np.linalg.norm(one[1] - other[1], axis=1).max() / scale
+        apart = max(float(np.max(angle_between(one[0], other[0]))), float(rates))
+    return apart if math.isfinite(apart) else math.inf
 
 
 def compare_answers(scene: Scene, t: Array, data: States, allowed: Array, step: float | None = None) -> Compared:

@@ -20,6 +20,7 @@ from conservative.errors import IntegrationFailed
 from conservative.method import Method
 from conservative.references.worker.client import EngineCrashed, EngineError
 
+from ..compare import largest_difference
 from ..finding import Finding, Verdict
 from .pairs import OF_INERTIA, PAIRS, Description, Pair, Samples, frame_back, to_principal
 from .runner import NotAvailable, Runner, run, runner_of
@@ -127,14 +128,10 @@ class PairFinding(Finding):
 
 
 def difference(one: Samples, other: Samples) -> float:
-    """Return the largest angle between two motions, rad, or difference of rates over the largest rate; inf if not finite."""
-    if len(one[0]) != len(other[0]):  # only the ends are the same times
+    """Return the largest difference of two motions; of their ends, if only these are the same times."""
+    if len(one[0]) != len(other[0]):
         one, other = ((R[[0, -1]], w[[0, -1]]) for R, w in (one, other))
-    scale = float(np.abs(one[1]).max()) or 1.0
-    with np.errstate(all="ignore"):
-        rates = np.abs(one[1] - other[1]).max() / scale
-        apart = max(float(np.max(angle_between(one[0], other[0]))), float(rates))
-    return apart if math.isfinite(apart) else math.inf
+    return largest_difference(one, other)
 
 
 class FirstFailed(Exception):
