@@ -306,7 +306,7 @@ class Compared:
 
 
 def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
-    """Return the largest angle of attitudes (n, 3, 3), rad, or difference of rates (n, 3) over the largest rate; inf for nan."""
+    """Return the largest angle of attitudes, rad, or difference of rates over the largest rate, of two motions; inf for nan."""
     scale = float(np.linalg.norm(one[1], axis=1).max()) or 1.0
     with np.errstate(all="ignore"):
         rates = np.linalg.norm(one[1] - other[1], axis=1).max() / scale

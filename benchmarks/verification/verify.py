@@ -19,6 +19,7 @@ from conservative.programs import list_programs
 from conservative.scene import Scene
 
 from .finding import CHECKS, Verification
+from .recordings.formats import ENDINGS
 
 if TYPE_CHECKING:
     from conservative.method import Method
@@ -51,11 +52,12 @@ MODELS = (".urdf", ".sdf", ".mjcf", ".xml", ".usd", ".usda", ".usdc", ".usdz")
 
 @dataclass(frozen=True)
 class Subject:
-    """A subject as the user wrote it, its kind, and its file or None."""
+    """A subject as the user wrote it, its kind, its file or None, and whether the user named its folder only."""
 
     text: str
     kind: Kind
     path: Path | None = None
+    in_folder: bool = False
 
 
 def kind_of(text: str) -> Kind:
@@ -97,20 +99,15 @@ def expand(texts: Sequence[str]) -> list[Subject]:
     subjects = []
     for text in texts:
         if (folder := Path(text)).is_dir():
-            files = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in (*MODELS, *TABLES))
+            endings = (*ENDINGS, *MODELS)
+            files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(endings))
             if not files:
-                raise BadInput(
-                    "subject", f"the folder {text!r}", f"a folder with files that end in {', '.join((*TABLES, *MODELS))}"
-                )
-            subjects += [Subject(str(path), kind_of(str(path)), path) for path in files]
+                raise BadInput("subject", f"the folder {text!r}", f"a folder with files that end in {', '.join(endings)}")
+            subjects += [Subject(str(path), kind_of(str(path)), path, in_folder=True) for path in files]
         else:
             kind = kind_of(text)
             subjects.append(Subject(text, kind, Path(text) if kind in (Kind.RECORDING, Kind.MODEL) else None))
     return subjects
-
-
-TABLES = (".csv", ".tsv", ".txt", ".dat", ".a", ".json", ".jsonl", ".ndjson", ".parquet", ".gz")
-"""Suffixes of recordings in a folder."""
 
 
 def verify(
@@ -175,8 +172,10 @@ def verify(
         from .bodies import verify_files
 
         results += verify_files(files, engines, tell, search)
-    if tables := [each.path for each in found if each.kind is Kind.RECORDING and each.path]:
-        results += _verify_recordings(tables, body, start, error, tell, reading)
+    recordings = [each for each in found if each.kind is Kind.RECORDING]
+    if tables := [each.path for each in recordings if each.path]:
+        together = len(tables) == 2 and not any(each.in_folder for each in recordings)
+        results += _verify_recordings(tables, together, body, start, error, tell, reading)
     for each in found:
         if each.kind is Kind.PROGRAM:
             results += _verify_program(each.text, only, pairs, tell)
@@ -218,9 +217,15 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
 
 
 def _verify_recordings(
-    files: Sequence[Path], body: str | Scene | None, start: str, error: float | None, tell: Tell, reading: Mapping[str, Any]
+    files: Sequence[Path],
+    together: bool,
+    body: str | Scene | None,
+    start: str,
+    error: float | None,
+    tell: Tell,
+    reading: Mapping[str, Any],
 ) -> Iterator[Verification]:
-    """Yield the verification of each recording; of two recordings one, which also compares them."""
+    """Yield the verification of each recording, or of two together, which are also compared with each other."""
     from .recordings import table, verdict
     from .recordings.layout import Options
 
@@ -229,7 +234,7 @@ def _verify_recordings(
     scene = registry.scene(body) if isinstance(body, str) else body
     from_row = start == "row"
     recordings = [(path.name, table.read(path, Options(**reading))) for path in files]
-    if len(recordings) == 2:
+    if together:
         from .recordings.two import verify_two
 
         first, second = recordings

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from conservative.benchmarks.verification.finding import Verdict, Verification
 from conservative.benchmarks.verification.recordings.two import Two
-from conservative.benchmarks.verification.recordings.verdict import Details, Unit
+from conservative.benchmarks.verification.recordings.verdict import Details
 
 from ..document.cells import bound
 from ..document.model import Block, Items, Paragraph, Section, Table, filled
@@ -22,14 +20,14 @@ def recording_blocks(verification: Verification) -> list[Block]:
     (finding,) = verification.findings
     sentences = []
     if finding.by == "noise" and max(details.noise) > 0:
-        sentence = f"The noise of an axis is {_amount(details.noise, details.units)}"
+        sentence = f"The noise of an axis is {details.show(details.noise)}"
         if max(details.first_row) > 0:
-            sentence += f"; from the first row alone the motion is off by {_amount(details.first_row, details.units)}"
+            sentence += f"; from the first row alone the motion is off by {details.show(details.first_row)}"
             sentence += ", so its start is fitted"
         sentences.append(f"{sentence}.")
     proven, candidates = details.explaining, details.candidates
     left = [
-        f"{each.sentence}: leaves {_amount(each.left, details.units)} of {_amount(each.plain, details.units)}"
+        f"{each.sentence}: leaves {details.show(each.left)} of {details.show(each.plain)}"
         for each in (proven if len(proven) > 1 else candidates)
     ]
     heading = "These explain the file equally well:" if len(proven) > 1 else ""
@@ -42,13 +40,13 @@ def recording_blocks(verification: Verification) -> list[Block]:
         f"Not used: {', '.join(name for name, why in details.unused.items() if why == each)}: {each}." for each in reasons
     ]
     quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
-    tried = [[each.name, _amount(each.left, details.units)] for each in details.tried[:LISTED]]
+    tried = [] if proven else [[each.name, details.show(each.left)] for each in details.tried[:LISTED]]
     return filled(
         Paragraph(" ".join(sentences)) if sentences else None,
         Paragraph(heading) if heading else None,
         Items.of(left if heading else []),
         Table(["quantity", "largest", "at the end"], quantities),
-        Table(["mistake", "error that is left"], tried),
+        Table(["mistake that was tried", "error that is left"], tried),
         Items.of([*used, *unused, *verification.notes]),
     )
 
@@ -58,7 +56,3 @@ def two_blocks(verification: Verification) -> list[Block]:
     details = verification.details
     assert isinstance(details, Two)
     return [Section(f"{each.subject}: {each.verdict}", recording_blocks(each)) for each in (details.first, details.second)]
-
-
-def _amount(errors: Sequence[float], units: Sequence[Unit]) -> str:
-    return " and ".join(f"{bound(error * size)} {unit}" for error, (unit, size) in zip(errors, units, strict=True) if size)
