@@ -69,7 +69,7 @@ def test_the_folder_has_every_format_and_is_replaced_by_the_same_command_only(tm
     assert done.exit_code == 1
     text = " ".join(done.stdout.split())
     assert "; its largest error is 0.0047 deg/s; " in text
-    assert "run.csv is wrong: constant time shift: the file is +0.0005 s ahead of the exact motion after its first row (leaves" in text
+    assert "run.csv is wrong: constant time shift: the file is +0.0005 s ahead of the exact motion after its first row" in text
     assert sorted(path.name for path in out.iterdir()) == ["errors.csv", "errors.svg", "verify.csv", "verify.json", "verify.md"]
     table = pd.read_csv(out / "errors.csv")
     assert table["quantity"].unique().tolist() == ["rate error, deg/s", "drift of energy"]
