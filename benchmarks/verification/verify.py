@@ -112,11 +112,11 @@ def expand(texts: Sequence[str]) -> list[Subject]:
 
 def verify(
     subjects: str | os.PathLike[str] | Method | Sequence[str | os.PathLike[str] | Method],
-    body: str | Scene | None = None,
+    body: str | os.PathLike[str] | Scene | None = None,
     *,
-    engines: Sequence[str] = (),
-    only: Sequence[str] = (),
-    pairs: Sequence[str] = (),
+    engines: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    pairs: str | Sequence[str] = (),
     search: Sequence[Path] = (),
     start: str = "row",
     error: float | None = None,
@@ -159,11 +159,19 @@ def verify(
     """
     given = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
     methods: list[Any] = [each for each in given if not isinstance(each, str | os.PathLike)]
+    for each in methods:
+        from conservative.method import Method  # here: recordings need no kernels
+
+        if not isinstance(each, Method):
+            raise BadInput("subjects", repr(each), "a path, a name, a method, or a list of them")
+    engines, only, pairs = ([each] if isinstance(each, str) else each for each in (engines, only, pairs))
+    choice("start", start, ("row", "scene"))
     found = expand([os.fspath(each) for each in given if isinstance(each, str | os.PathLike)])
     for name in only:
         choice("only", name, tuple(CHECKS))
     kinds = {each.kind for each in found} | ({Kind.METHOD} if methods else set())
-    _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, error=error, **reading)
+    begin = None if start == "row" else start
+    _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, start=begin, error=error, **reading)
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
@@ -219,7 +227,7 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
 def _verify_recordings(
     files: Sequence[Path],
     together: bool,
-    body: str | Scene | None,
+    body: str | os.PathLike[str] | Scene | None,
     start: str,
     error: float | None,
     tell: Tell,
@@ -231,7 +239,7 @@ def _verify_recordings(
 
     if body is None:
         raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
-    scene = registry.scene(body) if isinstance(body, str) else body
+    scene = body if isinstance(body, Scene) else registry.scene(os.fspath(body))
     from_row = start == "row"
     recordings = [(path.name, table.read(path, Options(**reading))) for path in files]
     if together:

@@ -99,11 +99,11 @@ def _guess_band(w: Array, before: Array) -> tuple[float, ...]:
 
 
 def roundest(low: float, high: float) -> float:
-    """Return the number with the fewest digits above `low` and up to `high`."""
+    """Return the smallest number above `low` and up to `high` with the fewest digits."""
     for digits in range(16):
-        size = 10.0 ** (np.floor(np.log10(high)) - digits)
-        number = float(np.floor(high / size * (1 + 1e-12)) * size)
-        if number > low:
+        size = 10.0 ** (np.floor(np.log10(low)) - digits)
+        number = float((np.floor(low / size * (1 + 1e-12)) + 1) * size)
+        if number <= high * (1 + 1e-12):
             return float(f"{number:.15g}")
     return high
 

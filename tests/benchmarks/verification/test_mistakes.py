@@ -11,7 +11,7 @@ import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.verification.compare import Compared, compare_answers
 from conservative.benchmarks.verification.explain import PROGRAM_KINDS, diagnose
-from conservative.benchmarks.verification.mistakes import BY_KEY, table_of
+from conservative.benchmarks.verification.mistakes import BY_KEY, habits, table_of
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.trials import compose
 from conservative.references.exact.method import free_body
@@ -187,3 +187,12 @@ def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key):
         assert {name: abs(x) for name, x in found[0].values.items()} == pytest.approx(
             {name: abs(x) for name, x in values.items()}, rel=1e-6, abs=1e-9
         )
+
+
+def test_a_band_is_not_larger_than_what_it_removed_shows():
+    assert [habits.roundest(*each) for each in ((0.0499, 10), (0.0512, 0.0525), (0.97, 1.2), (0.05, 0.06))] == [
+        0.05,
+        0.052,
+        1,
+        0.06,
+    ]

@@ -4,11 +4,15 @@ import shlex
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from conservative.benchmarks.verification import programs, protocol
 from conservative.benchmarks.verification.finding import Verdict
+from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.verify import verify
+from conservative.errors import BadInput, IntegrationFailed
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.programs import program_class, read_program
 from conservative.references.worker import client
 from conservative.references.worker.client import close_workers
@@ -165,6 +169,15 @@ def test_a_program_that_does_not_answer_is_ended(monkeypatch):
     assert (wrong.verdict, wrong.detail) == (Verdict.WRONG, f"timeout (after 2 s): {protocol.ANSWERS}")
 
 
+def test_a_crash_in_any_motion_is_a_finding():
+    def crash(scene, grid):
+        failed = IntegrationFailed("crashed")
+        failed.outcome = Outcome(OutcomeKind.CRASHED)
+        raise failed
+
+    assert {programs.run_motion(crash, motion, np.ones(2)).ended for motion in load()} == {"the run ended early: crashed"}
+
+
 @pytest.mark.parametrize("limit", ["LARGEST_ANSWER", "PATIENCE"])
 def test_an_answer_without_an_end_is_ended_by_its_size_and_by_time(limit, monkeypatch):
     module, value, problem = {
@@ -179,3 +192,17 @@ def test_an_answer_without_an_end_is_ended_by_its_size_and_by_time(limit, monkey
 def test_two_mistakes_are_named_together():
     named = keys(verified(command(PLANTED, "euler", "x, y, z, w", "w in deg"), "motions"))
     assert max(named, key=named.get) == "order xyzw + rates in degrees"
+
+
+@pytest.mark.parametrize(
+    ("subjects", "options"), [(None, {}), ([3], {}), ("taylor", {"start": "scene"}), ("taylor", {"start": "end"})]
+)
+def test_arguments_of_python_are_checked(subjects, options):
+    with pytest.raises(BadInput):
+        verify(subjects, **options)
+
+
+def test_one_check_is_a_text_or_a_list():
+    one, two = (verify("taylor", only=only)[0] for only in ("repeatability", ["repeatability"]))
+    assert one.sentence == two.sentence
+    assert {each.check for each in one.findings} == {"repeatability"}
