@@ -26,7 +26,7 @@ from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.programs import UnusableProgram, program_class
-from conservative.references.worker.client import time_limit
+from conservative.references.worker.client import EngineTimeout, time_limit
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -45,6 +45,10 @@ ROWS = 40
 """Largest number of samples of a motion, for the search."""
 NEAR = 3.0
 """Errors up to so many tolerances are right if they fall with the step as the declared order says."""
+FEW = 3
+"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is that of the method."""
+HANGS = 2
+"""Motions of a program that does not answer, after which the others are not run."""
 SLOPE = 0.5
 """Largest difference between the order and the exponent with which an error falls."""
 FINE = PARTS[-1]
@@ -81,6 +85,7 @@ class Ran:
     allowed: Array
     step: float
     ended: str = ""
+    hangs: bool = False
 
     @property
     def ratio(self) -> float:
@@ -135,7 +140,7 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) 
     case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
     at = slice(thin - 1, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
-    return Ran(motion, case, error, allowed, grid.dt, ended)
+    return Ran(motion, case, error, allowed, grid.dt, ended, isinstance(failure, EngineTimeout))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +176,9 @@ def run_motions(
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
         allowed = np.array(tolerance(motion, order, single))
+        if sum(each.hangs for each in ran) == HANGS:
+            reasons[motion.name] = f"it did not answer in {HANGS} motions before"
+            continue
         if reason := unsupported(motion.scene):
             reasons[motion.name] = reason
             continue
@@ -299,9 +307,15 @@ def _is_generic(motion: Motion) -> bool:
 
 def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], float]:
     """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
-    near = {each.motion.name: slope for each in answers.failing if each.ratio <= NEAR and (slope := _falls(answers, each))}
+    few = len(answers.failing) < FEW
+    near = {
+        each.motion.name: slope
+        for each in answers.failing
+        if (few or each.ratio <= NEAR) and not each.ended and (slope := _falls(answers, each))
+    }
     failing = [each for each in answers.failing if each.motion.name not in near]
     named = explain_motions(failing, [each for each in answers.ran if each not in failing])
+    named = [each for each in named if len(each.motions) >= min(FEW, len(failing))]  # what one motion shows is chance
     explained = {name: each for each in named for name in each.motions}
     # What converges as it declares, and is no known mistake, has a large error constant.
     rest = [each for each in failing if each.motion.name not in explained and not each.ended]
@@ -425,6 +439,10 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
             right = sum(each.verdict is Verdict.RIGHT for each in some)
             words = {"repeatability": "repeated runs"}.get(check, check)
             parts.append(f"{right} of {len(some)} {words}{'' if right == len(some) else ' are right'}")
+            if ended := [
+                each.detail for each in some if each.check == "motions" and each.verdict is Verdict.WRONG and each.detail
+            ]:
+                parts.append(f"in {len(ended)} {ended[0]}")
         else:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
     failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)

@@ -175,6 +175,8 @@ def verify(
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
+    if pairs and only and "pairs" not in only:
+        raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
     results: list[Verification] = []
     if files := [each.path for each in found if each.kind is Kind.MODEL and each.path]:
         from .bodies import verify_files

@@ -63,7 +63,8 @@ class OldName(click.ClickException):
 
     def __init__(self, old: str, arguments: Iterable[str] = ()) -> None:
         new = OLD_NAMES[old]
-        super().__init__(f"{old} is now {new}. Run: conservative {new} {shlex.join(arguments)}".rstrip())
+        given = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
+        super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
 
 
 class Command(click.Command):
