@@ -348,7 +348,7 @@ class Compared:
         """Return whether the motion multiplies the digits or the noise of the first row to the size of the errors.
 
         Small changes of any motion grow with the angle. From where they grow much faster, an error proves
-        nothing.
+        nothing; some start has to explain the rows before.
         """
         if not self.free:
             return False
@@ -360,8 +360,12 @@ class Compared:
         lost = np.flatnonzero((reached > LINEAR) & (growth.max(axis=(1, 2)) > FASTER * usual))
         if not len(lost):
             return False
-        limit = np.interp(np.arange(len(self.t)), some, reached) + self.allowed.max()
-        return bool((self.error.max(axis=0) <= limit)[: some[lost[0]]].all())
+        early = self.take(slice(0, max(2, int(some[lost[0]]))))
+        limit = np.interp(np.arange(len(early.t)), some, reached) + self.allowed.max()
+        if (early.error.max(axis=0) > limit).any():
+            return False
+        fitted = early.at(early.fit(exact(early), np.zeros(0), np.zeros(0))[0])
+        return early.passes(early.error) or fitted.passes(fitted.error)
 
     def at(self, initial: Array) -> Compared:
         """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
