@@ -30,9 +30,14 @@ SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; o
 LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
 PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
+SENSITIVE = 1e6  # factor by which a motion may multiply an error, beyond which solutions need more digits
 HOPELESS = 30.0  # of noise, that no other first row explains
 LINEAR = 0.3  # rad, differences of motions that are taken as small
-PERTURBED = 1e-8  # of initial states, to see how the motion multiplies it
+PERTURBED = 1e-8, 1e-12  # of initial states, to see how the motion multiplies it; the second where the first is not small
+STRAIGHT, NARROWED = 0.03, 6  # of differences for slopes; trials of smaller changes
+SMALLEST_CHANGE = 1e-14  # of initial states, for slopes
+EXTENDED = 40  # trials of a fit that takes more and more rows
+FASTER = 30.0  # times the angle, that a motion multiplies small changes by near a separatrix
 Solution = Callable[[Array, Array, Array, int], tuple[Array, Array]]
 """From initial attitudes (B, 3, 3), rates (B, 3), other numbers (B, k) and n to the first rows (B, n, 3, 3), (B, n, 3)."""
 
@@ -125,7 +130,7 @@ class Compared:
     allowed: Array
     noise: Array
     free: tuple[int, ...] = ()
-    growth: float = 1e6
+    growth: float = SENSITIVE
     stride: int = 1
     effort: Effort = field(default_factory=lambda: Effort(math.inf))
     rounded: tuple[float, float] = (0.0, 0.0)
@@ -242,7 +247,8 @@ class Compared:
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
         """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
-        tolerance = float(np.clip(1e-5 * self.noise.min(), 4e-16, 1e-8))
+        share = 0.1 / self.growth if self.growth > SENSITIVE else 1e-5
+        tolerance = float(np.clip(share * self.noise.min(), 4e-16, 1e-8))
         most = LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
         return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=most, **changes)
 
@@ -262,42 +268,104 @@ class Compared:
         small changes of the other numbers, for slopes.
         """
         free = list(self.free)
-        p, weights = np.concatenate([np.zeros(6), extra]), 1 / np.repeat(self.noise, [9, 3])
+        p = np.concatenate([np.zeros(6), extra])
         moved = [*free, *range(6, 6 + len(extra))]
         small = np.concatenate([np.full(6, 1e-6), changed])
         n = len(self.t)
 
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
-            part, damping = self.take(slice(0, k)), 1e-6
-            evaluate = partial(part.evaluate, motion)
-            R, w = evaluate(p[None])
-            now = (part.differences(R, w)[0] * weights).ravel()
-            for _ in range(most):
-                if self.effort.over:
-                    break
-                R, w = evaluate(p + np.concatenate([small * np.eye(6 + len(extra))[i][None] for i in moved]))
-                slopes = ((part.differences(R, w) * weights).reshape(len(moved), -1) - now) / small[moved][:, None]
-                better = False
-                while damping < 1e3 and not better:
-                    normal = slopes @ slopes.T
-                    step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-300), -slopes @ now, rcond=1e-15)[0]
-                    q = p.copy()
-                    q[moved] += step
-                    R, w = evaluate(q[None])
-                    new = (part.differences(R, w)[0] * weights).ravel()
-                    better = bool(new @ new < now @ now)
-                    damping = damping / 30 if better else max(damping, 1e-6) * 30
-                if not better:
-                    break
-                gain = 1 - (new @ new) / (now @ now)
-                p, now = q, new
-                if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
-                    break
-            if free and now @ now > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
+            p, cost = self._improve(motion, p, k, moved, small, most)
+            if free and cost > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
                 break  # no start explains these rows, so none explains more
         R, w = self.evaluate(motion, p[None])
         return p[:6], p[6:], (R[0], w[0])
+
+    def _improve(
+        self, motion: Solution, p: Array, k: int, moved: list[int], small: Array, most: int, damping: float = 1e-6
+    ) -> tuple[Array, float]:
+        """Return numbers (6 + extra,) that fit the first rows better, and the sum of squares that they leave.
+
+        The changes `small` of the initial state become smaller here where the motion multiplies them too much for slopes.
+        """
+        part, damping, weights = self.take(slice(0, k)), 1e-6, 1 / np.repeat(self.noise, [9, 3])
+        evaluate = partial(part.evaluate, motion)
+        R, w = evaluate(p[None])
+        now = (part.differences(R, w)[0] * weights).ravel()
+        for _ in range(most):
+            if self.effort.over:
+                break
+            for _ in range(NARROWED):
+                R, w = evaluate(p + np.concatenate([small * np.eye(len(p))[i][None] for i in moved]))
+                change = (part.differences(R, w) * weights).reshape(len(moved), -1) - now
+                largest = (np.abs(change) / np.tile(weights, k)).max(axis=1)
+                wide = [j for j, i in enumerate(moved) if i < 6 and largest[j] > STRAIGHT]
+                if not wide:
+                    break
+                at = [moved[j] for j in wide]
+                small[at] = np.maximum(small[at] * 0.1 * STRAIGHT / largest[wide], SMALLEST_CHANGE)
+            slopes = change / small[moved][:, None]
+            better = False
+            axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
+            sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
+            goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
+            while damping < 1e3 and not better:
+                step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
+                q = p.copy()
+                q[moved] += step
+                R, w = evaluate(q[None])
+                new = (part.differences(R, w)[0] * weights).ravel()
+                better = bool(new @ new < now @ now)
+                damping = damping / 30 if better else max(damping, 1e-6) * 30
+            if not better:
+                break
+            gain = 1 - (new @ new) / (now @ now)
+            p, now = q, new
+            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
+                break
+        return p, float(now @ now)
+
+    def extend(self) -> tuple[Compared, int]:
+        """Return the case with the initial state that explains the most rows, found from the first ones on, and their number.
+
+        A motion that multiplies small changes is determined by the first rows for some more rows only.
+        """
+        motion, small, p, good, step = exact(self), np.full(6, 1e-6), np.zeros(6), 0, max(8, len(self.t) // 64)
+        for _ in range(EXTENDED):
+            if good == len(self.t) or step <= len(self.t) // 256:
+                break
+            k = min(len(self.t), good + step)
+            q, _ = self._improve(motion, p, k, list(self.free), small, 8)
+            part = self.take(slice(0, k))
+            R, w = part.evaluate(motion, q[None])
+            if self.passes(part.errors(R[0], w[0])):
+                p, good, step = q, k, 2 * step
+            else:
+                step = (k - good) // 2
+        return self.at(p), good
+
+    def hidden(self) -> bool:
+        """Return whether the motion multiplies the digits or the noise of the first row to the size of the errors.
+
+        Small changes of any motion grow with the angle. From where they grow much faster, an error proves
+        nothing; some start has to explain the rows before.
+        """
+        if not self.free:
+            return False
+        some = np.unique(np.linspace(0, len(self.t) - 1, 400).astype(int))
+        flow = np.nan_to_num(linearise(self.take(some))[2]).reshape(-1, 2, 3, 2, 3)
+        growth = np.linalg.norm(flow, axis=(2, 4))
+        usual = 1 + (self.t[some] - self.start) * self.scale
+        reached = (growth @ self.allowed).max(axis=1)
+        lost = np.flatnonzero((reached > LINEAR) & (growth.max(axis=(1, 2)) > FASTER * usual))
+        if not len(lost):
+            return False
+        early = self.take(slice(0, max(2, int(some[lost[0]]))))
+        limit = np.interp(np.arange(len(early.t)), some, reached) + self.allowed.max()
+        if (early.error.max(axis=0) > limit).any():
+            return False
+        fitted = early.at(early.fit(exact(early), np.zeros(0), np.zeros(0))[0])
+        return early.passes(early.error) or fitted.passes(fitted.error)
 
     def at(self, initial: Array) -> Compared:
         """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
@@ -336,10 +404,16 @@ def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
 
 def linearise(case: Compared) -> tuple[Array, Array, Array]:
     """Return the exact motion (n, 3, 3), (n, 3), and the matrices (n, 6, 6) that carry small changes of its start along."""
-    turns, shifts = np.split(np.vstack([np.zeros(6), PERTURBED * np.eye(6)]), 2, axis=1)
-    R0 = case.scene.R_WB0 @ Rotation.from_rotvec(turns).as_matrix()
-    R, w = exact(case)(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)), len(case.t))
-    return R[0], w[0], np.moveaxis(differ(R[0], w[0], R[1:], w[1:], case.scale), 0, -1) / PERTURBED
+    flows = []
+    for size in PERTURBED:
+        turns, shifts = np.split(np.vstack([np.zeros(6), size * np.eye(6)]), 2, axis=1)
+        R0 = case.scene.R_WB0 @ Rotation.from_rotvec(turns).as_matrix()
+        R, w = exact(case.change(growth=math.inf))(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)), len(case.t))
+        flows.append(np.moveaxis(differ(R[0], w[0], R[1:], w[1:], case.scale), 0, -1))
+        if np.abs(flows[0]).max() < STRAIGHT:
+            break
+    small = np.maximum.accumulate(np.abs(flows[0]).max(axis=(1, 2))) < STRAIGHT
+    return R[0], w[0], np.where(small[:, None, None], flows[0] / PERTURBED[0], flows[-1] / PERTURBED[len(flows) - 1])
 
 
 def exact(case: Compared) -> Solution:
@@ -347,7 +421,7 @@ def exact(case: Compared) -> Solution:
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
         t = case.t[:n]
-        if closed(case.scene) and (t[-1] - case.start) * case.scale > 3 * LONGEST:
+        if closed(case.scene) and ((t[-1] - case.start) * case.scale > 3 * LONGEST or case.growth > SENSITIVE):
             each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
             return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
         return case.equations().solve(case.start, R, w, t)

@@ -120,6 +120,7 @@ def verify(
     search: Sequence[Path] = (),
     start: str = "row",
     error: float | None = None,
+    rates: str | None = None,
     tell: Tell = lambda share, what: None,
     **reading: Any,
 ) -> list[Verification]:
@@ -140,8 +141,9 @@ def verify(
         Names of pairs of descriptions; by default all.
     search
         Folders of meshes and packages, for model files.
-    start, error, **reading
-        For recordings: "row" or "scene", the allowed error, and the options of `recordings.table.Options`.
+    start, error, rates, **reading
+        For recordings: "row" or "scene", the allowed error, "body" or "world" for the axes of rates, and the other options of
+        `recordings.table.Options`.
     tell
         Called with the share of the work that is done and the next piece of it.
 
@@ -158,6 +160,8 @@ def verify(
         An engine is not installed.
     """
     given = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
+    if not given:
+        raise BadInput("subjects", "an empty list", "a path, a name, a method, or a list of them")
     methods: list[Any] = [each for each in given if not isinstance(each, str | os.PathLike)]
     for each in methods:
         from conservative.method import Method  # here: recordings need no kernels
@@ -166,6 +170,9 @@ def verify(
             raise BadInput("subjects", repr(each), "a path, a name, a method, or a list of them")
     engines, only, pairs = ([each] if isinstance(each, str) else each for each in (engines, only, pairs))
     choice("start", start, ("row", "scene"))
+    if rates is not None:
+        choice("rates", rates, ("body", "world"))
+        reading["world"] = rates == "world"
     found = expand([os.fspath(each) for each in given if isinstance(each, str | os.PathLike)])
     for name in only:
         choice("only", name, tuple(CHECKS))
@@ -243,7 +250,8 @@ def _verify_recordings(
         raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
     scene = body if isinstance(body, Scene) else registry.scene(os.fspath(body))
     from_row = start == "row"
-    recordings = [(path.name, table.read(path, Options(**reading))) for path in files]
+    read = table.read_all(files, Options(**reading))
+    recordings = [(path.name, recording) for path, recording in zip(files, read, strict=True)]
     if together:
         from .recordings.two import verify_two
 

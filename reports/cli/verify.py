@@ -186,9 +186,7 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
             flag = next(each.opts[0] for each in ctx.command.params if each.name == name)
             got = f"{flag}, which none of the subjects uses ({', '.join(sorted(kinds))})"
             raise BadInput(flag.lstrip("-"), got, f"a subject of the kind {', '.join(users)}")
-        if name == "rates":
-            options["world"] = value == "world"
-        elif name not in ("picture", "scripts"):
+        if name not in ("picture", "scripts"):
             options[name] = split_names(name, value) if name in LISTS else value
     return options
 

@@ -222,20 +222,19 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
     while True:
         end = len(rest.t)
         if from_row and whole and end > 2:
-            some = np.unique(np.linspace(0, end - 1, 200).astype(int))
-            thin = replace(rest, t=rest.t[some], data=take_rows(rest.data, some))
-            flow = linearise(thin)[2][:, 3 * (case.data[0] is None) :, 3 * (case.data[0] is None) :]
-            back = np.nan_to_num(np.linalg.pinv(np.nan_to_num(flow)))
-            # Errors of the file's own steps grow from any row on: near a separatrix more than those of the first row.
-            growth = np.array([np.linalg.norm(flow[k] @ back[: k + 1], axis=(1, 2)).max() for k in range(len(some))])
-            over = np.flatnonzero(growth * ROUND_OFF > case.allowed.min() / 10)
-            end = max(2, int(some[over[0]])) if len(over) else end
-            rest = replace(rest, growth=float(growth[some < end].max()))
+            end, growth = _reach(rest)
+            rest = replace(rest, growth=growth)
         part = rest.take(slice(0, end))
         if part.free and not part.passes(part.error) and _near(part):
             alone = np.maximum(alone, part.error.max(axis=1))
             initial, _, _ = part.fit(exact(part), np.zeros(0), np.zeros(0))
             fitted = part.at(initial)
+            if not fitted.passes(fitted.error) and part.hidden():
+                extended, good = part.extend()
+                if good < len(part.t) and whole and (reached := _reach(extended)[0]) <= good:
+                    extended, part, end = extended.take(slice(0, reached)), part.take(slice(0, reached)), reached
+                    fitted = extended
+                fitted = min(fitted, extended, key=lambda each: each.size(each.error))
             part = min(part, fitted, key=lambda each: each.size(each.error))
         parts.append(part)
         if end >= len(rest.t) or len(parts) > 200 or not part.passes(part.error):
@@ -253,6 +252,20 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
             missing = f"It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
             parts = [guessed]
     return parts, missing, alone
+
+
+def _reach(rest: Compared) -> tuple[int, float]:
+    """Return the number of rows up to which round-off of the exact motion is small, and its growth there."""
+    some = np.unique(np.linspace(0, len(rest.t) - 1, 200).astype(int))
+    thin = replace(rest, t=rest.t[some], data=take_rows(rest.data, some))
+    first = 3 * (rest.data[0] is None)
+    flow = linearise(thin)[2][:, first:, first:]
+    back = np.nan_to_num(np.linalg.pinv(np.nan_to_num(flow)))
+    # Errors of the file's own steps grow from any row on: near a separatrix more than those of the first row.
+    growth = np.array([np.linalg.norm(flow[k] @ back[: k + 1], axis=(1, 2)).max() for k in range(len(some))])
+    over = np.flatnonzero(growth * ROUND_OFF > rest.allowed.min() / 10)
+    end = max(2, int(some[over[0]])) if len(over) else len(rest.t)
+    return end, float(growth[some < end].max())
 
 
 def _near(part: Compared) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -91,6 +91,20 @@ def read(path: Path, options: Options) -> Recording:
 
     Raises `BadInput` for files, columns, options and rows that cannot be used, and `MissingEngine` for Parquet without pyarrow.
     """
+    return read_all([path], options)[0]
+
+
+def read_all(paths: Sequence[Path], options: Options) -> list[Recording]:
+    """Return the motions in files. Raises errors of `read`, and `BadInput` for an option that none of the files uses."""
+    made = [_read(path, options) for path in paths]
+    for argument, error in made[0][1].items() if made else ():
+        if all(argument in unused for _, unused in made):
+            raise error
+    return [recording for recording, _ in made]
+
+
+def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]:
+    """Return the motion in a file, and the errors of options that it does not use."""
     if options.euler is not None and not re.fullmatch("(?!.*(.)\\1)[xyz]{3}", options.euler):
         raise BadInput("euler", repr(options.euler), "three of the letters x, y, z without equal neighbours, such as zyx")
     start, end = options.start_time, options.end_time
@@ -98,7 +112,13 @@ def read(path: Path, options: Options) -> Recording:
         raise BadInput("until", f"{end:g}, not after {start:g} s", "a time after the first one, s")
     table = open_table(path)
     layout = choose(path, Layout(table.names, unused=dict(table.unused)), options)
-    _require_use(layout, options)
+    if options.world and layout.used["rates"] and layout.attitude is None:
+        raise BadInput(
+            "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"
+        )
+    unused = _unused(layout, options)
+    if "quaternion" in unused:  # named columns have their order
+        options = replace(options, quaternion=None)
     cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
     extra = [name for part in layout.also.values() for name in part]
@@ -126,7 +146,7 @@ def read(path: Path, options: Options) -> Recording:
         raise BadInput("run", f"{path} with rows within {duration:g} s", f"times that differ by {SMALLEST:g} s or more")
     t, data, shape = convert(raw[:, :width] * layout.sizes, layout, options)
     layout.notes += cleaner.notes
-    return Recording(
+    recording = Recording(
         t,
         data,
         shape,
@@ -142,16 +162,18 @@ def read(path: Path, options: Options) -> Recording:
         ended=cleaner.ended,
         others=compare_others(data[0], raw[:, width:], layout, options),
     )
+    return recording, unused
 
 
-def _require_use(layout: Layout, options: Options) -> None:
-    """Raise `BadInput` for an option that applies to none of the columns."""
+def _unused(layout: Layout, options: Options) -> dict[str, BadInput]:
+    """Return the errors of options that apply to none of the columns, by their arguments."""
+    out = dict[str, tuple[str, str]]()
     if options.euler is not None and layout.attitude != "angles":
-        raise BadInput("euler", f"{options.euler!r}, for a file without columns of angles that it applies to", "no --euler")
+        out["euler"] = f"{options.euler!r}, for a file without columns of angles that it applies to", "no --euler"
     if options.quaternion is not None and not layout.numbered:
-        raise BadInput("quaternion", f"{options.quaternion!r}, for a file without numbered quaternions", "no --quaternion")
-    if options.world and (not layout.used["rates"] or layout.attitude is None):
-        got = "'world', for a file without attitudes" if layout.used["rates"] else "'world', for a file without rates"
-        raise BadInput("rates", got, "body, or a file with attitudes to convert them")
+        out["quaternion"] = f"{options.quaternion!r}, for a file without numbered quaternions", "no --quaternion"
+    if options.world and not layout.used["rates"]:
+        out["rates"] = "'world', for a file without rates", "body, or a file with attitudes and rates"
     if options.units is not None and "unit" not in layout.notes:
-        raise BadInput("units", f"{options.units!r}, for a file whose columns name their units", "no --units")
+        out["units"] = f"{options.units!r}, for a file whose columns name their units", "no --units"
+    return {argument: BadInput(argument, got, allowed) for argument, (got, allowed) in out.items()}

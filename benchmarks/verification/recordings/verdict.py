@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
 from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
@@ -27,6 +28,10 @@ ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4  # errors that a good solver may leave, i
 SHAPE = 1e-6  # departure from a rotation that a good solver may leave
 UNITS = "rad", "of the largest rate"
 FAR = 0.05  # rad, or of the largest rate: of another motion
+HIDDEN = (
+    "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
+    "(--until), or --start scene decide"
+)
 
 
 class Unit(NamedTuple):
@@ -152,8 +157,9 @@ def verify_recording(
     BadInput
         For an error that is not a number of 1e-12 or more, and for times at which a load has no value.
     """
-    if error is not None and not (math.isfinite(error) and error >= 1e-12):
-        raise BadInput("error", f"{error:g}", "a finite number of 1e-12 or more, which the exact motion is rounded to")
+    if error is not None and not 1e-12 <= (real_number(error) or 0.0) < math.inf:
+        got = describe(error) if real_number(error) is None else f"{error:g}"
+        raise BadInput("error", got, "a finite number of 1e-12 or more, which the exact motion is rounded to")
     name = name or (recording.path.name if recording.path else "recording")
     rows = prepare(rotation_only(scene), recording, from_row, error)
     recording, notes = rows.recording, rows.notes
@@ -167,12 +173,14 @@ def verify_recording(
         tell("explain")
         whole = replace(found.case, growth=found.parts[0].growth)
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
-    proven = [each for each in explained.named if each.explains]
+    # Numbers that are fitted to rows that a start can explain as well prove nothing.
+    hidden = not (found.passed or found.outliers) and error is None and found.case.hidden()
+    proven = [each for each in explained.named if each.explains and not (hidden and each.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if found.passed and shaped:
         verdict, doubt = Verdict.RIGHT, found.undecided or recording.doubt(error)
     elif error is None and shaped and not proven:
-        doubt = _doubt(found.case, found.errors, rows.resolved, recording)
+        doubt = HIDDEN if hidden else _doubt(found.case, found.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = found.case
     if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
