@@ -185,9 +185,9 @@ def _changes(case: Compared, asked: _Asked) -> Found:
 def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
     """Return trials without numbers that make a difference, by the size of what they leave from the start of the scene.
 
-    Half of the work may go into this; the trials that are left follow in their order.
+    Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
     """
-    ranked, rest, least = [], list[Trial](), case.effort.left / 2
+    ranked, rest, least, case = [], list[Trial](), case.effort.left / 2, case.screen or case
     for number, each in enumerate(trials):
         motion = each.build(case)
         if motion is None:
@@ -196,7 +196,8 @@ def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
             rest.append(each)
             continue
         R, w = case.evaluate(motion, np.zeros((1, 6)))
-        ranked.append((case.size(case.errors(R[0], w[0])), number, each))
+        if np.isfinite(w).all():
+            ranked.append((case.size(case.errors(R[0], w[0])), number, each))
     return [each for *_, each in sorted(ranked)] + rest
 
 
