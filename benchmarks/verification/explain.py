@@ -69,14 +69,14 @@ def diagnose(
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
-    case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(EFFORT))
+    case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(0.0))
     early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
         if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
             continue
         tell(name)
-        case.effort.left = EFFORT * search.share
+        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # and what earlier parts have left
         for each in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
             if each is not None:
                 tried.append(each)
@@ -175,8 +175,30 @@ def _changes(case: Compared, asked: _Asked) -> Found:
     known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
     several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
     known.sort(key=lambda each: each[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
-    for mistakes in (*known, *(several if "scenes" in asked.kinds else ())):
-        yield attempt(case, compose(*mistakes))
+    trials = [compose(*mistakes) for mistakes in (*known, *(several if "scenes" in asked.kinds else ()))]
+    if case.free:  # fits of the start take most of the work: the nearest motions first
+        trials = _nearest_first(case, trials)
+    for each in trials:
+        yield attempt(case, each)
+
+
+def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
+    """Return trials without numbers that make a difference, by the size of what they leave from the start of the scene.
+
+    Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
+    """
+    ranked, rest, least, case = [], list[Trial](), case.effort.left / 2, case.screen or case
+    for number, each in enumerate(trials):
+        motion = each.build(case)
+        if motion is None:
+            continue
+        if case.effort.left < least:
+            rest.append(each)
+            continue
+        R, w = case.evaluate(motion, np.zeros((1, 6)))
+        if np.isfinite(w).all():
+            ranked.append((case.size(case.errors(R[0], w[0])), number, each))
+    return [each for *_, each in sorted(ranked)] + rest
 
 
 def _numbers(case: Compared, asked: _Asked) -> Found:
@@ -255,8 +277,15 @@ def _times(case: Compared, asked: _Asked) -> Found:
 
 def _own_times(case: Compared, gap: float, end: float) -> Found:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
-    if case.free:  # the first row has noise
-        case = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0])
+    starts = [case]
+    if case.free:  # a first row with noise, or jitter that a fit of the start takes for noise
+        starts.append(case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0]))
+    found = [one for each in starts if (one := _by_own_times(each, gap, end)) is not None]
+    yield min(found, key=lambda each: (not each.explains, each.size), default=None)
+
+
+def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
+    """Return the explanation by the times at which the motion from the initial state is nearest to the rows."""
     tau, e = case.t.copy(), 1e-6 / case.scale
     end += min(end - case.start, 50 * gap)
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
@@ -277,9 +306,10 @@ def _own_times(case: Compared, gap: float, end: float) -> Found:
     if lost.max() >= 1 and np.abs(off - lost * gap).max() < 0.2 * gap and (np.diff(lost) >= 0).all():
         at = float(case.t[np.flatnonzero(lost)[0]])
         values = {"rows": float(lost.max()), "at": at}
-        yield explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
-    elif abs(float(np.mean(off))) < 0.5 * size:
-        yield explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
+        return explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
+    if abs(float(np.mean(off))) < 0.5 * size:
+        return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
+    return None
 
 
 def _nowhere(case: Compared) -> None:

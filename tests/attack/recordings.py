@@ -334,11 +334,6 @@ def with_inertia(case: Case, J: Any) -> Case:
 
 # Attitudes that are not the integral of the right rates: the quaternion of a step from rates at its start and end
 
-FIRST, MAP = "the first-order step q + h/2 q w, normalised,", "a rotation"
-PLACE = "the first-order step of the quaternion, whose components are updated in place, one after another,"
-START, END = "by the rates of the start of the step (coning error)", "by the rates of the end of the step"
-MEAN, BODY = "by the mean of the rates of both ends (coning error)", ", which are in body axes, as if they were in world axes"
-
 
 def first(q: Any, v: Any) -> Any:
     return q + multiply(q, np.append(0.0, v)) / 2
@@ -353,16 +348,16 @@ def in_place(q: Any, v: Any) -> Any:
 
 
 ATTITUDES: dict[str, Callable[[Any, Any, Any, float], Any]] = {
-    f"attitudes by {FIRST} {START}": lambda q, a, b, h: first(q, a * h),
-    f"attitudes by {FIRST} {END}": lambda q, a, b, h: first(q, b * h),
-    f"attitudes by {FIRST} {MEAN}": lambda q, a, b, h: first(q, (a + b) / 2 * h),
-    f"attitudes by {MAP} {START}": lambda q, a, b, h: multiply(q, turn(a * h)),
-    f"attitudes by {MAP} {END}": lambda q, a, b, h: multiply(q, turn(b * h)),
-    f"attitudes by {MAP} {MEAN}": lambda q, a, b, h: multiply(q, turn((a + b) / 2 * h)),
-    f"attitudes by {PLACE} {START}": lambda q, a, b, h: in_place(q, a * h),
-    f"attitudes by {MAP} {START}{BODY}": lambda q, a, b, h: multiply(turn(a * h), q),
-    f"attitudes by {MAP} {MEAN}{BODY}": lambda q, a, b, h: multiply(turn((a + b) / 2 * h), q),
-    f"attitudes by {FIRST} {START}{BODY}": lambda q, a, b, h: q + multiply(np.append(0.0, a * h), q) / 2,
+    "attitude by normalisation, old rates": lambda q, a, b, h: first(q, a * h),
+    "attitude by normalisation": lambda q, a, b, h: first(q, b * h),
+    "attitude by normalisation, mean rates": lambda q, a, b, h: first(q, (a + b) / 2 * h),
+    "stale rates": lambda q, a, b, h: multiply(q, turn(a * h)),
+    "attitude by rotation, new rates": lambda q, a, b, h: multiply(q, turn(b * h)),
+    "attitude by rotation, mean rates": lambda q, a, b, h: multiply(q, turn((a + b) / 2 * h)),
+    "attitude in place, old rates": lambda q, a, b, h: in_place(q, a * h),
+    "stale rates on the wrong side": lambda q, a, b, h: multiply(turn(a * h), q),
+    "attitude by rotation, mean rates on the wrong side": lambda q, a, b, h: multiply(turn((a + b) / 2 * h), q),
+    "attitude by normalisation, old rates on the wrong side": lambda q, a, b, h: q + multiply(np.append(0.0, a * h), q) / 2,
 }
 
 
