@@ -149,7 +149,7 @@ def _order(each: Verification) -> bool:
     return each.verdict is not Verdict.RIGHT
 
 
-def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], None]:
+def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], object]:
     return lambda what: tell(f"{name}: {what}")
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from conservative.benchmarks.verification.recordings.table import ROWS, Options, read
+from conservative.benchmarks.verification.recordings.table import ROWS, Options, read, read_all
 from conservative.errors import BadInput
 
 from .made import FREE, T, exact
@@ -226,3 +226,17 @@ def test_memory_does_not_grow_with_the_rows(tmp_path):
     assert (recording.rows, ROWS <= len(recording.t) <= 2 * ROWS) == (n, True)
     np.testing.assert_array_equal(np.diff(recording.t), np.diff(recording.t)[0])
     assert peak < 30e6  # measured: 14 MB; all rows take 13 MB as numbers and as much again for each copy
+
+
+def test_an_option_is_refused_if_no_file_of_the_call_uses_it(tmp_path):
+    named, plain = tmp_path / "named.csv", tmp_path / "plain.csv"
+    quaternion = {f"q_{part}": Q[:, i] for i, part in enumerate("wxyz")}
+    pd.DataFrame({"time": T, **quaternion, **RATES}).to_csv(named, index=False)
+    numbered = {f"q{i}": Q[:, (i + 1) % 4] for i in range(4)}
+    pd.DataFrame({"time": T, **numbered, **{f"w_{x}": W[:, i] for i, x in enumerate("xyz")}}).to_csv(plain, index=False)
+    for options in (Options(units="rad", quaternion="xyzw"), Options(quaternion="xyzw", units="rad/s")):
+        for recording in read_all([named, plain], options):  # the order applies to numbered columns only
+            np.testing.assert_allclose(recording.data[0], R, atol=1e-12)
+    for argument, value in (("units", "rad"), ("quaternion", "xyzw"), ("euler", "zyx")):
+        with pytest.raises(BadInput, match=f"{argument}: got"):
+            read_all([named, named], Options(**{argument: value}))

@@ -129,7 +129,7 @@ def test_byte_order_marks_line_ends_and_gzip_are_read(tmp_path):
     assert verify_recording(SCENE, read(tmp_path / "run.csv.gz", Options())).verdict == "right"
 
 
-@pytest.mark.parametrize("error", [float("nan"), -1.0, 0.0])
+@pytest.mark.parametrize("error", [float("nan"), -1.0, 0.0, "abc", True])
 def test_an_error_that_is_no_size_is_refused(error):
     with pytest.raises(BadInput, match="error: got"):
         verdict(T, R, W, error=error)
