@@ -171,7 +171,7 @@ def run_motions(
 
     `unsupported` returns why a scene is not supported, None if it is.
     """
-    ran, reasons = [], dict[str, str]()
+    ran, reasons = list[Ran](), dict[str, str]()
     for every in load():
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
