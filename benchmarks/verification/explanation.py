@@ -16,7 +16,7 @@ from .finding import Cause
 from .mistakes.mistake import Mistake, Number
 
 HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
-OWN_SHARE = 0.02  # of the error of a program with a mistake, that its steps may make
+OWN_SHARE = 0.02  # of the effect of a mistake that another motion showed: what the steps of a program may change in it
 OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
 
 
@@ -112,7 +112,7 @@ class Explanation:
         made = R[0], w[0]
         if (case.apart(made, case.exact) <= case.allowed).all():
             return None
-        return explain(case, self.trial, made, self.values, self.numbers)
+        return explain(case, self.trial, made, self.values, self.numbers, OWN_SHARE)
 
     def refit(self, case: Compared) -> Explanation | None:
         """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
@@ -129,8 +129,12 @@ def explain(
     made: tuple[Array, Array],
     values: Mapping[str, float] = MappingProxyType({}),
     numbers: int | None = None,
+    share: float = 0.0,
 ) -> Explanation:
-    """Return the explanation by the motion that mistakes make; `numbers` counts those that were fitted, by default all."""
+    """Return the explanation by the motion that mistakes make; `numbers` counts those that were fitted, by default all.
+
+    `share` is the share of the error that the steps of a program may leave, beside its tolerance.
+    """
     plain, error = case.plain.max(axis=1), case.errors(*made)
     rest = case.size(error) / max(case.size(case.plain), 1e-15)
     return Explanation(
@@ -141,7 +145,7 @@ def explain(
         plain.tolist(),
         float(error.max() / max(plain.max(), 1e-15)),
         case.size(error),
-        _is_allowed(case, error, plain) and rest < HALF,
+        _is_allowed(case, error, share * plain) and rest < HALF,
         len(values) if numbers is None else numbers,
         made,
         rest,
@@ -150,15 +154,15 @@ def explain(
     )
 
 
-def _is_allowed(case: Compared, error: Array, plain: Array) -> bool:
-    """Return whether a mistake may leave errors (2, n) of the errors `plain` (2,) without it.
+def _is_allowed(case: Compared, error: Array, more: Array) -> bool:
+    """Return whether a mistake may leave errors (2, n).
 
-    A program with a mistake has an error of its steps as well: some tolerances, or a share of the error that is proportional to
-    the step, such as damping after each step.
+    A program with a mistake has an error of its steps as well: some tolerances, or errors `more` (2,) that are proportional to
+    the step and to the effect of the mistake, such as of damping after each step.
     """
     if case.step is None:
         return case.passes(error)
-    return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, OWN_SHARE * plain)).all())
+    return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, more)).all())
 
 
 def attempt(

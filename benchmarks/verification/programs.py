@@ -288,7 +288,9 @@ def _apply(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> Ap
         again = best.again(each.case)
         if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
             refined, refits = best.refit(each.case), refits + 1
-            best, again = (refined, refined) if refined is not None and refined.explains else (best, again)
+            applied = None if refined is None else refined.again(each.case)
+            if refined is not None and applied is not None and applied.explains:
+                best, again = refined, applied
         if again is not None and again.explains:
             names.append(each.motion.name)
             shares.append(again.share)
