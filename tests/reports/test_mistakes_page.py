@@ -28,14 +28,14 @@ def test_test_files_name_what_the_page_says():
     assert found == {key: mistakes.in_test_files(key) for key in found}
 
 
-@pytest.mark.parametrize("key", [pytest.param(key, marks=[pytest.mark.slow] * (key not in QUICK)) for key in BY_KEY])
+@pytest.mark.parametrize("key", [pytest.param(key, marks=[pytest.mark.attack] * (key not in QUICK)) for key in BY_KEY])
 def test_a_planted_mistake_is_named_in_a_recording_as_the_page_says(key):
     for cell, attitudes in zip(PAGE[key][1:3], (True, False), strict=True):
         if cell != mistakes.NOT_MEASURED:
             assert mistakes.in_recording(key, attitudes) == cell
 
 
-@pytest.mark.slow
+@pytest.mark.attack
 @pytest.mark.parametrize("key", BY_KEY)
 def test_a_planted_mistake_is_named_in_a_program_as_the_page_says(key):
     if PAGE[key][3] == mistakes.NOT_MEASURED:
