@@ -1,11 +1,13 @@
 """Whether recorded motions, programs, engines and loaded bodies are right, and the mistakes that explain what is wrong.
 
-import conservative as cv
+For example::
 
-for verification in cv.verification.verify(["run.csv"], body="my_body.toml"):
-    print(verification.sentence)
-    for finding in verification.findings:
-        print(finding.case, finding.verdict, finding.error, finding.allowed, finding.mistake)
+    import conservative as cv
+
+    for verification in cv.verification.verify(["run.csv"], body="my_body.toml"):
+        print(verification.sentence)
+        for finding in verification.findings:
+            print(finding.case, finding.verdict, finding.error, finding.allowed, finding.mistake)
 """
 
 from .finding import CHECKS, Cause, Finding, Verdict, Verification

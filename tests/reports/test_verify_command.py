@@ -149,7 +149,7 @@ def test_parts_of_a_scene_file_are_verified_from_any_row(gone, tmp_path):
         arguments = [str(tmp_path / "late.csv"), "--body", str(tmp_path / "body.toml"), "--start", start, "--error", "1e-8"]
         done = CliRunner().invoke(main, ["verify", *arguments])
         assert done.exit_code == (1 if gone else 0), done.output
-        assert (f"It is the motion without the {gone}" in done.stdout) == bool(gone)
+        assert (f"it is the motion without the {gone}" in done.stdout) == bool(gone)
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ class Runner:
         starts, grid = zip(*((each.R0, each.w0, each.scene.body.inertia) for each in bodies), strict=True), bodies[0].grid
         R, w, inertia = map(np.array, starts)
         options = {"dt": grid.dt, "t_end": grid.t[-1], "sample_every": grid.every, "method": self.method}
-        ensemble = integrate_many(bodies[0].scene, R, w, inertia=inertia, **options)
+        ensemble = integrate_many(bodies[number].scene, R, w, inertia=inertia, **options)  # its field is the one that counts
         return ensemble[number].R_WB, ensemble[number].w_WB_B
 
     def apart(self, one: Description) -> Samples:
