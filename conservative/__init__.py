@@ -25,5 +25,11 @@ def __getattr__(name: str) -> object:
     with unstoppable():
         if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
             return import_module(f"{__name__}.{name}")
-        value = globals()[name] = _load(name)
+        if name == "verification":  # of a room above, which this one cannot import
+            from .deferred_imports import ROOMS, load_entry
+
+            value = load_entry(ROOMS, ROOMS, name)
+        else:
+            value = _load(name)
+        globals()[name] = value
         return value

@@ -2,6 +2,7 @@
 
 from . import scenes as scenes
 from . import shapes as shapes
+from .benchmarks import verification as verification
 from .body import RigidBody as RigidBody
 from .card import Card as Card
 from .errors import AccuracyNotReached as AccuracyNotReached

@@ -9,6 +9,7 @@ h' is not needed, and K is continuous where h jumps. The integration ends at the
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -49,10 +50,11 @@ class Case:
 
     def scene(self, name: str = "case", **options: Any) -> cv.Scene:
         """Return the scene of the package with these numbers."""
-        body: Any = cv.RigidBody(self.J)
         breaks = {True: {"breaks": self.breaks}, False: {}}
-        if self.rotor is not None:
-            body = cv.RigidBody(self.J, rotor_momentum=self.rotor, **breaks[callable(self.rotor)])
+        with warnings.catch_warnings(action="ignore", category=cv.ImpossibleInertia):  # random tensors are what they are
+            body: Any = cv.RigidBody(self.J)
+            if self.rotor is not None:
+                body = cv.RigidBody(self.J, rotor_momentum=self.rotor, **breaks[callable(self.rotor)])
         if self.flight is not None:
             mass, com, g, p, v = self.flight
             body = cv.shapes.MassDistribution(mass, com, self.J)

@@ -15,7 +15,7 @@ from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.references.environments.catalogue import MuJoCo
 from conservative.references.exact import method
-from conservative.references.importers.model_files import body_from_mjcf
+from conservative.references.model_files.scene_bodies import body_from_mjcf
 from conservative.references.precise import Precise
 from conservative.references.solvers.heyoka import Heyoka
 from conservative.references.solvers.scipy import SciPy

@@ -22,7 +22,7 @@ def test_every_program_has_the_protocol_of_the_page():
 
 
 def test_formats_of_files():
-    assert (store.FORMAT_VERSION, measure.SCHEMA, baseline.FORMAT, checkpoint.FORMAT) == (1, 2, 2, 4)
+    assert (store.FORMAT_VERSION, measure.SCHEMA, baseline.FORMAT, checkpoint.FORMAT) == (1, 3, 2, 5)
 
 
 def test_the_baseline_has_the_definitions_of_the_suite():

@@ -25,7 +25,7 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.benchmarks.judge.diagnose import Diagnosis
+from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.versions.project import define_scene
 from conservative.needs import Need
 from conservative.programs import Program
@@ -313,27 +313,27 @@ def sweep(cell: Cell) -> None:
         cell.check(many.t, np.asarray(many.R_WB[i]))
 
 
-def judge(cell: Cell) -> None:
+def verify(cell: Cell) -> None:
     """The right motion is right, and the motion without the part is wrong; what explains it is left out, because it is slow."""
-    with patch("conservative.benchmarks.judge.verdict.diagnose", return_value=Diagnosis()):
-        judge_and_explain(cell)
+    with patch("conservative.benchmarks.verification.recordings.verdict.diagnose", return_value=Diagnosis()):
+        verify_and_explain(cell)
 
 
-def judge_and_explain(cell: Cell) -> None:
+def verify_and_explain(cell: Cell) -> None:
     for (R_WB, w), right in ((motion(cell.row.case, T), True), (motion(cell.row.without, T), False)):
         write_motion(cell.folder / "run.csv", R_WB, w)
-        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1, 3))
-        assert found["right"] is right, found["error"]
-        assert not right or max(found["error"]) < 1e-9
+        found = cell.call("verify", "run.csv", "--body", cell.name, codes=(0, 1, 3))
+        assert (found["verdict"] == "right") is right, found["subjects"]
+        assert not right or max(found["subjects"][0]["details"]["error"]) < 1e-9
 
 
-def judge_later(cell: Cell) -> None:
-    """A file that begins after t = 0 is judged at its own times."""
+def verify_later(cell: Cell) -> None:
+    """A file that begins after t = 0 is compared at its own times."""
     R_WB, w = motion(cell.row.case, T)
     write_motion(cell.folder / "run.csv", R_WB, w, 50)
-    with patch("conservative.benchmarks.judge.verdict.diagnose", return_value=Diagnosis()):
-        found = cell.call("judge", "run.csv", "--body", cell.name, codes=(0, 1, 3))
-    assert found["right"], found["error"]
+    with patch("conservative.benchmarks.verification.recordings.verdict.diagnose", return_value=Diagnosis()):
+        found = cell.call("verify", "run.csv", "--body", cell.name, codes=(0, 1, 3))
+    assert found["verdict"] == "right", found["subjects"]
 
 
 T = np.linspace(0, 2, 201)
@@ -369,7 +369,7 @@ COMMANDS = {
     "watch": (watch,),
     "recommend": (recommend,),
     "sweep": (sweep,),
-    "judge": (judge, judge_and_explain, judge_later),
+    "verify": (verify, verify_and_explain, verify_later),
     "study": (study,),
     "report": (report,),
     "gate": (gate,),
@@ -389,9 +389,9 @@ ENTRIES = (
     keys,
     truth,
 )
-SLOW = (dask, report, study, recommend, judge_and_explain, integrate_many_error)
-NEVER = (integrate, integrate_samples, integrate_error, pickled, keys, truth, run, run_odd_step, watch, judge)
-NEVER += (judge_and_explain, judge_later)
+SLOW = (dask, report, study, recommend, verify_and_explain, integrate_many_error)
+NEVER = (integrate, integrate_samples, integrate_error, pickled, keys, truth, run, run_odd_step, watch, verify)
+NEVER += (verify_and_explain, verify_later)
 """Columns that take every part: a refusal is a failure there."""
 columns = [*ENTRIES, *(column for each in COMMANDS.values() for column in each)]
 METHODS = registry.list_methods()

@@ -93,7 +93,7 @@ def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, ex
     assert f"pip install 'conservative-rotation[{extra}]'" in error
 
 
-def test_a_file_is_judged_in_a_lean_environment_and_without_numba(tmp_path):
+def test_a_file_is_verified_in_a_lean_environment_and_without_numba(tmp_path):
     t = np.linspace(0, 2, 101)
     for name, fault in (("right", 1.0), ("wrong", 1.001)):
         R, w = free_body(BODY, np.eye(3), [0.2, 2.0, 0.3], fault * t)
@@ -101,7 +101,7 @@ def test_a_file_is_judged_in_a_lean_environment_and_without_numba(tmp_path):
         header = ",".join(["t", *(f"R_{i}{j}" for i in "123" for j in "123"), *(f"w_{i} (rad/s)" for i in "xyz")])
         np.savetxt(tmp_path / f"{name}.csv", np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.17g")
         arguments = [
-            "judge",
+            "verify",
             str(tmp_path / f"{name}.csv"),
             "--body",
             str(tmp_path / "body.toml"),
@@ -113,7 +113,12 @@ def test_a_file_is_judged_in_a_lean_environment_and_without_numba(tmp_path):
         )
         code, _, error = run_python(REFUSE + LOOK + COMMAND, others() + ",numba,llvmlite", *arguments)
         assert code == (name == "wrong"), error
-        assert sorted(path.name for path in (tmp_path / name).iterdir()) == ["judge.csv", "judge.json", "judge.md"]
+        assert sorted(path.name for path in (tmp_path / name).iterdir()) == [
+            "errors.csv",
+            "verify.csv",
+            "verify.json",
+            "verify.md",
+        ]
 
 
 @pytest.mark.slow

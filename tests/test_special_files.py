@@ -6,11 +6,11 @@ import pytest
 
 import conservative as cv
 from conservative.benchmarks.gate import baseline, results
-from conservative.benchmarks.judge import table
+from conservative.benchmarks.verification.recordings import table
 from conservative.files import read_bytes
 from conservative.programs import read_programs
-from conservative.references.importers.files import Unread
-from conservative.references.importers.files import read_bytes as read_model
+from conservative.references.model_files.files import Unread
+from conservative.references.model_files.files import read_bytes as read_model
 from conservative.reports.run import checkpoint
 from conservative.scene_files import scene_file
 

@@ -188,7 +188,7 @@ def commands() -> str:
 
 def kept_motions() -> list[dict[str, Any]]:
     """Return the motions of references/motions, in the order of the catalogue."""
-    from conservative.benchmarks.motions.motion import load
+    from conservative.benchmarks.verification.motions.motion import load
 
     folder = ROOT / "references" / "motions"
     return [json.loads((folder / f"{motion.name}.json").read_text(encoding="utf-8")) for motion in load()]
@@ -207,15 +207,22 @@ def _factor(x: float) -> str:
     return "allowed" if x < 1 else f"{x:.0f}" if x < 1000 else f"{x:.0e}".replace("+0", "").replace("+", "")
 
 
+def _over(order: int, motion: dict[str, Any], known: dict[str, Any]) -> float:
+    """Return the largest error of a mistake over its tolerance at |w| h = 0.01."""
+    (allowed,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (order, 0.01))
+    return max(known[name] / allowed[name] for name in ("attitude", "rates", "energy", "momentum"))
+
+
 def mistakes() -> str:
     """Return a row for each mistake that motions catch."""
-    from conservative.benchmarks.motions.programs import MISTAKES
+    from conservative.benchmarks.verification.motions.signatures import names
 
     rows, kept = [], kept_motions()
-    for name, mistake in MISTAKES.items():
-        factors = [each["factor"] for motion in kept for each in motion["catches"] if each["mistake"] == name]
-        best = [max((factor[order], -1.0) for factor in factors)[0] for order in ("1", "2", "4")]
-        rows.append([name, mistake.sentence, str(len(factors)), *map(_factor, best)])
+    for name, sentence in names().items():
+        rows_of = [(motion, each) for motion in kept for each in motion["catches"] if each["mistake"] == name]
+        if rows_of:
+            best = [max(_over(order, *each) for each in rows_of) for order in (1, 2, 4)]
+            rows.append([name, sentence, str(len(rows_of)), *map(_factor, best)])
     return table(["mistake", "what the program does", "motions", "order 1", "order 2", "order 4"], rows)
 
 

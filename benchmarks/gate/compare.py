@@ -61,7 +61,7 @@ class Verdict:
         return "\n".join([*lines, "", *notes]) + "\n"
 
 
-def judge(baseline: Baseline, results: Results) -> Verdict:
+def decide(baseline: Baseline, results: Results) -> Verdict:
     """Return the verdict on results. An empty baseline is a violation, because everything would pass.
 
     Rows that the run left out are not compared. Raise `NothingToCompare` if these are all.

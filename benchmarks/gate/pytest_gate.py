@@ -117,7 +117,7 @@ class Gate:
             self.nothing = "no baseline"
             raise before
         try:
-            self.verdict = compare.judge(before, run)
+            self.verdict = compare.decide(before, run)
         except baseline.NothingToCompare as error:
             self.nothing = str(error)
             raise

@@ -51,7 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
     Raises
     ------
     pytest.UsageError
-        pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
+        pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot decide.
     """
     config.args = [_linked(text, config.invocation_params.dir) for text in config.args]
     if not config.getoption("conservative_benchmark"):

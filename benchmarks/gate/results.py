@@ -52,8 +52,8 @@ class Row:
         Reason why there are no values; may be empty.
     seconds
         Shortest time of a call, s, which is not gated; 0 if it was not timed.
-    cause
-        Mistake that explains the motion, as `engines check` or `judge` names it; only of two versions.
+    mistake, cause
+        Keys of the mistakes that explain the motion, and their sentences; only of two versions.
     """
 
     id: str
@@ -66,6 +66,7 @@ class Row:
     spreads: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     seconds: float = 0.0
+    mistake: str = ""
     cause: str = ""
 
 

@@ -24,13 +24,11 @@ from . import (
     long_runs,
     long_time,
     motion,
-    motions,
     paper,
     random,
     speed,
     stability,
     throughput,
-    twins,
     work_precision,
 )
 from .case import Case
@@ -39,7 +37,7 @@ from .study import Finding, Progress, Study, without_truth
 
 _IN_ORDER = (
     *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time),
-    *(engines_at_one_step, engines_over_steps, motions, twins, stability, hard_cases, throughput),
+    *(engines_at_one_step, engines_over_steps, stability, hard_cases, throughput),
 )
 STUDIES: Mapping[str, Declaration] = {each.STUDY.name: each.STUDY for each in _IN_ORDER}
 """The declaration of each study by its name, in the order of a report."""

@@ -1,4 +1,4 @@
-"""Versions of a project: the gate judges errors, drifts, orders and counts, as against a baseline; times are measured in turn.
+"""Versions of a project: the gate compares errors, drifts, orders and counts, as with a baseline; times are in turn.
 
 This process measures the errors of all versions against its own reference solution, and computes the drifts. A version only
 integrates, and reports the outcome of its runs.
@@ -9,20 +9,21 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from time import monotonic
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from conservative import registry
-from conservative.errors import BadInput, IntegrationFailed
+from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Role
+from conservative.needs import Need
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import Answer
@@ -38,7 +39,6 @@ from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
 from ..suite import description, points
 from . import inside
-from .causes import find_causes
 from .comparison import Comparison, Line, compare
 from .prices import Price
 from .times import PROCESSES, SLOWER, TimeRow, compare_times
@@ -57,19 +57,36 @@ ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]
 
 
+class Explained(NamedTuple):
+    """The mistakes that explain wrong motions, by their keys and in a sentence; both are empty for right motions."""
+
+    key: str = ""
+    sentence: str = ""
+
+
+Explain = Callable[[Callable[[Scene, Grid], Trajectory], Mapping[str, Any]], tuple[Explained, Explained]]
+"""From a function that integrates scenes, and a setting, to the mistakes on free and on other bodies."""
+
+
 class ProjectSide:
     """A version and its process, with its own folder of compiled kernels.
 
     `names` are the compared methods, by default those that the project registers with the role `Role.OURS`. `few` are the rows
     that are measured with fewer points: those of the earlier version, because values of other points cannot be compared.
+    `explain` finds the mistakes of a setting; without it no row has a cause.
     """
 
     def __init__(
-        self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None, few: set[str] | None = None
+        self,
+        version: Version,
+        names: Sequence[str] = (),
+        truths: FindTruth | None = None,
+        few: set[str] | None = None,
+        explain: Explain | None = None,
     ) -> None:
         self.version, self._names, self._truths = version, list(names), truths or remember_truths()
         self.few, self._decides = set[str]() if few is None else few, few is None
-        self._causes: dict[str, tuple[str, str]] = {}
+        self._explain, self._causes = explain, dict[str, tuple[Explained, Explained]]()
         kernels = version.environment.folder / "home" / "kernels"
         self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
 
@@ -100,8 +117,10 @@ class ProjectSide:
         for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
             if here == there:
                 row = self._measure(scene, setting, row)
-                cause = "" if row.status is Status.SKIPPED else self._find_causes(setting)[not registry.scene(scene).free]
-                yield name, replace(row, cause=cause)
+                if row.status is not Status.SKIPPED:
+                    found = self._find_causes(setting)[not registry.scene(scene).free]
+                    row = replace(row, mistake=found.key, cause=found.sentence)
+                yield name, row
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
                 yield name, replace(row, definition=there, reason="another motion")
 
@@ -122,7 +141,7 @@ class ProjectSide:
                 method.solve(point.scene, point.grid)
                 if monotonic() - spent > SLOW:
                     self.few.add(row.id)
-            return judge_values(row, *points.measure(point, row.id in self.few))
+            return decide_values(row, *points.measure(point, row.id in self.few))
         except IntegrationFailed as failure:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
@@ -130,14 +149,15 @@ class ProjectSide:
         names = setting["name"], setting["label"], setting["order"]
         return Remote(*names, side=self, scene_name=scene, longest=longest, precision=setting["precision"])
 
-    def _find_causes(self, setting: Mapping[str, Any]) -> tuple[str, str]:
-        """Return the mistakes of a setting on free and on heavy bodies; "" for none, and if it does not answer."""
-        if setting["name"] not in self._causes:
-            try:
-                self._causes[setting["name"]] = find_causes(self._remote(setting).probe)
-            except IntegrationFailed:  # a row of a scene says so
-                self._causes[setting["name"]] = "", ""
-        return self._causes[setting["name"]]
+    def _find_causes(self, setting: Mapping[str, Any]) -> tuple[Explained, Explained]:
+        """Return the mistakes of a setting on free and on other bodies; none if it does not answer."""
+        name = setting["name"]
+        if name not in self._causes:
+            self._causes[name] = Explained(), Explained()
+            with suppress(IntegrationFailed):  # a row of a scene says so
+                if self._explain:
+                    self._causes[name] = self._explain(self._remote(setting).probe, setting)
+        return self._causes[name]
 
     def run(self, task: str, read: Callable[[Answer], Any], **values: Any) -> WorkerRun[Any]:
         """Return the run of a task of `inside`; `read` converts its answers."""
@@ -171,12 +191,20 @@ class Remote(StandIn):
         return self.side.run("solve", partial(self.read, scene), scene=self.scene_name, method=self.name, **values)
 
     def probe(self, scene: Scene, grid: Grid) -> Trajectory:
-        """Return the trajectory of one of the bodies of `engines check`. It is not checked."""
+        """Return the trajectory of a body in its principal axes, free or with a weight. It is not checked.
+
+        Raise `Unsupported` for other scenes, which not every version has, and for those that the method does not support.
+        """
+        if lacking := scene.needs - {Need.GRAVITY}:
+            raise Unsupported("scene", ", ".join(sorted(lacking)), "a free body, or one with a weight")
         field: Any = scene.potential
         weight, com = (0.0, np.zeros(3)) if field is None else (field.weight, field.com_B)
         body = {"moments": scene.body.moments, "R_WB0": scene.R_WB0, "w_WB_B0": scene.w_WB_B0, "weight": weight, "com": com}
         steps = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every}
-        found = self.side.run("probe", partial(self.read, scene), method=self.name, **body, **steps)()
+        try:
+            found = self.side.run("probe", partial(self.read, scene), method=self.name, **body, **steps)()
+        except NotImplementedError as error:
+            raise Unsupported("scene", str(error), "a scene that the method supports") from None
         if found.failure is not None:
             raise found.failure
         return found
@@ -202,7 +230,7 @@ def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = descrip
     return points.define(answer["invariants"], points.arrange(answer))
 
 
-def judge_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
+def decide_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
     nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
     if reason := "; ".join(filter(None, [find_runaway(values), *nonsense])):
@@ -217,11 +245,13 @@ def compare_projects(
     methods: Sequence[str] = (),
     processes: int = PROCESSES,
     tell: Progress = lambda share, what: None,
+    explain: Explain | None = None,
 ) -> ProjectComparison:
     """Return the comparison of an earlier and a later version of a project, with a number of processes of each for times,
     or 0 for none.
 
     Scenes and methods are registered names; by default the scenes of the suite, and all methods with the role `Role.OURS`.
+    `explain` finds the mistakes that explain wrong motions; without it violations have no causes.
 
     Raises
     ------
@@ -231,7 +261,10 @@ def compare_projects(
     for name in scenes:
         define_scene(name)  # before any work
     truths = remember_truths()
-    with closing(ProjectSide(base, methods, truths)) as was, closing(ProjectSide(head, methods, truths, was.few)) as now:
+    with (
+        closing(ProjectSide(base, methods, truths, explain=explain)) as was,
+        closing(ProjectSide(head, methods, truths, was.few, explain)) as now,
+    ):
         made: ProjectComparison = compare((was, now), scenes, tell)
         if unknown := find_unknown(methods, {line.setting for line in made.lines}):
             raise BadInput("methods", ", ".join(unknown), "methods that a version has, without engines in environments")
@@ -254,14 +287,14 @@ def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]
     return [name for name in methods if name.partition(":")[0] not in families]
 
 
-def judge(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
+def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
     """Return the verdict on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
     both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
     before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
-    verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
+    verdict = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
     others = {(each.scene, each.method) for each in moved.values()}
     violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]
@@ -302,7 +335,7 @@ def _moves(was: Row, now: Row) -> bool:
     """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
     if Status.SKIPPED in (was.status, now.status) or was.status is Status.ERROR or was.definition != now.definition:
         return False
-    if now.cause not in ("", was.cause):  # also where the motion is lost in both
+    if now.mistake not in ("", was.mistake):  # also where the motion is lost in both
         return True
     return was.status is Status.PASSED and error_of(was) <= LOST < OTHER < error_of(now)
 
@@ -311,7 +344,7 @@ def _moved(was: Row, now: Row) -> Violation:
     """Return the violation by another motion, with its cause."""
     before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.reason})"
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
-    cause = now.cause if now.cause not in ("", was.cause) else "no mistake that `engines check` knows explains it"
+    cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
     return Violation(MOTION, now.scene, now.method, before, f"{size}. {cause}", "")
 
 
@@ -345,7 +378,7 @@ def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) ->
         for text in dict.fromkeys(row.reason for row in (was, now) if row and row.status is Status.SKIPPED):
             scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
         if was and was.cause:
-            still = "in both versions" if now and now.cause == was.cause else "not any more"
+            still = "in both versions" if now and now.mistake == was.mistake else "not any more"
             scenes.setdefault(f"{line.setting}: {was.cause} ({still})", []).append(line.scene)
     for text, names in scenes.items():
         yield f"{text}: {', '.join(dict.fromkeys(names))}"

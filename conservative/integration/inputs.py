@@ -101,8 +101,10 @@ def _read_inertia(value: Array) -> Array:
         good = _are_in_range(tensors) & (skew <= 1e-13 * np.abs(tensors).max(axis=(1, 2)))
         moments = np.full((len(tensors), 3), -1.0)
         moments[good] = np.linalg.eigvalsh(tensors[good])
-    good &= (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
-    _refuse_first("inertia", value, ~good, RigidBody)  # its checks are exact, and accept most of them
+    fine = good & (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
+    with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # one warning for all is below
+        _refuse_first("inertia", value, ~fine, RigidBody)  # its checks are exact, and accept most of them
+    moments[~good] = np.linalg.eigvalsh(tensors[~good])  # of molecules
     impossible = find_impossible(moments)
     if impossible.any():
         warnings.warn(ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum())), stacklevel=4)

@@ -9,7 +9,7 @@ World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://da
 
 import numpy as np
 
-from .shared import halves, stepped, way_of
+from .shared import description_of, halves, stepped
 
 ENGINE = {
     "package": "dartpy",
@@ -17,7 +17,7 @@ ENGINE = {
     "oldest": "6.19",
     "title": "semi-implicit Euler",
     "fields": ("UniformGravity",),
-    "ways": ("frame", "child", "world", "time"),
+    "descriptions": ("frame", "child", "world", "time"),
     "card": {
         "as_installed": ("",),
         "usual_dt": 0.001,
@@ -37,7 +37,7 @@ def prepare(given):
     parts = [body, *(skeleton.createWeldJointAndBodyNodePair(body)[1] for _ in halves(given)[1:])]
     for part, (mass, inertia) in zip(parts, halves(given), strict=True):
         part.setInertia(dart.dynamics.Inertia(mass, given.com, inertia))
-    if way_of(given) == "world":
+    if description_of(given) == "world":
         far = dart.dynamics.Skeleton("far")
         far.createFreeJointAndBodyNodePair()
         world.addSkeleton(far)
@@ -57,12 +57,14 @@ def prepare(given):
 
     def begin():
         world.reset()
-        if way_of(given) == "time":
-            world.setTime(1000.0)
         joint.setPositions(start[0])
         joint.setVelocities(start[1])
+
+    def begin_later():
+        begin()
+        world.setTime(1000.0)
 
     def read():
         return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}
 
-    return stepped(given, begin, world.step, read)
+    return stepped(given, begin_later if description_of(given) == "time" else begin, world.step, read)

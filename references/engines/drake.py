@@ -28,7 +28,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from .shared import FIELDS, field_torque, halves, pack_field, way_of, write_urdf
+from .shared import FIELDS, description_of, field_torque, halves, pack_field, write_urdf
 
 ENGINE = {
     "package": "drake",
@@ -42,7 +42,7 @@ ENGINE = {
     },
     "tolerance": "accuracy",
     "fields": FIELDS,
-    "ways": ("frame", "offset", "file", "child", "world", "time"),
+    "descriptions": ("frame", "offset", "file", "child", "world", "time"),
     "card": {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
         "suite": ("discrete", "runge_kutta5"),
@@ -62,7 +62,7 @@ def prepare(given):
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
     start = _start(drake, plant, body, inner, given)
-    begin = 1000.0 if way_of(given) == "time" else 0.0
+    begin = 1000.0 if description_of(given) == "time" else 0.0
     times = begin + given.steps * given.dt
 
     def run():
@@ -115,9 +115,9 @@ def _build(drake, given):
     discrete = given.integrator == "discrete"
     builder = drake.DiagramBuilder()
     plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
-    if way_of(given) == "world":
+    if description_of(given) == "world":
         plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(3.0, 2.0))
-    if way_of(given) == "file":
+    if description_of(given) == "file":
         drake.Parser(plant).AddModelsFromString(write_urdf(given), "urdf")
         body = plant.GetBodyByName("body")
     else:

@@ -31,7 +31,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
     "precision": "f32",
     "fields": ("UniformGravity",),
-    "ways": ("frame", "child", "damping"),
+    "descriptions": ("frame", "child", "damping"),
     "card": {
         "variants": ("Euler", "RK4", "implicitfast"),
         "many": ("RK4",),

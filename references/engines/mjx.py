@@ -30,7 +30,7 @@ ENGINE = {
     "settings": {"integrator": "RK4", "precision": "f64"},
     "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
     "fields": ("UniformGravity",),
-    "ways": ("frame", "child", "damping"),
+    "descriptions": ("frame", "child", "damping"),
     "card": {
         "variants": ("Euler", "implicitfast", "RK4", "RK4,precision=f32"),
         "many": ("RK4", "RK4,precision=f32"),

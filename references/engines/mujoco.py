@@ -30,7 +30,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .shared import FIELDS, compile_torque, mujoco_moments, pack_field, way_of, write_mjcf
+from .shared import FIELDS, compile_torque, description_of, mujoco_moments, pack_field, write_mjcf
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 ENGINE = {
@@ -40,7 +40,7 @@ ENGINE = {
     "settings": {"integrator": "RK4", "threads": 1},
     "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
     "fields": FIELDS,
-    "ways": ("frame", "offset", "file", "setter", "child", "joints", "world", "time", "damping", "saved"),
+    "descriptions": ("frame", "offset", "file", "setter", "child", "joints", "world", "time", "damping", "saved"),
     "card": {
         "variants": INTEGRATORS,
         "report": ("Euler", ""),
@@ -164,16 +164,18 @@ def _model(mj, given):
     if integrator is None:
         has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
         raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {given.integrator}, but {', '.join(has)}")
-    spec = mj.MjSpec.from_string(write_mjcf(given)) if way_of(given) in WRITTEN else mj.MjSpec()
+    spec = mj.MjSpec.from_string(write_mjcf(given)) if description_of(given) in WRITTEN else mj.MjSpec()
     spec.option.timestep = given.dt
     spec.option.integrator = integrator
     spec.option.gravity = (0, 0, -given.gravity)
     field = pack_field(given)
     off = (*SWITCHED_OFF, *("GRAVITY",) * (given.gravity == 0), *PASSIVE * (not field.any()))
     spec.option.disableflags = sum(int(getattr(mj.mjtDisableBit, f"mjDSBL_{name}", 0)) for name in off)
-    body = spec.body("body") if way_of(given) in WRITTEN else spec.worldbody.add_body(name="body", explicitinertial=True)
-    if way_of(given) not in WRITTEN:
-        body.mass, body.ipos, body.inertia, body.iquat = DUMMY if way_of(given) == "setter" else _inertial(given)
+    body = (
+        spec.body("body") if description_of(given) in WRITTEN else spec.worldbody.add_body(name="body", explicitinertial=True)
+    )
+    if description_of(given) not in WRITTEN:
+        body.mass, body.ipos, body.inertia, body.iquat = DUMMY if description_of(given) == "setter" else _inertial(given)
         body.add_joint(type=mj.mjtJoint.mjJNT_FREE if given.free else mj.mjtJoint.mjJNT_BALL)
     if given.stiffness and not given.turn.any():
         tendon = spec.add_tendon(name="spring", stiffness=given.stiffness, springlength=[given.rest_length] * 2)
@@ -183,11 +185,11 @@ def _model(mj, given):
     elif field.any():
         spec.add_numeric(name="field", data=[FIELD, *field], size=1 + len(field))
     model = spec.compile()
-    if way_of(given) == "setter":
+    if description_of(given) == "setter":
         for name, value in zip(("mass", "ipos", "inertia", "iquat"), _inertial(given), strict=True):
             getattr(model, f"body_{name}")[1] = value
         mj.mj_setConst(model, mj.MjData(model))
-    if way_of(given) == "saved":
+    if description_of(given) == "saved":
         with TemporaryDirectory() as folder:
             mj.mj_saveModel(model, f"{folder}/body.mjb", None)
             return mj.MjModel.from_binary_path(f"{folder}/body.mjb")
@@ -195,7 +197,7 @@ def _model(mj, given):
 
 
 WRITTEN = ("file", "child", "joints", "world", "damping")
-"""Ways of a body in a file."""
+"""Descriptions of a body by a file."""
 DUMMY = 1, (0.1, 0.2, 0.3), (2, 3, 4), (0.6, 0.8, 0, 0)
 """A body whose centre and axes are not those of its frame: MuJoCo decides that when it compiles a model."""
 
@@ -261,7 +263,7 @@ def _start(mj, model, data, given):
     data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0
     if hasattr(given, "p_WB0"):
         data.qpos[:3], data.qvel[:3] = given.p_WB0, given.v_WB0
-    if way_of(given) == "time":
+    if description_of(given) == "time":
         data.time = 1000.0
     state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
     mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)

@@ -23,7 +23,7 @@ export function build({ mass, gravity, com, moments_com: [a, b, c], q_com, q0, w
   return { step: () => M.mj_step(model, data), read: () => [data.qpos.slice(-4), data.qvel.slice(-3)], rates: 'w' };
 }
 
-export function load(path, M, own) { // as in importers/loaders.py
+export function load(path, M, own) { // as in model_files/loaders.py
   const take = (object) => (own(() => object.delete()), object);
   const text = readFileSync(path, 'utf8'), folder = dirname(path), files = take(new M.MjVFS());
   for (const name of readdirSync(folder).filter((each) => text.includes(`"${each}"`))) { // meshes

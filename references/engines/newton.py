@@ -27,7 +27,7 @@ from functools import partial
 
 import numpy as np
 
-from .shared import halves, record_warp, way_of, write_urdf
+from .shared import description_of, halves, record_warp, write_urdf
 
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
@@ -36,12 +36,12 @@ ORDERS = {
 ENGINE = {
     "package": "newton[sim]",  # without the extra it lacks MuJoCo
     "module": "newton",
-    "requirements": ("usd-core<26.9", "newton-usd-schemas", "scipy"),  # its importer of USD; the extra `importers` takes 1 GB
+    "requirements": ("usd-core<26.9", "newton-usd-schemas", "scipy"),  # its importer of USD; its extra `importers` takes 1 GB
     "oldest": "1.8",  # earlier versions build and step models in other ways
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,
     "precision": "f32",
-    "ways": ("frame", "file", "child", "world"),
+    "descriptions": ("frame", "file", "child", "world"),
     "fields": ("UniformGravity",),
     "free_only": {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
@@ -110,7 +110,7 @@ def _model(newton, warp, given):
         newton.solvers.SolverKamino.register_custom_attributes(builder)
     body = _add_body(builder, warp, given)
     lever = given.R0 @ given.com
-    if way_of(given) == "world":
+    if description_of(given) == "world":
         far = warp.transform((1000.0, 200.0, 30.0), (0.0, 0.0, 0.0, 1.0))
         builder.add_body(xform=far, mass=3.0, inertia=warp.mat33(*(3.0 * np.eye(3)).ravel().tolist()))
     builder.body_qd[body] = warp.spatial_vector(*np.cross(given.w0_W, lever).tolist(), *given.w0_W.tolist())
@@ -128,11 +128,11 @@ def _add_body(builder, warp, given):
         "inertia": warp.mat33(*given.inertia_com.ravel().tolist()),
         "mass": given.mass,
     }
-    if given.free and way_of(given) == "file":
+    if given.free and description_of(given) == "file":
         builder.add_urdf(write_urdf(given), floating=True)
         builder.body_q[0] = options["xform"]
         return 0
-    if given.free and way_of(given) != "child":
+    if given.free and description_of(given) != "child":
         return builder.add_body(**options)
     parts = [{**options, "mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())} for mass, inertia in halves(given)]
     body = builder.add_link(**parts[0])

@@ -18,7 +18,7 @@ aba, integrate: https://docs.ros.org/en/kinetic/api/pinocchio/html/
 
 import numpy as np
 
-from .shared import FIELDS, compile_torque, halves, pack_field, way_of, write_urdf
+from .shared import FIELDS, compile_torque, description_of, halves, pack_field, write_urdf
 
 ENGINE = {
     "package": "pin",
@@ -27,7 +27,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK4": 4},
     "prefix": "aba+",
     "fields": FIELDS,
-    "ways": ("frame", "offset", "file", "child", "joints"),
+    "descriptions": ("frame", "offset", "file", "child", "joints"),
     "card": {
         "variants": ("Euler", "RK4"),
         "report": ("",),
@@ -106,7 +106,7 @@ def _start(given):
 
 
 def _flies(given):
-    return hasattr(given, "p_WB0") or (given.free and way_of(given) == "joints")
+    return hasattr(given, "p_WB0") or (given.free and description_of(given) == "joints")
 
 
 def _stepper(pin, given):
@@ -116,7 +116,7 @@ def _stepper(pin, given):
     that acts from the right, q' = q v, with v in body axes.
     """
     kind = pin.JointModelFreeFlyer() if _flies(given) else pin.JointModelSpherical()
-    if way_of(given) == "file":
+    if description_of(given) == "file":
         model = pin.buildModelFromXML(write_urdf(given), kind)
     else:
         model = pin.Model()

@@ -21,7 +21,7 @@ from tempfile import NamedTemporaryFile
 
 import numpy as np
 
-from .shared import sample, way_of, write_urdf
+from .shared import description_of, sample, write_urdf
 
 ENGINE = {
     "package": "pybullet",
@@ -32,7 +32,7 @@ ENGINE = {
     "fields": ("UniformGravity",),
     "free_only": {"maximal": "PyBullet has no joint to the world for a body in maximal coordinates"},
     "rate_limit": 100.0,  # maxJointVelocity
-    "ways": ("offset", "file", "world"),
+    "descriptions": ("offset", "file", "world"),
     "card": {
         "variants": ("", "maximal", "as_installed=true"),
         "as_installed": ("as_installed=true",),
@@ -54,7 +54,7 @@ def prepare(given):
         bullet.resetSimulation()
         bullet.setGravity(0, 0, -given.gravity)
         bullet.setPhysicsEngineParameter(fixedTimeStep=given.dt, numSubSteps=0)
-        if way_of(given) == "world":
+        if description_of(given) == "world":
             bullet.createMultiBody(3.0, -1, -1, [1000, 200, 30])
         ready[:] = [build(bullet, given)]
 
@@ -91,9 +91,9 @@ def _build_free(bullet, given):
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
     arm = given.R0 @ given.com if hasattr(given, "p_WB0") else np.zeros(3)
     place = (getattr(given, "p_WB0", 0) + arm).tolist()
-    if way_of(given) == "file" and maximal:
+    if description_of(given) == "file" and maximal:
         raise NotImplementedError("the file has no shape, which a body in maximal coordinates needs")
-    if way_of(given) == "file":
+    if description_of(given) == "file":
         with NamedTemporaryFile("w", suffix=".urdf") as file:
             file.write(write_urdf(given))
             file.flush()
@@ -101,7 +101,7 @@ def _build_free(bullet, given):
     else:
         body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
     # Without its mass, a body in maximal coordinates would have a position that is not finite.
-    if way_of(given) != "file":
+    if description_of(given) != "file":
         bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments_com.tolist())
     if not given.as_installed:
         _switch_off(bullet, body, -1)

@@ -18,7 +18,7 @@ Sleeping, gyroscopic forces: https://rapier.rs/docs/user_guides/python/rigid_bod
 Joints: https://rapier.rs/docs/user_guides/python/joints
 """
 
-from .shared import sample, way_of
+from .shared import description_of, sample
 
 ENGINE = {
     "package": "rapier3d",
@@ -27,7 +27,7 @@ ENGINE = {
     "settings": {"substeps": 4, "as_installed": False},
     "precision": "f32",
     "fields": ("UniformGravity",),
-    "ways": ("frame", "world", "damping"),
+    "descriptions": ("frame", "world", "damping"),
     "card": {
         "variants": ("", "substeps=1", "as_installed=true"),
         "as_installed": ("as_installed=true",),
@@ -56,9 +56,9 @@ def prepare(given):
         body = body.gyroscopic_forces(True).linvel(drift)
         if not given.as_installed:
             body = body.can_sleep(False).allow_fast_rotation(True)
-        if way_of(given) == "damping":
+        if description_of(given) == "damping":
             body = body.linear_damping(0.0).angular_damping(0.0)
-        if way_of(given) == "world":
+        if description_of(given) == "world":
             world.add_body(rp.RigidBody.dynamic(translation=(1000, 200, 30)).additional_mass(3.0).build())
         handle = world.add_body(body.build())
         if not given.free:

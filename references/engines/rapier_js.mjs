@@ -3,7 +3,7 @@
  * `as_installed`, sleeping is off. https://rapier.rs/docs/user_guides/javascript/rigid_bodies
  */
 export const ENGINE = {
-  "package": "@dimforge/rapier3d-compat", "oldest": "0.12.0", "ways": ["frame", "setter", "world", "damping"], "settings": {"substeps": 4, "as_installed": false}
+  "package": "@dimforge/rapier3d-compat", "oldest": "0.12.0", "descriptions": ["frame", "setter", "world", "damping"], "settings": {"substeps": 4, "as_installed": false}
 };
 export const start = async (rapier) => (await rapier.init(), rapier);
 
@@ -14,11 +14,11 @@ export function build(given, R, own) {
   Object.assign(world, { timestep: given.dt, numSolverIterations: given.substeps });
   const settings = R.RigidBodyDesc.dynamic().setRotation(quaternion(given.q0)).setAngvel(vector(given.w0_W));
   const properties = [given.mass, vector(given.com), vector(given.moments_com), quaternion(given.q_com)];
-  if (given.way !== 'setter') settings.setAdditionalMassProperties(...properties);
-  if (given.way === 'damping') settings.setLinearDamping(0).setAngularDamping(0);
-  if (given.way === 'world') world.createRigidBody(R.RigidBodyDesc.dynamic().setTranslation(1000, 200, 30).setAdditionalMass(3));
+  if (given.description !== 'setter') settings.setAdditionalMassProperties(...properties);
+  if (given.description === 'damping') settings.setLinearDamping(0).setAngularDamping(0);
+  if (given.description === 'world') world.createRigidBody(R.RigidBodyDesc.dynamic().setTranslation(1000, 200, 30).setAdditionalMass(3));
   const body = world.createRigidBody(settings.setLinvel(...given.v0).setCanSleep(given.as_installed));
-  if (given.way === 'setter') body.setAdditionalMassProperties(...properties, true);
+  if (given.description === 'setter') body.setAdditionalMassProperties(...properties, true);
   const support = world.createRigidBody(R.RigidBodyDesc.fixed());
   if (!given.free) world.createImpulseJoint(R.JointData.spherical(origin, origin), support, body, true);
   return { step: () => world.step(), read: () => [body.rotation(), body.angvel()] };

@@ -17,7 +17,7 @@ SAPIEN: https://sapien-sim.github.io/docs/
 
 import numpy as np
 
-from .shared import stepped, way_of
+from .shared import description_of, stepped
 
 ENGINE = {
     "package": "sapien",
@@ -27,7 +27,7 @@ ENGINE = {
     "title": "PhysX",
     "precision": "f32",
     "fields": ("UniformGravity",),
-    "ways": ("frame", "world"),
+    "descriptions": ("frame", "world"),
     "rate_limit": 100.0,  # max_angular_velocity
     "card": {
         "variants": ("", "as_installed=true"),
@@ -64,7 +64,7 @@ def prepare(given):
             lock(0, 0)
         entity.add_component(joint)
     scene.add_entity(entity)
-    if way_of(given) == "world":
+    if description_of(given) == "world":
         far = sapien.Entity()
         far.add_component(sapien.physx.PhysxRigidDynamicComponent())
         far.set_pose(sapien.Pose([1000, 200, 30]))

@@ -138,14 +138,14 @@ def mujoco_moments(given):
     return np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
 
 
-def way_of(given):
-    """Return how a body is described, see the pairs of `conservative twins`; "" is the usual way."""
-    return getattr(given, "way", "")
+def description_of(given):
+    """Return the name of the description of the body, one of the adapter's `descriptions`; "" for the usual one."""
+    return getattr(given, "description", "")
 
 
 def halves(given):
     """Return the mass and the inertia (3, 3), kg m^2, of each part of the body: two if it has a fixed child."""
-    share = (0.25, 0.75) if way_of(given) == "child" else (1.0,)
+    share = (0.25, 0.75) if description_of(given) == "child" else (1.0,)
     return [(part * given.mass, part * given.inertia_com) for part in share]
 
 
@@ -162,16 +162,16 @@ def write_mjcf(given, option="", shape=""):
     """Return the body as an MJCF file, on a free joint or on a ball joint at the fixed point."""
     inertial = {"mass": np.array([given.mass]), "pos": given.com, "quat": given.q_com, "diaginertia": mujoco_moments(given)}
     attributes = " ".join(f'{name}="{" ".join(map(repr, values.tolist()))}"' for name, values in inertial.items())
-    way, kind = way_of(given), "free" if given.free else "ball"
-    zero = 'damping="0" armature="0" frictionloss="0"' if way == "damping" else ""
+    description, kind = description_of(given), "free" if given.free else "ball"
+    zero = 'damping="0" armature="0" frictionloss="0"' if description == "damping" else ""
     joint = f'<joint type="{kind}" {zero}/>'
-    if way == "joints" and given.free:
+    if description == "joints" and given.free:
         joint = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")) + '<joint type="ball"/>'
     inertia = f"<inertial {attributes}/>"
-    inertia = f"<body>{inertia}</body>" if way == "child" else inertia
+    inertia = f"<body>{inertia}</body>" if description == "child" else inertia
     far = (
         '<body pos="1000 200 30"><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="3 4 5"/></body>'
-        if way == "world"
+        if description == "world"
         else ""
     )
     return f"""

@@ -61,10 +61,9 @@ class EngineData(Distribution):
         depends on that.
     formats
         Formats of model files that its program loads: "urdf", "mjcf", "sdf" or "usd" (see `load` in PROTOCOL.md).
-    ways
-        Ways, beside the usual one, in which `prepare` can be told about a body: its number `way`, see `conservative twins`.
-        Two of them are in the numbers themselves: "frame", axes that are not principal, and "offset", a free body whose origin
-        is not its centre of mass.
+    descriptions
+        Further descriptions of a body that `prepare` understands, beside the usual one: its number `description` is one of
+        them. PROTOCOL.md lists them. Loops that are timed contain no code for them.
     rate_limit
         Largest angular velocity, rad/s, as installed.
     title
@@ -85,7 +84,7 @@ class EngineData(Distribution):
     fields: tuple[str, ...] = ()
     free_only: str | Mapping[str, str] = ""
     formats: tuple[str, ...] = ()
-    ways: tuple[str, ...] = ()
+    descriptions: tuple[str, ...] = ()
     rate_limit: float = math.inf
     title: str = ""
     prefix: str = ""

@@ -64,6 +64,8 @@ def _each(is_right: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 _TEXTS, _FORMATS = (_are_texts, "a list of texts"), ("urdf", "mjcf", "sdf", "usd")
 _NAMES = tuple(kind.__name__ for kind in FIELDS)
+EARLIER = "ways"
+"""Earlier name of `descriptions`, which programs may still use."""
 DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "settings": (_each(_is_setting), "an object of texts, numbers, true or false"),
     "order": (_is_order, "an integer or null"),
@@ -73,7 +75,8 @@ DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "precision": (lambda value: value in ("f64", "f32"), "'f64' or 'f32'"),
     "fields": (lambda value: _are_texts(value) and {*value} <= {*_NAMES}, f"a list of {', '.join(_NAMES)}"),
     "formats": (lambda value: _are_texts(value) and {*value} <= {*_FORMATS}, f"a list of {', '.join(_FORMATS)}"),
-    "ways": _TEXTS,
+    "descriptions": _TEXTS,
+    EARLIER: _TEXTS,
     "card": (lambda value: isinstance(value, dict), "an object"),
     "variants": _TEXTS,
     "flight": (lambda value: isinstance(value, bool), "true or false"),
@@ -102,6 +105,8 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
         greeting = worker_of(environment).greet(limit)
         _check_description(greeting.get("engine", {}))
         module.ENGINE = {**every, **greeting.get("engine", {})}
+        if EARLIER in module.ENGINE:
+            module.ENGINE["descriptions"] = module.ENGINE.pop(EARLIER)
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)

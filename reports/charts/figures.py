@@ -161,8 +161,8 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
     return apply_style(alt.hconcat(*panels))
 
 
-def judged(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
-    """Return errors and drifts of a recorded motion, from `verdict.judge`, a panel for each quantity, beside its limit."""
+def recorded(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
+    """Return errors and drifts of a recorded motion, a panel for each quantity, beside its limit."""
     panels = []
     shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))[rows["t"] > rows["t"].min()]
     for kind, part in shown.groupby("quantity", sort=False):

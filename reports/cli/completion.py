@@ -29,6 +29,12 @@ def engine_lists(ctx: click.Context, parameter: click.Parameter, incomplete: str
     return [CompletionItem(before + name) for name in ["all"] * "all".startswith(last) + _registered("engines", last)]
 
 
+def subjects(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the registered methods and engines that complete the text, and files."""
+    names = dict.fromkeys([*_registered("methods", incomplete), *_registered("engines", incomplete)])
+    return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
+
+
 def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the registered scenes, scene files and folders that complete the last of several."""
     before, last = _last(incomplete)

@@ -89,34 +89,8 @@ def add(command: str, name: str, project: bool, as_json: bool) -> None:
     _show([register(read_program(command, name, project))], lambda program: f"{program}: added", as_json)
 
 
-@engines.command(
-    short_help="Test a program.",
-    codes={1: "the program has a mistake"},
-    epilog=epilog("conservative engines check ./my_engine"),
-)
-@click.argument("command")
-@json_option
-@click.pass_context
-def check(ctx: click.Context, command: str, as_json: bool) -> None:
-    """Test COMMAND, or the program of that NAME or NAME@VERSION.
-
-    Mistakes are named, with what to change; the exit code is then 1.
-    """
-    require_extra("conservative engines", "environments")
-    from conservative.references.environments.conformance import check
-    from conservative.references.environments.programs import find_program, read_program
-
-    if (program := find_program(command)) is None:
-        _refuse_engine(command)
-        program = read_program(command, "program")
-    results = _show(
-        check(program), lambda result: f"{'right' if result[0] else 'WRONG'}  {result[1]}", as_json, f"testing {command}"
-    )
-    ctx.exit(int(not all(right for right, _ in results)))
-
-
 def _refuse_engine(command: str) -> None:
-    """Raise an error with the command that installs or tests an engine, if a text is the name of one and not a command."""
+    """Raise an error with the command that verifies an engine, if a text is the name of one and not a command."""
     from conservative.benchmarks.studies.engine_selection import select_engines
 
     if which(command) or Path(command).is_file():
@@ -125,9 +99,7 @@ def _refuse_engine(command: str) -> None:
         select_engines([command])
     except BadInput:
         return
-    raise BadInput(
-        "command", repr(command), f"a program. To test this engine, run: conservative study motions --engines {command}"
-    )
+    raise BadInput("command", repr(command), f"a program. To verify this engine, run: conservative verify {command}")
 
 
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))

@@ -127,7 +127,7 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
 def _judge(options: dict[str, Any]) -> Document:
     """Compare results with the baseline, or accept them."""
     from conservative.benchmarks.gate import baseline, results
-    from conservative.benchmarks.gate.compare import judge
+    from conservative.benchmarks.gate.compare import decide
 
     from ..document.model import Document, Paragraph, Table, filled
 
@@ -135,7 +135,7 @@ def _judge(options: dict[str, Any]) -> Document:
     runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
     if options["update"] is None:
         before = baseline.read(path)
-        verdicts = [judge(before, run) for run in runs]
+        verdicts = [decide(before, run) for run in runs]
         failed = [str(each) for each in verdicts if not each.passed]
         data = {"passed": not failed, "verdicts": [{"passed": each.passed, **vars(each)} for each in verdicts]}
         texts = [Paragraph(str(each)) for each in verdicts]
@@ -166,6 +166,7 @@ def _compare(options: dict[str, Any]) -> Document:
     from conservative.references.environments.lock import Source
     from conservative.registry import read_name
 
+    from ..run.causes import find_causes
     from ..run.provenance import provenance
     from ..sections.comparison import build
     from ..terminal.progress import progress
@@ -195,4 +196,4 @@ def _compare(options: dict[str, Any]) -> Document:
     with TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         base, latest = prepare(options["against"]), prepare(head)
         with progress() as step:
-            return build(compare_projects(base, latest, tell=step, **asked), made, prices)
+            return build(compare_projects(base, latest, tell=step, explain=find_causes, **asked), made, prices)

@@ -16,8 +16,6 @@ import click
 from ..terminal.interrupts import notes, received
 from .engines import engines
 from .gate import gate
-from .importers import importers
-from .judge import judge
 from .list import list_all
 from .motions import motions
 from .new import new
@@ -28,7 +26,7 @@ from .run import run
 from .study import study
 from .sweep import sweep
 from .track import track
-from .twins import twins
+from .verify import verify
 from .watch import watch
 
 
@@ -79,6 +77,7 @@ FIRST = """\
 conservative run brick_flip                      integrate a tumbling brick, and say how wrong the result is
 conservative watch brick_flip                    see it move, beside other methods
 conservative recommend brick_flip --error 1e-6   which method to use, with which step
+conservative verify run.csv --body my_body.toml  is a recorded motion right, and if not, what is wrong?
 conservative report                              measure all methods on the paper's scenes: a page, in a minute
 conservative new > my_body.toml                  describe your own body; each command takes this file
 conservative --help                              all commands"""
@@ -118,9 +117,7 @@ for command in (
     engines,
     track,
     study,
-    judge,
-    importers,
+    verify,
     motions,
-    twins,
 ):
     main.add_command(command)

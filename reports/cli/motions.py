@@ -21,9 +21,9 @@ def motions(out: Path, force: bool, as_json: bool) -> None:
     """Write 48 short motions as JSON and CSV, with tolerances and the mistakes that they catch.
 
     The files are those of references/motions, to the last digit. Solutions are computed again in multi-precision and tolerances
-    measured again, which takes a minute.
+    measured again, with all designs of right programs, which takes some minutes.
     """
-    from conservative.benchmarks.motions import files
+    from conservative.benchmarks.verification.motions import files
 
     from ..document import json
 

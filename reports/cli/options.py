@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
@@ -44,6 +45,28 @@ EXIT_CODES = {
 """Exit codes of every command; see `Command`."""
 
 
+OLD_NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("judge", "twins", "importers", "engines check"), "verify"),
+        "study motions": "verify --only motions",
+        "study twins": "verify --only pairs",
+        "track --twins": "track --verify pairs",
+    }
+)
+"""Commands, studies and options of the last release, and what takes their place with the same arguments."""
+
+
+class OldName(click.ClickException):
+    """A name of the last release, in the table `OLD_NAMES`, and the arguments that follow it."""
+
+    exit_code = 2
+
+    def __init__(self, old: str, arguments: Iterable[str] = ()) -> None:
+        new = OLD_NAMES[old]
+        given = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
+        super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
+
+
 class Command(click.Command):
     """A command that takes the old names of options, and whose help lists its own exit codes.
 
@@ -59,6 +82,8 @@ class Command(click.Command):
         new = {old: long for name, ((long, *_), olds) in VOCABULARY.items() if name in names for old in olds}
         for i, word in enumerate(args[: args.index("--") if "--" in args else None]):
             name, *value = word.split("=", 1)
+            if name.startswith("-") and f"{self.name} {name}" in OLD_NAMES and not ctx.resilient_parsing:
+                raise OldName(f"{self.name} {name}", [*args[:i], *args[i + 1 :]])
             if name in new and not ctx.resilient_parsing:  # as in completion
                 click.echo(f"{name} is now {new[name]}; the old name works until the next release.", err=True)
                 args = [*args[:i], "=".join([new[name], *value]), *args[i + 1 :]]
@@ -77,9 +102,17 @@ def write_codes(formatter: click.HelpFormatter, codes: Mapping[int, str]) -> Non
 
 
 class Group(click.Group):
-    """A group of commands. Its help lists the exit codes that all of them have."""
+    """A group of commands. Its help lists the exit codes that all of them have. An old name is answered with the new one."""
 
     command_class = Command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        root = ctx.find_root()
+        old = ctx.command_path.removeprefix(str(root.info_name)).strip()
+        old = f"{old} {args[0]}".strip()
+        if old in OLD_NAMES and not ctx.resilient_parsing:
+            raise OldName(old, args[1:])
+        return super().resolve_command(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         super().format_epilog(ctx, formatter)
@@ -281,10 +314,10 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
     Yields
     ------
     Callable
-        Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
-        given to it as functions without arguments, such as `csv=...`, which return a text or bytes. They are called last, and
-        a file that cannot be made leaves the others: it keeps its content, and the returned document has the failure. A disk
-        that becomes full leaves the others, too: `NotWritten` is raised after them.
+        Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have,
+        and files with other content, are functions without arguments, such as `csv=...`, which return a text or bytes. They are
+        called last, and a file that cannot be made leaves the others: it keeps its content, and the returned document has the
+        failure. A disk that becomes full leaves the others, too: `NotWritten` is raised after them.
     """
     from conservative.files import make_folder, text_file
 
@@ -304,9 +337,10 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
 
         def write(document: Document, **others: Callable[[], str | bytes]) -> Document:
             failures, unwritten = list(document.failures), list[NotWritten]()
-            for name in sorted(opened, key=lambda name: name.rpartition(".")[2] in others):
-                (context, stream), kind = opened[name], name.rpartition(".")[2]
-                make = others.get(kind) or partial(text, document, kind)
+            made_by = {name: others.get(name) or others.get(name.rpartition(".")[2]) for name in opened}
+            for name in sorted(opened, key=lambda name: made_by[name] is not None):
+                context, stream = opened[name]
+                make = made_by[name] or partial(text, document, name.rpartition(".")[2])
                 try:
                     with suppress(_NotMade), context:  # on the disk before the next one is drawn
                         made = attempt(f"The file {str(places[name][0])!r}", make)

@@ -13,6 +13,8 @@ from conservative.errors import require_extra
 from . import completion
 from .options import (
     FAILED,
+    OLD_NAMES,
+    OldName,
     Output,
     OutputCommand,
     engines_option,
@@ -109,6 +111,8 @@ def study(
     from ..sections.study import build
     from ..terminal.progress import announce, progress
 
+    if (old := f"study {name}") in OLD_NAMES:
+        raise OldName(old, [*split_names("methods", methods), *split_list("engines", engines)])
     with output_files(out, FILES, csv=csv, markdown=markdown, latex=latex) as write:
         planned = plan_study(
             name,

@@ -54,7 +54,11 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 @click.option("--bump", metavar="REF", help="The versions in the lock or requirements files of a git ref and of this folder.")
 @names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
 @names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
-@click.option("--twins", is_flag=True, help="Also show which twins began or ceased to differ; see `conservative twins`.")
+@names_option(
+    "verify",
+    "Also show in which version a case of these checks became right or wrong: motions, pairs.",
+    "CHECKS",
+)
 @json_option
 @click.option("--junit", type=Output('name="conservative track '), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(PAGE["track.md"]), help="Write tables and changes as Markdown.")
@@ -73,14 +77,16 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     from conservative.benchmarks.versions.bumps import find_bump
     from conservative.benchmarks.versions.engine import compare_engine, plan_versions, require_several
     from conservative.benchmarks.versions.version import Version
+    from conservative.check import choice
     from conservative.references.environments.environment import distribution_of
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
     from conservative.registry import read_name
 
     from ..run.provenance import provenance
+    from ..run.verification import CHECKS, verify_methods
     from ..sections.track import build
-    from ..sections.twins import changes as twin_changes
+    from ..sections.verified_engines import changes
     from ..terminal.progress import progress
 
     def tell(what: str) -> None:
@@ -93,7 +99,9 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         if bump is None:
             return click.echo(f"No file has another version of {engine} than {options['bump']}.")
         versions = *versions, *bump
-    scenes, settings = (split_names(name, options[name]) for name in ("scenes", "settings"))
+    scenes, settings, checks = (split_names(name, options[name]) for name in ("scenes", "settings", "verify"))
+    for name in checks:
+        choice("verify", name, CHECKS)
     with output_files(options["out"], PAGE, junit=options["junit"], markdown=options["markdown"]) as write:
         made = provenance().facts
         source, against = Source(options["find_links"], options["allow_build"]), options["against"]
@@ -109,7 +117,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         with progress() as step:
             compared = compare_engine(sides, step)
         with progress() as step:
-            found = twin_changes([(side.version.name, side.methods) for side in sides], step) if options["twins"] else None
-        answer = build(compared, against is not None, made, found)
+            found = [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
+        answer = build(compared, against is not None, made, changes(found) if checks else None)
         answer = write(answer)
     show(answer, as_json, silent=True)

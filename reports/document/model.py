@@ -42,7 +42,7 @@ class Cell:
     text, note
         The text, and a less important one.
     grade
-        Its grade, if it is judged.
+        Its grade, if it has one.
     value
         The number that the page sorts the column by; NaN comes last.
     interval
@@ -217,12 +217,13 @@ Block = Paragraph | Items | Links | Facts | Table | Figure | Motion | Section
 
 @dataclass(frozen=True)
 class Check:
-    """A test case for continuous integration: group, name, output, and why it failed (empty if it passed)."""
+    """A test case for continuous integration: group, name, output, and why it failed or was skipped, empty if it was not."""
 
     group: str
     name: str
     output: str = ""
     failure: str = ""
+    skipped: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,6 +67,7 @@ SETTINGS = {
 }
 MODULES = (
     "conservative.attitude",
+    "conservative.benchmarks.verification",
     "conservative.invariants",
     "conservative.methods.automatic",
     "conservative.methods.coefficients.compositions",
@@ -155,7 +156,7 @@ def written(source: Path) -> None:
     for title, entries in groups:
         texts[f"contents/{anchor(title)}.md"] = listing(title, "", entries.split())
     texts["index.md"] += listing("", "", [*LIVE, *(f"contents/{anchor(title)}" for title, _ in groups)][1:], ":hidden:")
-    public = [name for name in cv.__all__ if name not in ("scenes", "shapes", "VERSION")]
+    public = [name for name in cv.__all__ if name not in ("scenes", "shapes", "verification", "VERSION")]
     texts |= {f"api/{name}.rst": api(f"conservative.{name}", name) for name in public}
     texts |= {f"api/{name}.rst": api(name, name) for name in (*MODULES, "conservative.scenes", "conservative.shapes")}
     for name, command in main.commands.items():

@@ -23,8 +23,11 @@ from conservative.files import open_file, read_text, remove_leftovers, write_tex
 
 from .plan import Plan
 from .provenance import Provenance
+from .verification import Verified, from_plain, to_plain
 
-FORMAT = 4
+FORMAT = 5
+VERIFICATION = "verification"
+"""Name of the verification of engines among the parts of a report; the other parts are studies."""
 _BEGINNING = '{"format": '
 """First characters of every file of unfinished work."""
 _MOST_DIFFERENCES = 3
@@ -33,15 +36,17 @@ _ROOMS = (".", "references", "benchmarks")
 """Packages whose source determines measurements. `reports` only shows them."""
 
 
+Part = Finding | Verified
+"""A part of the result of a study, or of the verification."""
 Origin = dict[str, str]
 """A process: its `command`, `start` time and `commit` (see `Provenance`)."""
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The findings of a study, and the process that measured it."""
+    """The findings of a study or of the verification, and the process that measured it."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[Part, ...]
     by: Origin
 
 
@@ -49,7 +54,8 @@ class StudyResult:
 class Checkpoint:
     """The finished studies of a report by name, which are also in a file.
 
-    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the current `process`, and `results`.
+    Attributes: `path` of the file, `names` of all studies and of the verification, `terms` (see `terms`), the current
+    `process`, and `results`.
     """
 
     path: Path
@@ -58,7 +64,7 @@ class Checkpoint:
     process: Origin
     results: dict[str, StudyResult] = field(default_factory=dict)
 
-    def store(self, name: str, findings: Iterable[Finding]) -> None:
+    def store(self, name: str, findings: Iterable[Part]) -> None:
         """Store the findings of a study, also in the file. Raise `NotWritten` if that fails."""
         result = StudyResult(tuple(findings), self.process)
         studies = {
@@ -66,6 +72,7 @@ class Checkpoint:
                 "by": each.by,
                 "rows": [measurement.flat(row) for row in each.findings if isinstance(row, Measurement)],
                 "samples": [measurement.flat_samples(line) for line in each.findings if isinstance(line, Samples)],
+                "verified": to_plain(part for part in each.findings if isinstance(part, Verified)),
             }
             for name, each in {**self.results, name: result}.items()
         }
@@ -135,7 +142,8 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
     """
     path = find_unfinished(out)
     process = {"command": source.command, "start": source.date, "commit": source.commit}
-    fresh = Checkpoint(path_for(out), plan.names, terms(plan, source), process)
+    names = (*plan.names, *[VERIFICATION] * plan.verified)
+    fresh = Checkpoint(path_for(out), names, terms(plan, source), process)
     if not resume:
         return fresh
     if path is None:
@@ -212,7 +220,11 @@ def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
             raise ValueError(f"format {content['format']}")
         results = {
             name: StudyResult(
-                (*map(measurement.from_flat, record["rows"]), *map(measurement.samples_from_flat, record["samples"])),
+                (
+                    *map(measurement.from_flat, record["rows"]),
+                    *map(measurement.samples_from_flat, record["samples"]),
+                    *from_plain(record["verified"]),
+                ),
                 {name: record["by"][name] for name in ("command", "start", "commit")},
             )
             for name, record in content["studies"].items()

@@ -17,7 +17,6 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.case import Case, attempt
-from conservative.benchmarks.studies.study import Finding
 from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.kernels import is_first_use
@@ -27,11 +26,12 @@ from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import kill_workers
 
 from ..terminal.progress import Step, announce
-from .checkpoint import Checkpoint
+from .checkpoint import VERIFICATION, Checkpoint, Part
 from .plan import Plan
 from .provenance import Provenance
+from .verification import Verified, to_plain, verify_methods
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 COMPILERS = 4
 """Largest number of processes that compile kernels; each takes 0.3 GB."""
@@ -41,23 +41,33 @@ COMPILATION_LIMIT = 300.0
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """The measurements of a report: the tidy table (see `Measurement`), and the samples of lines (see `Samples`)."""
+    """The measurements of a report.
+
+    Attributes
+    ----------
+    table, samples
+        The tidy table (see `Measurement`), and the samples of lines (see `Samples`).
+    verified
+        The findings on the engines that the report names.
+    """
 
     table: pd.DataFrame
     samples: pd.DataFrame
+    verified: tuple[Verified, ...] = ()
 
     @classmethod
-    def of(cls, findings: Iterable[Finding]) -> Measurements:
-        """Return the tables of findings."""
+    def of(cls, findings: Iterable[Part]) -> Measurements:
+        """Return the tables of the findings of studies, and those on engines."""
         every = list(findings)
         return cls(
             measurement.frame(each for each in every if isinstance(each, Measurement)),
             measurement.samples_frame(each for each in every if isinstance(each, Samples)),
+            tuple(each for each in every if isinstance(each, Verified)),
         )
 
     def content(self, source: Provenance) -> dict[str, Any]:
         """Return the content of measurements.json."""
-        return {"schema": SCHEMA, **vars(source), "rows": records(self.table)}
+        return {"schema": SCHEMA, **vars(source), "rows": records(self.table), "verified": to_plain(self.verified)}
 
 
 def records(table: pd.DataFrame) -> list[dict[str, object]]:
@@ -121,4 +131,7 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
             step((i + share) / len(plan.studies), f"{title}: {what}")
 
         checkpoint.store(study.name, studies.findings(study, tell))
-    return Measurements.of(finding for name in plan.names for finding in checkpoint.results[name].findings)
+    if VERIFICATION in checkpoint.names and VERIFICATION not in checkpoint.results:
+        announce("verification of engines")
+        checkpoint.store(VERIFICATION, verify_methods(plan.engines, lambda share, what: step(1.0, f"verification: {what}")))
+    return Measurements.of(finding for name in checkpoint.names for finding in checkpoint.results[name].findings)

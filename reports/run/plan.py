@@ -48,9 +48,9 @@ seconds after the installation, mostly to compile kernels, and a further method 
 class Plan:
     """The plan of a report: what is compared, and the studies in the order of measurement.
 
-    Engines have studies and a section of their own. `named` are the methods that the user named. `bodies` is the number of
-    random bodies in each field, `seed` their seed. `arguments` are the texts from which commands make the scenes, such as their
-    files, by the names of the scenes.
+    Engines have studies and a section of their own, and are verified if `verified`. `named` are the methods that the user
+    named. `bodies` is the number of random bodies in each field, `seed` their seed. `arguments` are the texts from which
+    commands make the scenes, such as their files, by the names of the scenes.
     """
 
     scenes: tuple[Scene, ...]
@@ -66,6 +66,7 @@ class Plan:
     bodies: int = 0
     seed: int = 0
     arguments: Mapping[str, str] = field(default_factory=dict)
+    verified: bool = False
 
     @property
     def locks(self) -> tuple[LockedEngine, ...]:
@@ -157,5 +158,6 @@ def plan_report(
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}
     asked = compared if methods else ()
     return Plan(
-        chosen, compared, tuple(made), named, asked, quick, skip_missing, png, latex, time_limit, bodies, seed, arguments
+        *(chosen, compared, tuple(made), named, asked, quick, skip_missing, png, latex, time_limit, bodies, seed, arguments),
+        verified=bool(named) and not names,
     )

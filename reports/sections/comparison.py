@@ -11,7 +11,7 @@ from conservative.benchmarks.gate.compare import Violation
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.prices import Price
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, faster, judge
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, decide, faster
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
 from ..document.cells import DASH, number, numeric
@@ -75,30 +75,30 @@ def build(
     comparison: ProjectComparison, made: Mapping[str, str] | None = None, prices: Mapping[str, Price] | None = None
 ) -> Document:
     """Return the document of a comparison; `made` names how and where it was measured, `prices` longer times by method."""
-    versions, judged, made = comparison.versions, judge(comparison, prices or {}), made or {}
-    findings = [each.finding for each in judged.violations]
+    versions, decided, made = comparison.versions, decide(comparison, prices or {}), made or {}
+    findings = [each.finding for each in decided.violations]
     timed = sum(line.times is not None for line in comparison.lines)
     rows, violations = len(comparison.lines), len(findings)
     verdict = (
-        f"gate: {'passed' if judged.passed else 'FAILED'}, {rows} row{'s' * (rows != 1)}, {timed} timed, "
+        f"gate: {'passed' if decided.passed else 'FAILED'}, {rows} row{'s' * (rows != 1)}, {timed} timed, "
         f"{violations} violation{'s' * (violations != 1)}"
     )
     # A check for each row, and one for each violation that belongs to no row.
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
-    for each in judged.violations:
+    for each in decided.violations:
         failed.setdefault((each.scene, each.method), []).append(each.finding)
     packages = [(each.title, each.environment.runtime, ", ".join(each.packages)) for each in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
-    notes = Items.of(f"note: {note}" for note in judged.notes)
+    notes = Items.of(f"note: {note}" for note in decided.notes)
     data = {
         "made": dict(made),
-        "passed": judged.passed,
+        "passed": decided.passed,
         "versions": {
             when: {"name": version.name, "commit": version.commit, "packages": version.packages}
             for when, version in zip(("was", "is"), versions, strict=True)
         },
-        "violations": judged.violations,
-        "notes": judged.notes,
+        "violations": decided.violations,
+        "notes": decided.notes,
         "rows": [_record(line) for line in comparison.lines],
     }
     return Document(
@@ -107,7 +107,7 @@ def build(
         filled(
             Paragraph(verdict, Emphasis.LEAD),
             Section("Violations", filled(Items.of(findings))),
-            Section("Rows", [Paragraph(explained), table(comparison, judged.violations)]),
+            Section("Rows", [Paragraph(explained), table(comparison, decided.violations)]),
             Section("Notes", filled(notes)),
             Section("Versions", [Table(("version", "runtime", "packages"), packages, "Packages of both versions")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
@@ -172,7 +172,7 @@ def _record(line: ProjectLine) -> dict[str, Any]:
     for when, row in zip(("was", "is"), line.results, strict=True):
         if row is not None:
             values = {"values": row.values, "spreads": row.spreads}
-            record[when] = {"status": row.status, "reason": row.reason, "cause": row.cause, **values}
+            record[when] = {"status": row.status, "reason": row.reason, "mistake": row.mistake, "cause": row.cause, **values}
     if (time := line.times) is not None:
         again = {} if time.again is None else {"again": time.again}
         ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}

@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
-
-import pandas as pd
 
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
-from conservative.benchmarks.studies.motions import STUDY
-from conservative.outcome import OutcomeKind
+from conservative.benchmarks.verification.finding import Verdict
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import version_key
 from conservative.version import VERSION
@@ -23,6 +19,8 @@ from ..document.badge import badge
 from ..document.cells import DASH, angle
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
+from ..run.verification import Verified
+from . import verified_engines
 from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
 
@@ -47,12 +45,8 @@ def file_name(engine: str) -> str:
     return "engine_" + re.sub(r"[^\w.-]", "_", engine)
 
 
-def pages(measured: Measured, sections: Mapping[str, Any]) -> dict[str, Document]:
-    """Return the page of each engine that the report names, by the name of its file without an ending.
-
-    `sections` are the sections of studies of engines by their names, each a module with a function `section`. A page has those
-    of which the report has rows of its engine.
-    """
+def pages(measured: Measured) -> dict[str, Document]:
+    """Return the page of each engine that the report names, by the name of its file without an ending."""
     table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
     points = points_over(table, OVER_STEPS)
     scenes = {scene.name: engine_rows(table, scene.name, points) for scene in measured.plan.scenes}
@@ -62,24 +56,25 @@ def pages(measured: Measured, sections: Mapping[str, Any]) -> dict[str, Document
         families.setdefault(label.partition("==")[0], []).append(label)
     found = dict[str, Document]()
     for family, versions in families.items():
-        page = attempt(f"The page of {family}", partial(_page, measured, family, versions, scenes, sections))
+        page = attempt(f"The page of {family}", partial(_page, measured, family, versions, scenes))
         found[file_name(family)] = page if isinstance(page, Document) else Document("conservative report", family, [page])
     return found
 
 
-def _badge(found: pd.DataFrame, version: str) -> str:
-    """Return a badge with the exact motions that a version passes with its best setting, of those that it takes."""
-    ran = found[(found["study"] == STUDY.name) & (found["version"] == version) & (found["outcome"] != OutcomeKind.UNSUPPORTED)]
-    passed = (ran["value"] <= 1).groupby(ran["name"]).agg(["sum", "size"]).sort_values("sum", kind="stable")
-    if not len(passed):
+def _badge(verified: Sequence[Verified], version: str) -> str:
+    """Return a badge with the exact motions that are right in a version with its best setting, of those that were tested."""
+    counts = []
+    for each in verified:
+        motions = [finding.verdict for finding in each.findings if finding.check == "motions"]
+        if each.names["version"] == version and (tested := len(motions) - motions.count(Verdict.NOT_TESTED)):
+            counts.append((motions.count(Verdict.RIGHT), tested))
+    if not counts:
         return ""
-    best, every = passed.iloc[-1]
+    best, every = max(counts, key=lambda count: count[0])
     return badge("exact motions, at its best", f"{best} of {every}", "good" if best == every else "fair")
 
 
-def _page(
-    measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]], sections: Mapping[str, Any]
-) -> Document:
+def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
     for scene in measured.plan.scenes:
         if shown := chosen(scenes[scene.name], newest):
@@ -87,11 +82,10 @@ def _page(
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(versions, scenes)))
-    found = measured.rows[measured.rows["engine"].str.partition("@")[0] == family]
-    for name, part in sections.items():
-        if (found["study"] == name).any():
-            blocks.append(attempt(f"The section {name!r}", partial(part.section, found, measured.samples)))
-    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions, sections)]))
+    found = [each for each in measured.measurements.verified if each.names["engine"].partition("@")[0] == family]
+    if found:
+        blocks.append(attempt("The section 'verification'", partial(verified_engines.section, found)))
+    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = newest.replace("==", " ")
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
@@ -135,7 +129,7 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
     return [Items(items), *tables]
 
 
-def _commands(measured: Measured, family: str, versions: Sequence[str], studies: Iterable[str]) -> list[str]:
+def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[str]:
     """Return the commands that repeat a page."""
     plan = measured.plan
     apart = {f"{each.maker}" for each in plan.engines if isinstance(each, EngineMethod)}
@@ -143,5 +137,5 @@ def _commands(measured: Measured, family: str, versions: Sequence[str], studies:
     install = " ".join(name for name in names if "@" in name)
     scenes = shlex.quote(",".join(plan.arguments.get(scene.name, scene.name) for scene in plan.scenes))
     command = f"conservative report --methods reduced --scenes {scenes} --engines {','.join(names)}" + " --quick" * plan.quick
-    commands = [command, *(f"conservative study {study} --engines {','.join(names)}" for study in studies)]
+    commands = [command, f"conservative verify {' '.join(names)}"]
     return [f"`{each}`" for each in [*[f"conservative engines install {install}"] * bool(install), *commands]]

@@ -1,4 +1,4 @@
-"""Each method on each hard case, judged by its motion and by its invariants, and the longest step that works."""
+"""Grades of each method on each hard case, by its motion and by its invariants, and the longest step that works."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def sections(table: pd.DataFrame) -> list[Section]:
         "Every registered scene over the first part of its motion, at its own step, with two verdicts: the motion by its "
         f"largest attitude error (✓ up to {tolerance(RIGHT)} rad, ≈ up to {USABLE:g} rad, ✗ more), and the invariants by "
         f"the largest relative drift (✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more). ✗ in both: the "
-        f"run failed; {DASH}: not supported, or nothing to judge."
+        f"run failed; {DASH}: not supported, or nothing to grade."
     )
     cases, steps = hard_cases(table), stability(table)
-    judged = (
+    graded = (
         Section("Hard cases", [Paragraph(words), cases], "hard-cases", source={"study": HARD_CASES.name}) if cases else None
     )
     longest = Section("Stability", [steps], "stability", source={"study": STABILITY.name}) if steps else None
-    return [each for each in (judged, longest) if each]
+    return [each for each in (graded, longest) if each]
 
 
 def hard_cases(table: pd.DataFrame) -> Table | None:
@@ -47,17 +47,17 @@ def hard_cases(table: pd.DataFrame) -> Table | None:
     rows = _competitors(table, HARD_CASES.name)
     if rows.empty:
         return None
-    judged = {key: judge(members) for key, members in _by_method_and_scene(rows).items()}
-    cases, missing = list(rows["scene"].unique()), _judgement(_NOT_RUN, _NOT_RUN)
+    graded = {key: grades(members) for key, members in _by_method_and_scene(rows).items()}
+    cases, missing = list(rows["scene"].unique()), _halves(_NOT_RUN, _NOT_RUN)
 
     def rank(method: str) -> tuple[int, ...]:
         """Return the number of cases in which the motion is not good, and the invariants."""
-        cells = [judged.get((method, case), missing) for case in cases]
+        cells = [graded.get((method, case), missing) for case in cases]
         return tuple(sum(cell.parts[half].grade is not Grade.GOOD for cell in cells) for half in (0, 1))
 
     methods = sorted(rows["method"].unique(), key=rank)
     names = dict(zip(rows["method"], rows["name"], strict=True))
-    body: list[Row] = [[str(case), *(judged.get((method, case), missing) for method in methods)] for case in cases]
+    body: list[Row] = [[str(case), *(graded.get((method, case), missing) for method in methods)] for case in cases]
     caption = "Each cell: first the motion, then the invariants. Hover or tap for the numbers."
     return Table(["case", *(str(names[method]) for method in methods)], body, caption, Style.GRID)
 
@@ -73,22 +73,22 @@ def _values(records: list[Record], measure: Measure) -> list[float]:
     return [each["value"] for each in records if each["measure"] == measure.text and not math.isnan(each["value"])]
 
 
-def judge(records: list[Record]) -> Cell:
-    """Return the judgement of a method on a case: its failure, else the grades of its attitude error and of its worst drift."""
+def grades(records: list[Record]) -> Cell:
+    """Return the grades of a method on a case: its failure, else the grades of its attitude error and of its worst drift."""
     for record in records:
         if record["outcome"] != OutcomeKind.OK:
             cell = outcome_cell(outcome_of(record))
-            return _judgement(cell, cell)
+            return _halves(cell, cell)
     errors = _values(records, Measure.ATTITUDE_MAX)
     motion = grade(max(errors), f"{angle(max(errors))} rad", (RIGHT, USABLE)) if errors else _NOTHING
     drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
     if not drifts:
-        return _judgement(motion, _NOTHING)
+        return _halves(motion, _NOTHING)
     worst = max(drifts, key=lambda each: each["value"])
-    return _judgement(motion, grade(worst["value"], f"{bound(worst['value'])} {worst['quantity']}"))
+    return _halves(motion, grade(worst["value"], f"{bound(worst['value'])} {worst['quantity']}"))
 
 
-def _judgement(motion: Cell, invariants: Cell) -> Cell:
+def _halves(motion: Cell, invariants: Cell) -> Cell:
     text = str(motion) if motion == invariants else f"motion {motion}, invariants {invariants}"
     return Cell(text, parts=(motion, invariants))
 

@@ -10,8 +10,6 @@ from typing import Any, TypeVar
 import pandas as pd
 
 from conservative.benchmarks.studies import random
-from conservative.benchmarks.studies.declaration import Named
-from conservative.benchmarks.studies.studies import STUDIES
 
 from ..document.attempt import attempt
 from ..document.model import Block, Document, Links, Paragraph, Section
@@ -28,7 +26,6 @@ from . import (
     hard_cases,
     long_time,
     many_bodies,
-    motions,
     provenance,
     random_bodies,
     ratios,
@@ -36,12 +33,12 @@ from . import (
     speed,
     summary,
     tumbling,
-    twins,
+    verified_engines,
 )
 from .measured import Measured, of_scene
 
 T = TypeVar("T")
-SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time, motions, twins)}
+SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time)}
 """Sections of the rows and samples of one study, by its name."""
 
 
@@ -68,8 +65,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     for scene in plan.scenes:
         make = partial(lambda scene: scenes.section(measured, scene, summaries()[scene.name]), scene)
         details.append(part(f"all tables of {scene.name}", make))
-    of_engines = {name: part for name, part in SECTIONS.items() if STUDIES[name].named is Named.ONLY}
-    pages = part("pages of engines", lambda: engine_page.pages(measured, of_engines)) if plan.engines else {}
+    pages = part("pages of engines", lambda: engine_page.pages(measured)) if plan.engines else {}
     if isinstance(pages, Paragraph):
         details.append(pages)
         pages = {}
@@ -78,6 +74,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         section = part("engines", lambda: engines.section(measured))
         linked = replace(section, blocks=[links, *section.blocks]) if isinstance(section, Section) else section
         details.append(linked)
+    if verified := measurements.verified:
+        details.append(part("verification", lambda: verified_engines.section(verified)))
     for name, each in SECTIONS.items():
         if name in plan.names:
             section = part(name, partial(each.section, measured.rows, measured.samples))

@@ -33,11 +33,11 @@ def build(
     comparison: EngineComparison,
     gated: bool = False,
     made: Mapping[str, str] | None = None,
-    twins: Sequence[str] | None = None,
+    verified: Sequence[str] | None = None,
 ) -> Document:
     """Return the document of a comparison, measured as `made` says; if `gated`, a loss in the last version is a failure.
 
-    `twins` are sentences about the pairs of descriptions that began or ceased to differ; None if they were not compared.
+    `verified` are sentences about cases that became right or wrong; None if the versions were not verified.
     """
     made, transitions = made or {}, list_transitions(comparison)
     environments = [version.environment for version in comparison.versions]
@@ -54,7 +54,9 @@ def build(
         by_scene.setdefault(line.scene, []).append(line)
     tables = [_table(scene, lines) for scene, lines in by_scene.items()]
     changed = Section("Changes", [Items.of(sentences) if sentences else Paragraph(NOTHING_CHANGED)])
-    of_twins = [] if twins is None else [Section("Twins", [Items.of(twins) if twins else Paragraph(NOTHING_CHANGED)])]
+    verdicts = (
+        [] if verified is None else [Section("Verification", [Items.of(verified) if verified else Paragraph(NOTHING_CHANGED)])]
+    )
     failed = [text for line in comparison.lines for text in _unfinished(line)]
     unfinished = Section("Runs that failed or show no order", filled(Items.of(failed)))
     verdict = []
@@ -69,7 +71,7 @@ def build(
         "engine": engine,
         "passed": not failures,
         "failures": failures,
-        **({} if twins is None else {"twins": list(twins)}),
+        **({} if verified is None else {"verified": list(verified)}),
         "versions": [{name: getattr(each, name) for name in ("version", "runtime", "packages")} for each in environments],
         "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
         "changes": [
@@ -95,13 +97,13 @@ def build(
         filled(
             *verdict,
             changed,
-            *of_twins,
+            *verdicts,
             Section("Measurements", [Paragraph(_WORDS), *tables]),
             unfinished,
             Section("Versions", [Table(("version", "runtime", "packages"), versions, "Packages of each version")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
         ),
-        brief=filled(*tables, changed, *of_twins, unfinished, *verdict),
+        brief=filled(*tables, changed, *verdicts, unfinished, *verdict),
         data=data,
         checks=checks,
         failures=failures,

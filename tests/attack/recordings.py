@@ -1,11 +1,11 @@
-"""Recordings with a planted mistake, or none, for `conservative judge`: a scene, a simulator, a layout, noise and a length.
+"""Recordings with a planted mistake, or none, for `conservative verify`: a scene, a simulator, a layout, noise and a length.
 
-Nothing here comes from the judge or an integrator of the package: right-hand side, steps and layouts are its own. A state is
-(q, w): a quaternion, scalar first, body to world, and rates, rad/s, body axes.
+Nothing here comes from the package: right-hand side, steps and layouts are its own. A state
+is (q, w): a quaternion, scalar first, body to world, and rates, rad/s, body axes.
 
     q' = q (0, w) / 2        J w' = (J w + h) x w + T - h'
 
-The generator decides before the judge runs. `grain` is the root mean square of noise, digits or single precision in a row, at
+The generator decides before the verification. `grain` is the root mean square of noise, digits or single precision in a row, at
 least 1e-9. A file is wrong if it differs from the exact motion by more than 3 grains (root mean square over the rows,
 against the initial state that fits best unless the first row is exact). A planted mistake that differs by less proves nothing.
 A mistake is identifiable if it differs by more than 10, also from its rivals: other mistakes of its kind with as few fitted
@@ -25,7 +25,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from conservative.benchmarks.judge.table import Options
+from conservative.benchmarks.verification.recordings.table import Options
 
 from ..independent import Case, inverse_of, is_table
 from .random_scenes import Draw
@@ -334,11 +334,6 @@ def with_inertia(case: Case, J: Any) -> Case:
 
 # Attitudes that are not the integral of the right rates: the quaternion of a step from rates at its start and end
 
-FIRST, MAP = "the first-order step q + h/2 q w, normalised,", "a rotation"
-PLACE = "the first-order step of the quaternion, whose components are updated in place, one after another,"
-START, END = "by the rates of the start of the step (coning error)", "by the rates of the end of the step"
-MEAN, BODY = "by the mean of the rates of both ends (coning error)", ", which are in body axes, as if they were in world axes"
-
 
 def first(q: Any, v: Any) -> Any:
     return q + multiply(q, np.append(0.0, v)) / 2
@@ -353,16 +348,16 @@ def in_place(q: Any, v: Any) -> Any:
 
 
 ATTITUDES: dict[str, Callable[[Any, Any, Any, float], Any]] = {
-    f"attitudes by {FIRST} {START}": lambda q, a, b, h: first(q, a * h),
-    f"attitudes by {FIRST} {END}": lambda q, a, b, h: first(q, b * h),
-    f"attitudes by {FIRST} {MEAN}": lambda q, a, b, h: first(q, (a + b) / 2 * h),
-    f"attitudes by {MAP} {START}": lambda q, a, b, h: multiply(q, turn(a * h)),
-    f"attitudes by {MAP} {END}": lambda q, a, b, h: multiply(q, turn(b * h)),
-    f"attitudes by {MAP} {MEAN}": lambda q, a, b, h: multiply(q, turn((a + b) / 2 * h)),
-    f"attitudes by {PLACE} {START}": lambda q, a, b, h: in_place(q, a * h),
-    f"attitudes by {MAP} {START}{BODY}": lambda q, a, b, h: multiply(turn(a * h), q),
-    f"attitudes by {MAP} {MEAN}{BODY}": lambda q, a, b, h: multiply(turn((a + b) / 2 * h), q),
-    f"attitudes by {FIRST} {START}{BODY}": lambda q, a, b, h: q + multiply(np.append(0.0, a * h), q) / 2,
+    "attitude by normalisation, old rates": lambda q, a, b, h: first(q, a * h),
+    "attitude by normalisation": lambda q, a, b, h: first(q, b * h),
+    "attitude by normalisation, mean rates": lambda q, a, b, h: first(q, (a + b) / 2 * h),
+    "stale rates": lambda q, a, b, h: multiply(q, turn(a * h)),
+    "attitude by rotation, new rates": lambda q, a, b, h: multiply(q, turn(b * h)),
+    "attitude by rotation, mean rates": lambda q, a, b, h: multiply(q, turn((a + b) / 2 * h)),
+    "attitude in place, old rates": lambda q, a, b, h: in_place(q, a * h),
+    "stale rates on the wrong side": lambda q, a, b, h: multiply(turn(a * h), q),
+    "attitude by rotation, mean rates on the wrong side": lambda q, a, b, h: multiply(turn((a + b) / 2 * h), q),
+    "attitude by normalisation, old rates on the wrong side": lambda q, a, b, h: q + multiply(np.append(0.0, a * h), q) / 2,
 }
 
 
@@ -379,8 +374,8 @@ def integrate(rule: Any, q: Any, w: Any, h: float, parts: int) -> Any:
 READINGS = (
     *("transposed", "order xyzw", "order wxyz", "rates in degrees", "rates in radians", "world rates", "reversed rates"),
 )
-TIMES = ("time shift", "phase drift", "time in 0.001 s", "jittered times", "dropped rows", "rates at other times")
-FITTED = ("damped", "another body", "body axes", "first row", "single rows")
+TIMES = ("time shift", "phase drift", "time in ms", "jittered times", "dropped rows", "rates at other times")
+FITTED = ("damping", "another body", "body axes", "first row", "single rows")
 PAIR = "two mistakes"
 
 # Layouts: a header, its columns of q (n, 4) and w (n, 3), the factor from their rounding to angles, and how they are read
@@ -492,7 +487,7 @@ def draw_case(draw: Draw) -> tuple[Case, float]:
 
 @dataclass(eq=False)
 class Planted:
-    """A file and what it is, decided before it is judged.
+    """A file and what it is, decided before it is verified.
 
     `expected` is "right" or "wrong", or "" if the file is wrong by less than noise allows. `same` are mistakes with its rows.
     """
@@ -564,7 +559,7 @@ def plant(seed: int) -> Planted:
     case = made.case
     exact = Simulator(case)
     Y, rounding = simulate(draw, made, kind, t, parts, rate)
-    t = np.arange(len(Y)) * gap if mistake != "time in 0.001 s" else t
+    t = np.arange(len(Y)) * gap if mistake != "time in ms" else t
     t, Y = t[cut:], Y[cut:]
     write(draw, made, t, Y, rounding)
     decide(made, kind, exact, t, Y)
@@ -590,7 +585,7 @@ def simulate(draw: Draw, made: Planted, kind: str, t: Any, parts: int, rate: flo
         Y = np.hstack([integrate(ATTITUDES[name], Y[0, :4], Y[:, 4:], gap / parts, parts), Y[::parts, 4:]])
     elif kind == "time":
         Y = simulate_times(draw, made, exact, t, gap)
-    elif name == "damped":
+    elif name == "damping":
         D = rate * draw.between(1e-4, 0.03) * case.J + (0.0 if case.damping is None else case.damping)
         Y = Simulator(replace(case, damping=D)).solve(t)
     elif name in ("another body", PAIR):
@@ -666,7 +661,7 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any, single: float) -> None:
     ]
     off = [np.sqrt(((a.reshape(b.shape) - b) ** 2).sum(axis=1).mean()) for a, b in zip(read, blocks, strict=True)]
     origin = 1.7e18 if made.layout == "ROS" else 0.0
-    second = 1e3 if made.mistake == "time in 0.001 s" else layout.second
+    second = 1e3 if made.mistake == "time in ms" else layout.second
     ticks = np.round(t * second) + origin if layout.second > 1 else t * second
     times = [f"{x:.0f}" if layout.second > 1 else f"{x:.12g}" for x in ticks]
     late = float(np.sqrt(np.mean(((ticks - origin) / second - t) ** 2))) + (6e-8 if origin else 0.0)
@@ -724,7 +719,7 @@ def compare(made: Planted, exact: Simulator, t: Any, Y: Any, inexact: bool) -> R
 def decide(made: Planted, kind: str, exact: Simulator, t: Any, Y: Any) -> None:
     """Decide whether a file is right, whether its mistake is identifiable, and which others make the same rows."""
     made.expected = "right" if kind == "right" else "wrong"
-    if kind in ("right", "reading") or made.mistake == "time in 0.001 s":  # what these change is as large as the motion
+    if kind in ("right", "reading") or made.mistake == "time in ms":  # what these change is as large as the motion
         made.identifiable = kind != "right" and made.turns > 0.5
         return
     rows = compare(made, exact, t, Y, made.noise != "none" or made.single or made.layout in ("ROS", "EuRoC"))
@@ -758,4 +753,4 @@ def rivals(made: Planted, kind: str, exact: Simulator, rows: Rows) -> dict[str, 
         return {name: [rows.off(np.hstack([q, E[:, 4:]]))] for name, q in turned.items()}
     if made.mistake in ("another body", "body axes"):
         return {"phase drift": [late, (np.arange(len(t))[:, None] * late.reshape(len(t), -1)).ravel()]}
-    return {"time shift": [late]} if made.mistake in ("damped", "phase drift") else {}
+    return {"time shift": [late]} if made.mistake in ("damping", "phase drift") else {}

@@ -23,7 +23,7 @@ from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.check import describe
 from conservative.references.exact.method import free_body, lagrange_top
-from conservative.references.importers.model_files import body_from_mjcf, body_from_urdf
+from conservative.references.model_files.scene_bodies import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
 
 from ..environments import PATIENCE

@@ -5,8 +5,10 @@ The whole command but for times runs: two builds, each in the process of its ver
 
 import pytest
 
-from conservative.benchmarks.versions.project import MOTION, compare_projects, judge
+from conservative.benchmarks.verification.mistakes import BY_KEY
+from conservative.benchmarks.versions.project import MOTION, compare_projects, decide
 from conservative.benchmarks.versions.version import Checkout, Version
+from conservative.reports.run.causes import find_causes
 from conservative.version import VERSION
 
 from ..benchmarks.versions.rewrites import MISTAKES, build, rewrite
@@ -31,7 +33,9 @@ def gate(tmp_path, monkeypatch):
 
     def run(flags, changes, scenes):
         was = version("was", [flag for flag in flags if flag.startswith("-D")], {})
-        return judge(compare_projects(was, version("is", flags, changes), scenes, ["mine"], processes=0)).violations
+        return decide(
+            compare_projects(was, version("is", flags, changes), scenes, ["mine"], processes=0, explain=find_causes)
+        ).violations
 
     return run
 
@@ -47,4 +51,4 @@ def test_a_physical_mistake_is_found_and_named(name, gate):
     for flags in (["-DREAL=float"], ["-DEULER"]):
         found = gate(flags, MISTAKES[name], ("brick_flip", "falling_top"))
         assert {each.measure for each in found} == {MOTION}
-        assert any(name in each.now for each in found)
+        assert any(BY_KEY[name].sentence.partition("{")[0] in each.now for each in found)

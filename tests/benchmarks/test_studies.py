@@ -35,7 +35,7 @@ KINDS = {
 BROKEN = tuple(Broken(how) for how in KINDS)
 FACTS = (Measure.PRECISION, Measure.ORDER_EXPECTED)
 """Properties of a method that do not depend on its runs."""
-CROSSING = [name for name in studies.STUDIES if name not in ("motion", "motions", "throughput", "twins", "long_time")]
+CROSSING = [name for name in studies.STUDIES if name not in ("motion", "throughput", "long_time")]
 """Studies of any scene with a row for every method, also for failures. The others have their own tests."""
 
 

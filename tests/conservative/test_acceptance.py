@@ -22,6 +22,7 @@ from conservative.methods.bounds import bounds_of
 from conservative.outcome import OutcomeKind
 from conservative.trajectory import Bounds, Trajectory
 
+from ..bodies import impossible_body
 from .one_body import BODY
 
 BRICK = cv.scenes.brick_flip()
@@ -251,7 +252,7 @@ def test_ill_conditioned_bodies_are_right_or_an_outcome() -> None:
         R, _ = np.linalg.qr(draw.normal(size=(3, 3)))
         tensor = R @ np.diag([1.0, 10 ** draw.uniform(-16, -12), 0.6]) @ R.T
         try:
-            body = cv.RigidBody((tensor + tensor.T) / 2)
+            body = impossible_body((tensor + tensor.T) / 2)
         except cv.BadInput:  # rounding has made it indefinite
             continue
         scene = cv.Scene("flat", body, np.eye(3), draw.normal(size=3), 1.0, cv.UniformGravity(1.0, (0.3, 0.2, 0.5)))

@@ -16,6 +16,8 @@ from conservative.references.exact.lagrange_top import nutation, nutation_phase,
 from conservative.references.exact.method import free_body, lagrange_top
 from conservative.references.exact.start import InitialState
 
+from ..bodies import impossible_body
+
 FREE_BOUND, TOP_BOUND = 1e-13, 1e-12  # claimed at any time: attitudes, rad, and rates relative to the largest one
 # Of the integration, and of one near a separatrix. The motions are integrable: a distance d from the separatrix costs the
 # digits of 1/d^2 once, not at every reversal.
@@ -86,7 +88,7 @@ def turn_axes(rng, moments):
     R_BP = np.eye(3)[rng.permutation(3)] if rng.random() < 1 / 3 else random_rotation(rng)
     R_BP = R_BP * np.linalg.det(R_BP)
     tensor = R_BP @ np.diag(moments) @ R_BP.T
-    return cv.RigidBody((tensor + tensor.T) / 2), R_BP
+    return impossible_body((tensor + tensor.T) / 2), R_BP
 
 
 def draw_free(rng, separatrix=None, physical=False):

@@ -4,8 +4,8 @@ import pytest
 import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.attitude import from_quaternion, rotation_about
-from conservative.references.importers import readers
-from conservative.references.importers.model_files import body_from_mjcf, body_from_urdf
+from conservative.references.model_files import readers
+from conservative.references.model_files.scene_bodies import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
 
 # One body of generic parameters, written in every way that a format has.

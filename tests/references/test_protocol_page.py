@@ -1,4 +1,4 @@
-"""The samples in PROTOCOL.md are right programs: they are built from the page and pass the conformance test."""
+"""The samples in PROTOCOL.md are right programs: they are built from the page and verified."""
 
 import re
 import shlex
@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from conservative.references.environments import conformance
-from conservative.references.environments.conformance import check
-from conservative.references.environments.programs import read_program
+from conservative.benchmarks.verification import protocol
+from conservative.benchmarks.verification.verify import verify
 from conservative.references.worker import program
 from conservative.references.worker.client import close_workers
 
@@ -32,7 +31,7 @@ QUICK = ("c", "javascript")
 @pytest.mark.parametrize(
     "language", [*QUICK, *(pytest.param(each, marks=pytest.mark.slow) for each in LANGUAGES if each not in QUICK)]
 )
-def test_a_sample_passes_the_conformance_test(language, tmp_path, monkeypatch):
+def test_a_sample_is_right(language, tmp_path, monkeypatch):
     build, run = LANGUAGES[language]
     tool = (build or run).partition(" ")[0]
     if not shutil.which(tool):
@@ -40,14 +39,15 @@ def test_a_sample_passes_the_conformance_test(language, tmp_path, monkeypatch):
     for name in ("CONFIG", "CACHE"):
         monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(conformance, "PACE", 0.05)
+    monkeypatch.setattr(protocol, "PACE", 0.05)
     (tmp_path / f"my_engine.{ENDINGS[language]}").write_text(SAMPLES[language])
     if build:
         subprocess.run(shlex.split(build), check=True)
-    results = list(check(read_program(run)))
+    (found,) = verify([run])
     close_workers()
-    assert [text for passed, text in results if not passed] == []
-    assert results[3][1] == "heavy body: unsupported (only free bodies)"
+    assert found.verdict == "right", found.reason
+    heavy = next(each for each in found.findings if each.case == "heavy")
+    assert (heavy.verdict, heavy.detail.count("only free bodies")) == ("not tested", 1)
 
 
 def test_samples_are_short():

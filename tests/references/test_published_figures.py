@@ -24,6 +24,7 @@ from conservative.grid import Grid, grid_for
 from conservative.references.truth import reference
 from conservative.shapes import MassDistribution
 
+from ..bodies import impossible_body
 from ..environments import ROOT
 
 with (ROOT / "tests" / "data" / "published_figures.csv").open(encoding="utf-8", newline="") as stream:
@@ -129,7 +130,7 @@ MOTIONS |= {
     "gazebo-flight": cv.Scene("published", BOX, START, (0.1, 5, 0.1), 10, BOX.gravity(9.8), v_WB0=(-2, 2, 8)),
     "eulr": cv.Scene(
         "published",
-        cv.RigidBody((0.5, 2, 3)),
+        impossible_body((0.5, 2, 3)),
         START,
         (1, 0, 0.9),
         20,
@@ -180,7 +181,7 @@ FRB_TURN = rotation_about(np.cross(FRB_FIELD, (0, 0, 1)), np.arccos(FRB_FIELD[2]
 
 
 def with_momentum(moments, momentum, t_end, start=START, potential=None):
-    return cv.Scene("published", cv.RigidBody(moments), start, np.divide(momentum, moments), t_end, potential)
+    return cv.Scene("published", impossible_body(moments), start, np.divide(momentum, moments), t_end, potential)
 
 
 FRB_MOMENTUM = (-0.709894965287627, -0.685144717153487, 0.163174308075589)

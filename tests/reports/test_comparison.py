@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative.benchmarks.gate.results import Status
-from conservative.benchmarks.versions.project import judge
+from conservative.benchmarks.versions.project import decide
 from conservative.reports.cli.main import main
 from conservative.reports.document import text as text_of
 from conservative.reports.sections.comparison import EXPLANATION, Standing, build, table
@@ -31,7 +31,7 @@ def answer(was=GOOD, now=GOOD, time=ON_TIME):
 
 
 def shown(compared):
-    return table(compared, judge(compared).violations).rows
+    return table(compared, decide(compared).violations).rows
 
 
 def document(*compared, **others):
@@ -156,7 +156,7 @@ def test_options_of_two_versions_need_two(gate, options):
 
 def test_junit_has_violations_that_belong_to_no_row():
     nothing = answer(was=None)  # no row of the earlier version has passed: everything would
-    assert [each.measure for each in judge(nothing).violations] == ["rows"]
+    assert [each.measure for each in decide(nothing).violations] == ["rows"]
     suite = ElementTree.fromstring(text_of(build(nothing), "junit")).find("testsuite")
     assert suite.get("failures") == "1"
     assert "rows" in suite.find(".//failure").get("message")
@@ -213,8 +213,8 @@ def test_the_action_and_the_workflow_use_options_that_there_are():
 
 
 def test_a_row_of_another_motion_and_an_accepted_price_have_their_standing():
-    lost = replace(row(attitude_error_max=3.1), cause="no torque")
+    lost = replace(row(attitude_error_max=3.1), mistake="no torque", cause="no torque")
     slow = ((row(), row(), timed((1.1, 1.08, 1.12), (1.1, 1.08, 1.12))),)
     moved = comparison((row(), lost, None))
-    assert [str(cells[2]) for cells in table(moved, judge(moved).violations).rows] == [f"✗ {Standing.MOTION}"]
+    assert [str(cells[2]) for cells in table(moved, decide(moved).violations).rows] == [f"✗ {Standing.MOTION}"]
     assert [str(cells[2]) for cells in table(comparison(*slow), ()).rows] == [Standing.PAID]

@@ -81,3 +81,8 @@ def test_the_script_of_a_shell_gets_them(folder):
     environment = {"_CONSERVATIVE_COMPLETE": "bash_complete", "COMP_WORDS": "conservative run bric", "COMP_CWORD": "2"}
     done = CliRunner().invoke(main, [], env=environment, prog_name="conservative")
     assert done.stdout.splitlines() == ["plain,brick_flip", "plain,brick_of_mine.toml"]
+
+
+def test_subjects_of_verify_are_names_and_files(folder):
+    assert completed("verify reduc") == [("plain", "reduced"), ("file", "reduc")]
+    assert ("file", "my_") in completed("verify my_")

@@ -5,6 +5,7 @@ import re
 import shlex
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import deferred_imports, registry
+from conservative.benchmarks.verification.finding import Verification
 from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.method import Method
@@ -23,28 +25,30 @@ from conservative.reports.cli.main import main
 
 from .. import conftest
 
-TAKEN = ("methods", "engines", "engine", "names", "command")
+TAKEN = ("methods", "engines", "engine", "names", "command", "subjects")
 """Parameters of commands that take names of engines."""
 COMMAND_LINE = ("engines add", "command")
 """The parameter among them that takes a command line only."""
 GIVEN = {"scene": "brick_flip", "spread": "rate=1%", "name": "motion", "against": "HEAD", "versions": "9.9"}
 """Values of other parameters: those that are required, and those in `NEEDS`."""
 NEEDS = {"gate": "against", "track": "versions"}
-TABLES = ("recommend", "report", "study", "twins")
+TABLES = ("recommend", "report", "study", "verify")
 """Commands that show all settings of a name."""
 CAPTURED = {
-    "engines check": ("references.environments.conformance.check",),
     "engines install": ("references.environments.lock.resolve",),
     "engines remove": ("references.environments.install.drop", "references.environments.install.register"),
     "gate": (),
-    "importers": ("references.importers.compare.Program.check",),
     "recommend": ("benchmarks.recommendation.recommend.recommend",),
     "report": ("reports.report.write",),
     "run": ("reports.run.single_run.Planned",),
     "study": ("reports.run.single_study.measure_study",),
     "sweep": ("reports.run.sweep.run_sweep",),
     "track": ("references.environments.install.find_environment",),
-    "twins": ("benchmarks.studies.twins.compare_methods",),
+    "verify": (
+        "benchmarks.verification.programs.verify_method",
+        "benchmarks.verification.programs.verify_program",
+        "benchmarks.verification.bodies.loaded.Program.check",
+    ),
     "watch": ("reports.run.single_run.Planned",),
 }
 """Functions that get what a command has selected, before any work. `gate` refuses versions."""
@@ -57,7 +61,7 @@ GREETING = {
 
 
 class Captured(Exception):
-    """The arguments of a function that was not called."""
+    """A function was not called."""
 
 
 def leaves(group, before=""):
@@ -111,25 +115,36 @@ def methods_in(value):
 def ask(monkeypatch, name, command, parameter, text):
     """Return the methods and settings that a command selects for a name, or its refusal; "==" is written as "@" in it."""
 
+    seen = list[tuple]()
+
     def capture(*values, **others):
-        raise Captured(*values, *others.values())
+        seen.append((*values, *others.values()))
+        raise Captured
+
+    def verify(*values, **others):  # is called for each setting
+        with suppress(Captured):
+            capture(*values, **others)
+        return Verification("", "method", [])
 
     for place in CAPTURED[name]:
-        monkeypatch.setattr(f"conservative.{place}", capture)
-    monkeypatch.setattr("conservative.references.importers.compare.read_files", lambda *_: [SimpleNamespace(kind="", label="")])
+        replaced = verify if place.startswith("benchmarks.verification.programs") else capture
+        monkeypatch.setattr(f"conservative.{place}", replaced)
+    monkeypatch.setattr(
+        "conservative.benchmarks.verification.bodies.loaded.read_files", lambda *_: [SimpleNamespace(kind="", label="")]
+    )
     others = [each for each in command.params if each is not parameter and (each.required or each.name == NEEDS.get(name))]
     words = name.split()
     for each in sorted([parameter, *others], key=command.params.index):
         value = text if each is parameter else GIVEN[each.name]
         words += [each.opts[0], value] if isinstance(each, click.Option) else [value]
     done = CliRunner().invoke(main, words)
-    if not isinstance(done.exception, Captured):
+    if not seen:
         assert done.exit_code == 2, (done.output, done.exception)
         return done.output.replace("==", "@").splitlines()[-1], None
-    found = {each for each in methods_in(done.exception.args) if each.family == read_name(text).family}
+    found = {each for each in methods_in(seen) if each.family == read_name(text).family}
     if found:
         return {each.label for each in found}, sorted(settings_text(each) for each in found)
-    texts = (getattr(each, "label", each) for each in done.exception.args if not callable(each))
+    texts = (getattr(each, "label", each) for each in seen[-1] if not callable(each))
     return ", ".join(map(str, texts)).replace("==", "@"), None
 
 
@@ -161,7 +176,7 @@ def test_a_name_of_nothing_is_refused_by_name(monkeypatch, name, command, parame
     assert (refusal, settings) == ask(monkeypatch, name, command, parameter, text.replace("@", "=="))
     if text == "mujoco@0.2" and name in ("engines install", "track"):
         assert "0.2" in refusal  # it would be installed
-    elif name != "engines check":  # which takes another text for a command line
+    else:
         assert refusal.startswith("Error: ")
         assert (text.partition("@")[0] or text) in refusal
 

@@ -7,7 +7,7 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures import measurement
-from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.verification.finding import Cause, Finding, Verdict
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports import report
 from conservative.reports.document import html, markdown
@@ -17,19 +17,20 @@ from conservative.reports.document.model import Document, Links, Section, Table
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan
 from conservative.reports.run.provenance import provenance
-from conservative.reports.sections import engine_page, motions
+from conservative.reports.run.verification import Verified
+from conservative.reports.sections import engine_page, verified_engines
 from conservative.reports.sections.measured import Measured
 
-from . import rows
 from .made_up import at_step
 
 
-def motion(engine, setting, scene, ratio, detail="", kind=OutcomeKind.OK):
-    family, _, version = engine.partition("==")
-    names = {"label": f"{engine}/{setting}", "family": family, "version": version, "setting": setting, "role": "engine"}
-    outcome = Outcome(kind, "" if kind == OutcomeKind.OK else "why")
-    method = f"{family}@{version}:{setting}"
-    return rows.row("motions", method, Measure.ALLOWED, ratio, 0.01, scene=scene, detail=detail, outcome=outcome, **names)
+def verified(version, setting, *verdicts):
+    """Return findings on exact motions. Wrong ones have no gyroscopic term."""
+    cause = (Cause(("no gyroscopic term",), "The gyroscopic term is missing", 1e-9, 0.3),)
+    findings = (
+        Finding("a", "motions", str(i), each, 1.0, 0.1, causes=cause * (each == "wrong")) for i, each in enumerate(verdicts)
+    )
+    return Verified({"family": "a", "engine": "a", "version": version, "setting": setting}, tuple(findings))
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +42,16 @@ def measured():
         *at_step("a==1.10", "RK4", 1e-3),
         *at_step("a@1.9==1.9", "Euler", 3.0, as_installed=True),  # an environment of a version that is named
         *at_step("b==7", "x", math.nan, outcome=Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")),
-        motion("a==2", "Euler", "fast", 3.0, "damping"),
-        motion("a==2", "Euler", "slow", 0.5),
-        motion("a==2", "RK4", "fast", 0.2),
-        motion("a==2", "RK4", "slow", 0.4),
-        motion("a==2", "RK4", "spring", math.nan, kind=OutcomeKind.UNSUPPORTED),
-        motion("a==2", "RK4", "tiny", math.nan, kind=OutcomeKind.CRASHED),
     ]
+    right, wrong, _, not_tested = Verdict
+    findings = verified("2", "Euler", wrong, right), verified("2", "RK4", right, right, not_tested, wrong)
     plan = Plan((registry.scene("brick_flip"),), (), (), engines=(registry.method("pinocchio"),))
-    return Measured(plan, Measurements(measurement.frame(found), measurement.samples_frame([])), provenance([]))
+    return Measured(plan, Measurements(measurement.frame(found), measurement.samples_frame([]), findings), provenance([]))
 
 
 @pytest.fixture(scope="module")
 def pages(measured):
-    return engine_page.pages(measured, {"motions": motions})
+    return engine_page.pages(measured)
 
 
 def tables(page):
@@ -66,7 +63,7 @@ def test_there_is_a_page_for_each_engine_with_narrow_tables(pages):
     assert list(pages) == ["engine_b", "engine_a"]
     assert [page.title for page in pages.values()] == ["b 7", "a 2"]
     for page in pages.values():
-        assert all(len(row) <= 6 for rows in tables(page).values() for row in rows)
+        assert all(len(row) <= 7 for rows in tables(page).values() for row in rows)
         assert html.render(page)
 
 
@@ -92,16 +89,17 @@ def test_it_names_the_version_since_which_an_error_is_the_same(pages):
     assert [row[0] for row in tables(pages["engine_a"])["brick_flip: versions"]] == ["a 2", "a 1.10", "a 1.9"]
 
 
-def test_it_has_the_sections_of_studies_with_rows_of_the_engine(pages):
-    rows = tables(pages["engine_a"])["Exact motions"]
-    assert rows == [["a 2 Euler", "1 of 2", "0", "0", "fast", "damping (1)"], ["a 2 RK4", "2 of 2", "1", "1", "–", "–"]]
-    assert "Exact motions" not in tables(pages["engine_b"])
+def test_it_has_the_findings_on_the_engine(pages):
+    rows = tables(pages["engine_a"])["Cases of each check"]
+    named = "no gyroscopic term (1)"
+    assert rows == [["a 2 Euler", "motions", "1", "1", "0", "0", named], ["a 2 RK4", "motions", "2", "1", "0", "1", named]]
+    assert "Cases of each check" not in tables(pages["engine_b"])
 
 
 def test_commands_repeat_it(pages):
     text = markdown.render(pages["engine_a"])
     assert "`conservative report --methods reduced --scenes brick_flip --engines a`" in text
-    assert "`conservative study motions --engines a`" in text
+    assert "`conservative verify a`" in text
 
 
 def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
@@ -117,14 +115,14 @@ def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
 OTHERS = "since 1.10, 3 rad in 1.9"
 
 
-@pytest.mark.parametrize(("name", "kept"), [("_since", ""), ("_badge", ""), ("motions", OTHERS), ("render", OTHERS)])
+@pytest.mark.parametrize(("name", "kept"), [("_since", ""), ("_badge", ""), ("findings", OTHERS), ("render", OTHERS)])
 def test_a_part_of_a_page_that_fails_is_a_sentence_on_it(name, kept, measured, tmp_path, monkeypatch):
     def fault(*_, **__):
         raise ZeroDivisionError("planted")
 
-    places = {"motions": (motions, "section"), "render": (markdown, "table")}
+    places = {"findings": (verified_engines, "section"), "render": (markdown, "table")}
     monkeypatch.setattr(*places.get(name, (engine_page, name)), fault)
-    found = engine_page.pages(measured, {"motions": motions})
+    found = engine_page.pages(measured)
     document = report.render(Document("", "all", [], pages=found), tmp_path, png=False)
     assert list(document.pages) == ["engine_b", "engine_a"]
     sentences = failed_parts(document.pages["engine_a"].blocks)

@@ -53,10 +53,9 @@ def test_the_list_as_json_has_every_version(cache):
         (("install", "exudyn", "drake==1.0 2.0"), "engine: got 'drake==1.0 2.0'; expected NAME"),
         (("remove", "exudyn==1.9.0"), "expected an installed engine (none is installed)"),
         (("remove", "../exudyn"), "engine: got '../exudyn'; expected an installed engine"),
-        (("check", "mujoco==4.0.0"), "Run: conservative engines install mujoco@4.0.0"),
         (("add", "exudyn"), "Run: conservative engines install exudyn"),
-        (("check", "pinocchio"), "To test this engine, run: conservative study motions --engines pinocchio"),
-        (("check", ""), "command: got ''; expected an executable"),
+        (("add", "pinocchio"), "To verify this engine, run: conservative verify pinocchio"),
+        (("add", ""), "command: got ''; expected an executable"),
         (("add", "my 'engine"), 'command: got "my \'engine" (No closing quotation)'),
     ],
 )

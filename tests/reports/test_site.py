@@ -112,7 +112,7 @@ def test_a_wide_table_is_divided_and_keeps_its_first_column():
 
 def check_names_and_options(pages):
     modules = {name for name in conservative.__all__ if isinstance(getattr(conservative, name), ModuleType)}
-    assert modules == {"scenes", "shapes"}
+    assert modules == {"scenes", "shapes", "verification"}
     for name in set(conservative.__all__) - modules - {"VERSION"}:
         assert f'id="conservative.{name}"' in pages[f"api/{name}.html"]
     for name in (name for name in vars(conservative.scenes) if callable(getattr(conservative.scenes, name))):

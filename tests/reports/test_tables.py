@@ -249,18 +249,18 @@ def test_hard_cases_are_a_matrix():
     assert hard_cases.hard_cases(made_up.table()) is None
 
 
-def judged(*values):
+def graded(*values):
     found = [made_up.row("hard_cases", "reduced", measure, value) for measure, value in values]
-    judgement = hard_cases.judge(frame(found).to_dict("records"))
-    return tuple(part.grade for part in judgement.parts)
+    cell = hard_cases.grades(frame(found).to_dict("records"))
+    return tuple(part.grade for part in cell.parts)
 
 
-def test_a_hard_case_is_judged_by_its_motion_and_by_its_worst_invariant():
+def test_a_hard_case_is_graded_by_its_motion_and_by_its_worst_invariant():
     """The two are independent: a method can conserve everything with an error of 0.2 rad, or be accurate and drift."""
-    wrong = judged(("attitude error max", 0.2), ("energy drift max", 1e-15), ("momentum drift max", 0))
+    wrong = graded(("attitude error max", 0.2), ("energy drift max", 1e-15), ("momentum drift max", 0))
     assert wrong == (Grade.BAD, Grade.GOOD)
-    assert judged(("attitude error max", 1.4e-6), ("energy drift max", 1e-8)) == (Grade.GOOD, Grade.FAIR)
-    assert judged(("attitude error max", 0.05), ("energy drift max", 1e-15), ("momentum drift max", 1e-2))[1] is Grade.BAD
+    assert graded(("attitude error max", 1.4e-6), ("energy drift max", 1e-8)) == (Grade.GOOD, Grade.FAIR)
+    assert graded(("attitude error max", 0.05), ("energy drift max", 1e-15), ("momentum drift max", 1e-2))[1] is Grade.BAD
 
 
 def test_methods_stand_in_the_order_in_which_they_did_well():

@@ -44,7 +44,7 @@ def test_a_lost_order_fails_a_build_and_a_gain_does_not():
     assert lost.blocks[0].text == "2.0 against 1.0: FAILED"
     assert not build(history(BAD, GOOD), gated=True).failures
     assert not build(history(GOOD, GOOD), gated=True).failures
-    assert not build(history(GOOD, BAD)).failures  # a history is no build to judge
+    assert not build(history(GOOD, BAD)).failures  # a history is no build to gate
 
 
 def test_only_losses_of_the_last_version_count():

@@ -99,8 +99,7 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
 
 
 FAILING = {
-    *("run", "watch", "sweep", "report", "study", "gate", "track", "judge", "importers", "twins"),
-    *("engines install", "engines check"),
+    *("run", "watch", "sweep", "report", "study", "gate", "track", "verify", "engines install"),
 }
 """Commands that can end with exit code 1."""
 
@@ -108,7 +107,7 @@ FAILING = {
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_help_page_lists_its_own_exit_codes(name):
     page = CliRunner(env={"COLUMNS": "110"}).invoke(main, [*name.split(), "--help"]).stdout.partition("Exit codes:\n")[2]
-    own = {code for code, names in ((1, FAILING), (3, {"judge"})) if name in names}
+    own = {code for code, names in ((1, FAILING), (3, {"verify"})) if name in names}
     assert {int(code) for code in re.findall(r"^ +(\d+) ", page, re.MULTILINE)} == {*EXIT_CODES} | own
     assert ("--resume" in page) is any(option.name == "resume" for option in COMMANDS[name].params)
 
@@ -117,6 +116,6 @@ def test_the_vocabulary_is_used():
     """A word that no command has, or a cell that the tests above miss, is a mistake of the table."""
     assert {option.name for _, option in CELLS} == set(VOCABULARY)
     assert {old for _, olds in VOCABULARY.values() for old in olds} == {"--method", "--engine", "--duration"}  # of 0.3
-    assert {"run --methods", "watch --error", "recommend --t-end", "judge --picture"} <= {
+    assert {"run --methods", "watch --error", "recommend --t-end", "verify --picture"} <= {
         f"{name} {VOCABULARY[option.name][0][0]}" for name, option in CELLS
     }

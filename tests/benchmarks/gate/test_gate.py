@@ -74,7 +74,7 @@ def run(**changes):
 
 def failures(kept, latest):
     """Return the violations as (measure, method)."""
-    verdict = compare.judge(kept, latest)
+    verdict = compare.decide(kept, latest)
     assert verdict.passed == (not verdict.violations)
     return {(each.measure, each.method) for each in verdict.violations}
 
@@ -139,13 +139,13 @@ def test_rows_that_a_run_left_out_stay():
 
 def test_rows_that_a_run_left_out_are_counted_and_no_violations():
     both = baseline.update_baseline(KEPT, [Results("here", {ROW.id: ROW, OTHER.id: OTHER})], "both")
-    verdict = compare.judge(both, Results("here", {OTHER.id: OTHER}, left_out=(ROW.id,)))
+    verdict = compare.decide(both, Results("here", {OTHER.id: OTHER}, left_out=(ROW.id,)))
     assert (verdict.passed, verdict.rows) == (True, 1)
     assert verdict.notes == ("not compared: 1 rows of the baseline, which were not selected",)
-    assert not compare.judge(both, Results("here", {OTHER.id: OTHER})).passed
-    assert not compare.judge(both, Results("here", {}, left_out=(ROW.id,))).passed  # the other one is missing
+    assert not compare.decide(both, Results("here", {OTHER.id: OTHER})).passed
+    assert not compare.decide(both, Results("here", {}, left_out=(ROW.id,))).passed  # the other one is missing
     with pytest.raises(baseline.NothingToCompare, match="none of the 2 rows"):
-        compare.judge(both, Results("here", {}, left_out=(ROW.id, OTHER.id)))
+        compare.decide(both, Results("here", {}, left_out=(ROW.id, OTHER.id)))
 
 
 def test_runs_that_disagree_are_refused():
@@ -295,13 +295,13 @@ def test_the_definition_changes_with_the_motion_and_the_engine_with_its_version(
 
 
 def test_the_same_results_pass_and_values_at_their_limit():
-    assert compare.judge(KEPT, RUN) == compare.Verdict((), (), 1)
-    assert str(compare.judge(KEPT, RUN)) == "gate: passed, 1 rows, 0 violations"
-    assert compare.judge(KEPT, changed(values={"energy drift max": 1e-3 + 5e-5, "observed order": 1.95})).passed
+    assert compare.decide(KEPT, RUN) == compare.Verdict((), (), 1)
+    assert str(compare.decide(KEPT, RUN)) == "gate: passed, 1 rows, 0 violations"
+    assert compare.decide(KEPT, changed(values={"energy drift max": 1e-3 + 5e-5, "observed order": 1.95})).passed
 
 
 def test_a_violation_has_the_value_before_and_now_and_the_limit():
-    verdict = compare.judge(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
+    verdict = compare.decide(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
     assert [tuple(vars(each).values()) for each in verdict.violations] == [
         ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
         ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
@@ -328,7 +328,7 @@ TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
     ],
 )
 def test_rows_that_cannot_be_compared(latest, expected):
-    (each,) = compare.judge(KEPT, latest).violations
+    (each,) = compare.decide(KEPT, latest).violations
     assert (each.measure, each.was, each.now, each.allowed) == expected
     assert (each.scene, each.method) == ("brick", "reduced")
 
@@ -341,9 +341,9 @@ def test_a_measure_that_is_gone():
 
 def test_a_row_that_is_new_is_a_note_if_it_passed():
     both = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", method="new")})
-    assert compare.judge(KEPT, both).notes == ("unbaselined: new",)
+    assert compare.decide(KEPT, both).notes == ("unbaselined: new",)
     failed = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", status=Status.FAILED)})
-    assert compare.judge(KEPT, failed) == compare.Verdict((), (), 1)
+    assert compare.decide(KEPT, failed) == compare.Verdict((), (), 1)
 
 
 def test_a_baseline_without_rows_is_a_violation():
@@ -354,22 +354,22 @@ def test_a_baseline_without_rows_is_a_violation():
 def test_a_runaway_is_a_failure_with_any_baseline(drift, failed):
     values = {results.ENERGY_DRIFT: drift}
     row = replace(OTHER, values=values)
-    unknown = compare.judge(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
+    unknown = compare.decide(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
     assert [each.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
     as_before = baseline.BaselineRow(
         "top", "gauss", row.engine, "other", {results.ENERGY_DRIFT: baseline.Allowed(drift, 0, 1, 3e11)}
     )
-    known = compare.judge(baseline.Baseline({row.id: as_before}, []), Results("here", {row.id: row}))
+    known = compare.decide(baseline.Baseline({row.id: as_before}, []), Results("here", {row.id: row}))
     assert known.passed != failed
 
 
 def test_a_gain_as_large_as_a_failure_is_noted():
-    better = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 6e-5, "observed order": 2.06}))
+    better = compare.decide(KEPT, changed(values={"energy drift max": 1e-3 - 6e-5, "observed order": 2.06}))
     assert better.passed
     assert [note.partition(",")[0] for note in better.notes] == ["better: energy drift max", "better: observed order"]
-    same = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 4e-5, "observed order": 2.04}))
+    same = compare.decide(KEPT, changed(values={"energy drift max": 1e-3 - 4e-5, "observed order": 2.04}))
     assert not same.notes
-    assert not compare.judge(KEPT, changed(definition="new", values={"energy drift max": 0.0})).notes
+    assert not compare.decide(KEPT, changed(definition="new", values={"energy drift max": 0.0})).notes
 
 
 @pytest.fixture

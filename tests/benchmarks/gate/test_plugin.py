@@ -255,7 +255,7 @@ for words in json.loads(sys.argv[1]):
     if not baseline.PATH.exists():
         baseline.write(baseline.update_baseline(None, [run], "first"), baseline.PATH)
     try:
-        missing = [each.scene for each in compare.judge(baseline.read(baseline.PATH), run).violations if each.now == "missing"]
+        missing = [each.scene for each in compare.decide(baseline.read(baseline.PATH), run).violations if each.now == "missing"]
     except baseline.NothingToCompare:
         missing = []
     ended[words] = code, sorted(run.rows), sorted(missing)

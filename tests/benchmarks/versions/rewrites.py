@@ -63,21 +63,21 @@ W0, MOMENTS, SHOWN = 'number(line, "w0", i - 4)', 'number(line, "moments", 0)', 
 WEIGHT, DT = 'weight = number(line, "mass", 0)', 'h = number(line, "dt", 0)'
 GYROSCOPIC = ("(J2 - J3) * v * z", "(J3 - J1) * z * x", "(J1 - J2) * x * v")
 MISTAKES = {
-    "no gyroscopic torque": dict.fromkeys(GYROSCOPIC, "0"),
-    "gyroscopic term has the other sign": {term: f"-{term}" for term in GYROSCOPIC},
-    "Gravity points up": {WEIGHT: WEIGHT.replace("=", "= -")},
-    "ignores gravity": {WEIGHT: WEIGHT.replace("=", "= 0 *")},
-    "inertia is inverted": {f"J{i} = number": f"J{i} = 1 / number" for i in (1, 2, 3)},
-    "about the centre of mass": {f'"moments", {i}': f'"moments_com", {i}' for i in range(3)},
-    "in ms": {DT: f"{DT} / 1000"},
-    "reads rates in deg/s": {W0: f"{W0} * acos(-1) / 180"},
-    "answer in rad/s": {SHOWN: f"{SHOWN} * (skip ? 180 / acos(-1) : 1)"},
+    "no gyroscopic term": dict.fromkeys(GYROSCOPIC, "0"),
+    "sign of the gyroscopic term": {term: f"-{term}" for term in GYROSCOPIC},
+    "sign of the field": {WEIGHT: WEIGHT.replace("=", "= -")},
+    "without the field": {WEIGHT: WEIGHT.replace("=", "= 0 *")},
+    "inverted inertia": {f"J{i} = number": f"J{i} = 1 / number" for i in (1, 2, 3)},
+    "inertia about the centre of mass": {f'"moments", {i}': f'"moments_com", {i}' for i in range(3)},
+    "time in ms": {DT: f"{DT} / 1000"},
+    "start in degrees": {W0: f"{W0} * acos(-1) / 180"},
+    "rates in degrees": {SHOWN: f"{SHOWN} * (skip ? 180 / acos(-1) : 1)"},
     "transposed": {SHOWN: f"{SHOWN} * (skip || !i ? 1 : -1)"},
-    "scalar comes first": {SHOWN: "(double)y[skip ? skip + i : (i + 1) % 4]"},
+    "order xyzw": {SHOWN: "(double)y[skip ? skip + i : (i + 1) % 4]"},
     "half a step late": {"for (n = 0;": "h /= -2, step(y), h *= -2; for (n = 0;"},
-    "damped": {"n = sqrt(": "for (i = 4; i < 7; i++) y[i] = y[i] * (1 - h / 20); n = sqrt("},
+    "damping": {"n = sqrt(": "for (i = 4; i < 7; i++) y[i] = y[i] * (1 - h / 20); n = sqrt("},
 }
-"""Physical mistakes: a part of the sentence that names each, and the replaced texts."""
+"""Physical mistakes by their keys, and the replaced texts."""
 FLAGS = ("-O0", "-O3 -ffast-math", "-O2 -mfma -ffp-contract=fast", "-O1")
 
 

@@ -9,7 +9,7 @@ from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.versions import project
 from conservative.benchmarks.versions.prices import Price, read_prices
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, define_scene, faster, judge, judge_values
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, define_scene, faster
 from conservative.errors import BadInput
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
@@ -21,7 +21,7 @@ SLOW = (1.1, 1.08, 1.12)
 
 
 def compare(was, now, time=None):
-    return judge(comparison((was, now, time)) if was or now else comparison())
+    return decide(comparison((was, now, time)) if was or now else comparison())
 
 
 def violations(*arguments):
@@ -39,10 +39,10 @@ def test_equal_rows_pass_without_notes():
 def test_no_measure_of_a_real_row_is_ignored():
     values, spreads = points.measure(points.Point(scene("lagrange_top:t_end=0.1"), method("reduced")))
     assert {"rate error max", "vertical momentum drift max", "iterations", "observed order"} <= values.keys()
-    was = judge_values(row(), values, spreads)
+    was = decide_values(row(), values, spreads)
     for name, value in values.items():
         worse = value + (-0.5 if name == "observed order" else 0.5)
-        now = judge_values(row(), values | {name: worse}, spreads)
+        now = decide_values(row(), values | {name: worse}, spreads)
         assert (violations(was, now), violations(now, was)) == ({name}, set())
 
 
@@ -73,12 +73,12 @@ def test_a_row_that_fails_now_or_is_gone_fails():
 
 def test_another_motion_is_one_violation_with_its_cause():
     lost = row(attitude_error_max=3.1, rate_error_max=5.0, energy_drift_max=0.5)
-    (each,) = compare(row(), replace(lost, cause="no torque")).violations
+    (each,) = compare(row(), replace(lost, mistake="no torque", cause="no torque")).violations
     assert (each.measure, each.allowed) == (MOTION, "")
     assert "no torque" in each.finding
     assert violations(row(), lost) == {MOTION}  # without a cause
-    assert violations(row(), replace(row(), cause="late")) == {MOTION}  # which the scene does not show
-    failed = replace(row("diverged", status=Status.FAILED), cause="no torque")
+    assert violations(row(), replace(row(), mistake="late", cause="late")) == {MOTION}  # which the scene does not show
+    failed = replace(row("diverged", status=Status.FAILED), mistake="no torque", cause="no torque")
     assert violations(row(), failed) == {MOTION}
     assert violations(row(), row(attitude_error_max=0.5)) == {"attitude error max"}  # an error may have grown
 
@@ -91,10 +91,10 @@ def test_a_motion_that_is_lost_in_both_versions_is_never_faster():
     assert violations(was, now) == set()  # half a turn says nothing
     assert violations(was, replace(now, values={**now.values, "energy drift max": 0.1})) == {"energy drift max"}
     assert violations(was, now, timed(SLOW, SLOW)) == {TIME}
-    known = replace(was, cause="no torque")
-    assert violations(was, replace(now, cause="no torque")) == {MOTION}
-    assert violations(known, replace(now, cause="no torque")) == set()
-    assert any("no torque" in note for note in compare(known, replace(now, cause="no torque")).notes)
+    known = replace(was, mistake="no torque", cause="no torque")
+    assert violations(was, replace(now, mistake="no torque", cause="no torque")) == {MOTION}
+    assert violations(known, replace(now, mistake="no torque", cause="no torque")) == set()
+    assert any("no torque" in note for note in compare(known, replace(now, mistake="no torque", cause="no torque")).notes)
 
 
 def test_a_longer_time_can_have_a_price(tmp_path):
@@ -104,14 +104,14 @@ def test_a_longer_time_can_have_a_price(tmp_path):
     assert prices == {"reduced": Price(1.09, ""), "other": Price(6.0, "")}
     prices = read_prices([], file)
     slow = comparison((row(), row(), timed(SLOW, SLOW)))
-    assert "more digits" in judge(slow, prices).notes[0]
-    assert judge(slow, prices).passed
-    assert not judge(slow, {"reduced": Price(1.07, "")}).passed
-    assert judge(comparison((row(), row(), timed(SAME))), prices).notes == (
+    assert "more digits" in decide(slow, prices).notes[0]
+    assert decide(slow, prices).passed
+    assert not decide(slow, {"reduced": Price(1.07, "")}).passed
+    assert decide(comparison((row(), row(), timed(SAME))), prices).notes == (
         f"reduced: no row needs the longer time, {prices['reduced']}",
     )
     broken = comparison((row(), row(), timed((math.nan,) * 3, reason="crashed")))
-    assert not judge(broken, prices).passed
+    assert not decide(broken, prices).passed
 
 
 @pytest.mark.parametrize("text", ["reduced", "reduced=6", "reduced=0.5x", "=6x", "reduced=6x reason"])
@@ -125,7 +125,7 @@ def test_a_price_that_is_none_is_refused(text, tmp_path):
 
 def test_a_scene_that_is_not_supported_is_one_note():
     skipped = row("only free bodies", status=Status.SKIPPED)
-    result = judge(comparison((row(method="gauss"), row(method="gauss"), None), (skipped, skipped, None)))
+    result = decide(comparison((row(method="gauss"), row(method="gauss"), None), (skipped, skipped, None)))
     assert result.passed
     assert result.notes == ("reduced: not supported (only free bodies): brick_flip",)
 
@@ -143,10 +143,10 @@ def test_a_slow_method_is_measured_with_fewer_points():
 def test_rows_that_are_new_or_failed_before_pass_with_a_note():
     failed = row("diverged at 1 s", status=Status.FAILED)
     old = row(method="gauss")
-    new = judge(comparison((old, old, None), (None, row(), None)))
+    new = decide(comparison((old, old, None), (None, row(), None)))
     assert new.passed
     assert new.notes == ("brick_flip, reduced: was not there",)
-    mended = judge(comparison((old, old, None), (failed, row(), None)))
+    mended = decide(comparison((old, old, None), (failed, row(), None)))
     assert mended.passed
     assert mended.notes == ("brick_flip, reduced: was without values: diverged at 1 s",)
 
@@ -158,7 +158,7 @@ def test_without_a_row_that_passed_there_is_no_verdict():
 
 def test_differences_between_environments_are_notes():
     other = version("is", "numpy==2.1", "numba==0.68", runtime="Python 3.12.1")
-    result = judge(comparison((row(), row(), None), head=other))
+    result = decide(comparison((row(), row(), None), head=other))
     assert result.notes == (
         "another numba: was not there, is numba==0.68",
         "another numpy: was numpy==2.0, is numpy==2.1",
@@ -178,9 +178,9 @@ RUNAWAY = "energy drift max is 2.7e+11, more than 1: the run failed"
     ],
 )
 def test_a_runaway_fails_without_an_error(name, value, reason):
-    judged = judge_values(row(), {name: value}, {name: 0.0})
-    assert (judged.status, judged.reason) == (Status.FAILED, reason)
-    assert judge_values(row(), {"energy drift max": 0.36}, {"energy drift max": 0.0}).reason == ""
+    decided = decide_values(row(), {name: value}, {name: 0.0})
+    assert (decided.status, decided.reason) == (Status.FAILED, reason)
+    assert decide_values(row(), {"energy drift max": 0.36}, {"energy drift max": 0.0}).reason == ""
 
 
 class Answers(ProjectSide):

@@ -1,1 +1,0 @@
-"""Motions that other programs recorded, compared with the exact motion, and what explains the difference."""

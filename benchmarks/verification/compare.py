@@ -1,0 +1,456 @@
+"""Samples of a motion beside the exact motion: errors, what is allowed and by what, noise, and fits of initial states.
+
+Attitude errors are in rad, errors of rates relative to the largest rate. Nothing here knows files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array, angle_between, to_quaternion
+from conservative.needs import IN_TIME
+from conservative.scene import Scene
+
+from .solution import ANGLE, Equations, States, closed, truth
+
+FLOOR = 1e-9  # errors that round-off makes in double precision
+UNITS_OF_DIGITS = 6.0  # of what digits round, that the largest error may have
+SIGMAS = 7.0  # of noise, that the largest error may have
+ROUND_OFF = 1e-13  # of double precision, which no fit goes below
+LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
+TINY = 1e-11  # of noise, which is round-off
+SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
+LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
+PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
+HUGE = 1e60  # of the largest rate: a difference that is not finite
+SENSITIVE = 1e6  # factor by which a motion may multiply an error, beyond which solutions need more digits
+HOPELESS = 30.0  # of noise, that no other first row explains
+LINEAR = 0.3  # rad, differences of motions that are taken as small
+PERTURBED = 1e-8, 1e-12  # of initial states, to see how the motion multiplies it; the second where the first is not small
+STRAIGHT, NARROWED = 0.03, 6  # of differences for slopes; trials of smaller changes
+SMALLEST_CHANGE = 1e-14  # of initial states, for slopes
+EXTENDED = 40  # trials of a fit that takes more and more rows
+FASTER = 30.0  # times the angle, that a motion multiplies small changes by near a separatrix
+Solution = Callable[[Array, Array, Array, int], tuple[Array, Array]]
+"""From initial attitudes (B, 3, 3), rates (B, 3), other numbers (B, k) and n to the first rows (B, n, 3, 3), (B, n, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Allowed:
+    """Errors that samples may have, of attitudes, rad, and of rates, relative to the largest rate, and what allows them.
+
+    `errors` (2,) are the largest, and `by` says for each of the two what allows it: "digits", "noise", or another word for
+    a given error. `noise` (2,) is the deviation of one axis, by which fits weigh samples. `rounded` (2,) are the errors that
+    digits make; a given error alone decides, so it stands there too.
+    """
+
+    errors: Array
+    by: tuple[str, str]
+    noise: Array
+    rounded: Array
+
+
+def allow(rounded: Any = (0.0, 0.0), noise: Any = (0.0, 0.0), error: float | None = None, by: str = "error") -> Allowed:
+    """Return the errors that are allowed: a given error alone, or else what the digits and the noise of samples make.
+
+    `rounded` (2,) are the errors that digits make, and `noise` (2,) is the standard deviation of one axis, both of attitudes,
+    rad, and of rates, relative to the largest. `by` says what a given error comes from.
+    """
+    rounded, noise = np.asarray(rounded, float), np.asarray(noise, float)
+    weight = np.maximum(np.maximum(noise, rounded), ROUND_OFF)
+    if error is not None:
+        return Allowed(np.full(2, error), (by, by), weight, np.full(2, error))
+    digits, scattered = np.maximum(FLOOR, UNITS_OF_DIGITS * rounded), SIGMAS * noise
+    words = ["noise" if a > b else "digits" for a, b in zip(scattered, digits, strict=True)]
+    return Allowed(np.maximum(digits, scattered), (words[0], words[1]), weight, rounded)
+
+
+def take_rows(data: States, rows: Any) -> States:
+    """Return some rows of a motion."""
+    return None if data[0] is None else data[0][rows], None if data[1] is None else data[1][rows]
+
+
+def weigh(scene: Scene) -> float:
+    """Return the work of a solution in a scene, relative to the work for a free body."""
+    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.needs & IN_TIME)
+    varying = None if scene.damping is None else scene.damping.of_time
+    slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
+    return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state
+
+
+def take_part(motion: tuple[Array, Array], of: States) -> States:
+    """Return attitudes and rates of a motion as far as data have them."""
+    R, w = (x if y is not None else None for x, y in zip(motion, of, strict=True))
+    return R, w
+
+
+@dataclass
+class Effort:
+    """The work that a search may still do. It is counted, because the clock depends on how busy the machine is.
+
+    The unit is a stretch of a solution (`Equations.flow`), one to three milliseconds on an idle machine.
+    """
+
+    left: float
+
+    def spend(self, stretches: float) -> None:
+        """Count work."""
+        self.left -= stretches
+
+    @property
+    def over(self) -> bool:
+        """True if no work is left."""
+        return self.left <= 0
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Rows of a file and the scene whose motion they should be, from its initial state at `start`, s.
+
+    `allowed` and `noise` (2,) are errors of attitudes, rad, and rates, relative to `scale`, rad/s. `free` says which of six
+    numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
+    the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
+    the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
+    alone decides, it is that. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
+    which the quaternion of the file changes its sign; None if the file has no quaternions.
+    """
+
+    scene: Scene
+    t: Array
+    data: States
+    start: float
+    scale: float
+    allowed: Array
+    noise: Array
+    free: tuple[int, ...] = ()
+    growth: float = SENSITIVE
+    stride: int = 1
+    effort: Effort = field(default_factory=lambda: Effort(math.inf))
+    rounded: tuple[float, float] = (0.0, 0.0)
+    step: float | None = None
+    flipped: Any = None
+
+    @property
+    def from_row(self) -> bool:
+        """Whether the initial state is that of the first row."""
+        return self.start == float(self.t[0])
+
+    def take(self, rows: Any) -> Compared:
+        """Return some of the rows."""
+        flipped = None if self.flipped is None else self.flipped[rows]
+        taken = replace(self, t=self.t[rows], data=take_rows(self.data, rows), flipped=flipped)
+        if "exact" in vars(self):
+            vars(taken)["exact"] = take_rows(self.exact, rows)
+        return taken
+
+    def change(self, **changes: Any) -> Compared:
+        """Return the case with other fields than scene, start and times, whose exact motion it keeps."""
+        changed = replace(self, **changes)
+        if "exact" in vars(self):
+            vars(changed)["exact"] = self.exact
+        return changed
+
+    def first(self, angle: float, least: int) -> Compared:
+        """Return the rows in which the body turns by an angle, rad, or at least so many."""
+        return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
+
+    def read(self, R: Array | None, w: Array | None) -> Compared:
+        """Return the case of other attitudes and rates, from the first row on."""
+        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None and self.from_row}
+        return replace(self, scene=self.scene.rename(self.scene.name, **changes), data=(R, w))
+
+    def rescale(self, scale: float) -> Compared:
+        """Return the rows with rates relative to another scale, rad/s. Round-off in double precision is relative to a row."""
+        factors = np.array([1.0, self.scale / scale])
+        allowed = np.where(self.allowed <= FLOOR, FLOOR, self.allowed * factors)
+        return replace(
+            self, scale=scale, allowed=allowed, noise=np.where(self.noise <= ROUND_OFF, ROUND_OFF, self.noise * factors)
+        )
+
+    @cached_property
+    def exact(self) -> tuple[Array, Array]:
+        """The exact motion at the times of the rows."""
+        return truth(self.scene, self.start, self.t)
+
+    @cached_property
+    def error(self) -> Array:
+        """The errors (2, n) of the rows against the exact motion."""
+        return self.errors(*self.exact)
+
+    @cached_property
+    def screen(self) -> Compared | None:
+        """The first rows, which already tell whether a mistake explains the error; None if all rows are needed."""
+        for angle in SCREENS:
+            some = self.first(angle, FEWEST_SCREENED)
+            if len(some.t) > 0.5 * len(self.t):
+                return None
+            if (np.sqrt((some.error**2).mean(axis=1)) > SCREENED * np.maximum(some.allowed, some.noise)).any():
+                return some
+        return None
+
+    @property
+    def turned(self) -> float:
+        """The angle, rad, by which the body may have turned."""
+        return float(self.t[-1] - self.start) * self.scale
+
+    @cached_property
+    def plain(self) -> Array:
+        """The errors (2, n) without a mistake: from the first row, or from a start that is fitted if it has noise."""
+        if not self.free or self.passes(self.error) or self.turned > NUMERICAL:
+            return self.error
+        return min(self.error, self.errors(*self.fit(exact(self), np.zeros(0), np.zeros(0))[2]), key=self.size)
+
+    def differences(self, R: Array, w: Array) -> Array:
+        """Return motions (..., n, 3, 3), (..., n, 3) minus the data, (..., n, 12), rad and relative; 0 where there are none."""
+        out = np.zeros((*w.shape[:-1], 12))
+        if self.data[0] is not None:
+            out[..., :9] = (R - self.data[0]).reshape(*w.shape[:-1], 9) / np.sqrt(2)
+        if self.data[1] is not None:
+            out[..., 9:] = (w - self.data[1]) / self.scale
+        return np.clip(np.nan_to_num(out, nan=HUGE), -HUGE, HUGE)
+
+    def errors(self, R: Array, w: Array) -> Array:
+        """Return the sizes (2, n) of differences: angles between attitudes, rad, and differences of rates."""
+        d = self.differences(R, w)
+        return np.stack(
+            [2 * np.arcsin(np.minimum(np.linalg.norm(d[..., :9], axis=-1) / 2, 1)), np.linalg.norm(d[..., 9:], axis=-1)]
+        )
+
+    def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+        """Return the largest differences (2,) of two motions in the quantities of the data: rad, and relative to the scale."""
+        return replace(self, data=take_part(other, self.data)).errors(*one).max(axis=1)
+
+    def passes(self, error: Array) -> bool:
+        """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
+        n = error.shape[1]
+        mean = np.sqrt((error**2).mean(axis=1))
+        noisy = (self.noise * SIGMAS > 0.5 * self.allowed) & (self.rounded < self.allowed)
+        most = np.where(noisy, 1.3 * np.sqrt(3) * (1 + 3 / np.sqrt(n)) * self.noise, self.allowed)
+        return bool((error.max(axis=1) <= self.allowed).all() and (mean <= most).all())
+
+    def size(self, error: Array) -> float:
+        """Return the root of the mean square of errors, in units of the noise."""
+        return float(np.sqrt((error**2).mean(axis=1) / self.noise**2).max())
+
+    def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
+        """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
+        turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
+        self.effort.spend(weigh(self.scene) * (1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
+        return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
+
+    def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
+        """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
+        share = 0.1 / self.growth if self.growth > SENSITIVE else 1e-5
+        tolerance = float(np.clip(share * self.noise.min(), 4e-16, 1e-8))
+        most = LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
+        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=most, **changes)
+
+    def deviations(self, motion: Solution, found: Array, small: float) -> Array:
+        """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""
+        moved = [*self.free, *range(6, len(found))]
+        R, w = self.evaluate(motion, found + small * np.vstack([0 * found, np.eye(len(found))[moved]]))
+        d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
+        slopes, out = (d[1:] - d[0]) / small, np.zeros(len(found))
+        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        return out
+
+    def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:
+        """Return initial numbers (6,), other numbers (k,), and the motion that fit the rows best (Levenberg and Marquardt).
+
+        The fit starts at `extra` and at the initial state of the scene, and takes more and more of the rows. `changed` are the
+        small changes of the other numbers, for slopes.
+        """
+        free = list(self.free)
+        p = np.concatenate([np.zeros(6), extra])
+        moved = [*free, *range(6, 6 + len(extra))]
+        small = np.concatenate([np.full(6, 1e-6), changed])
+        n = len(self.t)
+
+        rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
+        for k in rows if moved else ():
+            p, cost = self._improve(motion, p, k, moved, small, most)
+            if free and cost > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
+                break  # no start explains these rows, so none explains more
+        R, w = self.evaluate(motion, p[None])
+        return p[:6], p[6:], (R[0], w[0])
+
+    def _improve(
+        self, motion: Solution, p: Array, k: int, moved: list[int], small: Array, most: int, damping: float = 1e-6
+    ) -> tuple[Array, float]:
+        """Return numbers (6 + extra,) that fit the first rows better, and the sum of squares that they leave.
+
+        The changes `small` of the initial state become smaller here where the motion multiplies them too much for slopes.
+        """
+        part, damping, weights = self.take(slice(0, k)), 1e-6, 1 / np.repeat(self.noise, [9, 3])
+        evaluate = partial(part.evaluate, motion)
+        R, w = evaluate(p[None])
+        now = (part.differences(R, w)[0] * weights).ravel()
+        for _ in range(most):
+            if self.effort.over:
+                break
+            for _ in range(NARROWED):
+                R, w = evaluate(p + np.concatenate([small * np.eye(len(p))[i][None] for i in moved]))
+                change = (part.differences(R, w) * weights).reshape(len(moved), -1) - now
+                largest = (np.abs(change) / np.tile(weights, k)).max(axis=1)
+                wide = [j for j, i in enumerate(moved) if i < 6 and largest[j] > STRAIGHT]
+                if not wide:
+                    break
+                at = [moved[j] for j in wide]
+                small[at] = np.maximum(small[at] * 0.1 * STRAIGHT / largest[wide], SMALLEST_CHANGE)
+            slopes = change / small[moved][:, None]
+            better = False
+            axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
+            sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
+            goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
+            while damping < 1e3 and not better:
+                step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
+                q = p.copy()
+                q[moved] += step
+                R, w = evaluate(q[None])
+                new = (part.differences(R, w)[0] * weights).ravel()
+                better = bool(new @ new < now @ now)
+                damping = damping / 30 if better else max(damping, 1e-6) * 30
+            if not better:
+                break
+            gain = 1 - (new @ new) / (now @ now)
+            p, now = q, new
+            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
+                break
+        return p, float(now @ now)
+
+    def extend(self) -> tuple[Compared, int]:
+        """Return the case with the initial state that explains the most rows, found from the first ones on, and their number.
+
+        A motion that multiplies small changes is determined by the first rows for some more rows only.
+        """
+        motion, small, p, good, step = exact(self), np.full(6, 1e-6), np.zeros(6), 0, max(8, len(self.t) // 64)
+        for _ in range(EXTENDED):
+            if good == len(self.t) or step <= len(self.t) // 256:
+                break
+            k = min(len(self.t), good + step)
+            q, _ = self._improve(motion, p, k, list(self.free), small, 8)
+            part = self.take(slice(0, k))
+            R, w = part.evaluate(motion, q[None])
+            if self.passes(part.errors(R[0], w[0])):
+                p, good, step = q, k, 2 * step
+            else:
+                step = (k - good) // 2
+        return self.at(p), good
+
+    def hidden(self) -> bool:
+        """Return whether the motion multiplies the digits or the noise of the first row to the size of the errors.
+
+        Small changes of any motion grow with the angle. From where they grow much faster, an error proves
+        nothing; some start has to explain the rows before.
+        """
+        if not self.free:
+            return False
+        some = np.unique(np.linspace(0, len(self.t) - 1, 400).astype(int))
+        flow = np.nan_to_num(linearise(self.take(some))[2]).reshape(-1, 2, 3, 2, 3)
+        growth = np.linalg.norm(flow, axis=(2, 4))
+        usual = 1 + (self.t[some] - self.start) * self.scale
+        reached = (growth @ self.allowed).max(axis=1)
+        lost = np.flatnonzero((reached > LINEAR) & (growth.max(axis=(1, 2)) > FASTER * usual))
+        if not len(lost):
+            return False
+        early = self.take(slice(0, max(2, int(some[lost[0]]))))
+        limit = np.interp(np.arange(len(early.t)), some, reached) + self.allowed.max()
+        if (early.error.max(axis=0) > limit).any():
+            return False
+        fitted = early.at(early.fit(exact(early), np.zeros(0), np.zeros(0))[0])
+        return early.passes(early.error) or fitted.passes(fitted.error)
+
+    def at(self, initial: Array) -> Compared:
+        """Return the case whose initial state is changed by six numbers, as `fit` finds them."""
+        R0, w0 = self.scene.R_WB0 @ Rotation.from_rotvec(initial[:3]).as_matrix(), self.scene.w_WB_B0 + initial[3:] * self.scale
+        return replace(self, scene=self.scene.rename(self.scene.name, R_WB0=R0, w_WB_B0=w0))
+
+
+def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
+    """Return the largest angle of attitudes, rad, or difference of rates over the largest rate, of two motions; inf for nan."""
+    scale = float(np.linalg.norm(one[1], axis=1).max()) or 1.0
+    with np.errstate(all="ignore"):
+        rates = np.linalg.norm(one[1] - other[1], axis=1).max() / scale
+        apart = max(float(np.max(angle_between(one[0], other[0]))), float(rates))
+    return apart if math.isfinite(apart) else math.inf
+
+
+def compare_answers(scene: Scene, t: Array, data: States, allowed: Array, step: float | None = None) -> Compared:
+    """Return the case of samples of a program or engine at times t, s, of the scene, whose errors (2,) may be `allowed`.
+
+    `step` is the step of the program, s.
+    """
+    allowed = np.asarray(allowed, float)
+    rates = truth(scene, 0.0, t)[1] if len(t) else np.zeros((0, 3))
+    scale = float(np.linalg.norm(np.vstack([scene.w_WB_B0, rates]), axis=1).max()) or 1.0
+    noise = np.maximum(allowed * PART_OF_ALLOWED, 1e-13)
+    return Compared(scene, t, data, 0.0, scale, allowed, noise, rounded=(float(allowed[0]), float(allowed[1])), step=step)
+
+
+def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
+    """Return motions (..., n) minus another one (n), (..., n, 6): turns in body axes, rad, and relative rates."""
+    turn = np.nan_to_num(np.swapaxes(R0, -1, -2) @ R) + 0.0
+    turn[np.abs(np.linalg.det(turn)) < 0.5] = np.eye(3)
+    vector = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
+    return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
+
+
+def linearise(case: Compared) -> tuple[Array, Array, Array]:
+    """Return the exact motion (n, 3, 3), (n, 3), and the matrices (n, 6, 6) that carry small changes of its start along."""
+    flows = []
+    for size in PERTURBED:
+        turns, shifts = np.split(np.vstack([np.zeros(6), size * np.eye(6)]), 2, axis=1)
+        R0 = case.scene.R_WB0 @ Rotation.from_rotvec(turns).as_matrix()
+        R, w = exact(case.change(growth=math.inf))(R0, case.scene.w_WB_B0 + shifts * case.scale, np.zeros((7, 0)), len(case.t))
+        flows.append(np.moveaxis(differ(R[0], w[0], R[1:], w[1:], case.scale), 0, -1))
+        if np.abs(flows[0]).max() < STRAIGHT:
+            break
+    small = np.maximum.accumulate(np.abs(flows[0]).max(axis=(1, 2))) < STRAIGHT
+    return R[0], w[0], np.where(small[:, None, None], flows[0] / PERTURBED[0], flows[-1] / PERTURBED[len(flows) - 1])
+
+
+def exact(case: Compared) -> Solution:
+    """Return the exact motion as a function of initial states."""
+
+    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
+        t = case.t[:n]
+        if closed(case.scene) and ((t[-1] - case.start) * case.scale > 3 * LONGEST or case.growth > SENSITIVE):
+            each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
+            return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
+        return case.equations().solve(case.start, R, w, t)
+
+    return motion
+
+
+def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
+    """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
+
+    It is the smallest robust estimate from differences of order 3 to 9. Of a smooth motion they fall with each order, and those
+    of noise do not.
+    """
+    noise, resolved = np.zeros(2), np.zeros(2, bool)
+    for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
+        if values is None or len(t) < 14:
+            continue
+        x = values
+        if i == 0:
+            x = to_quaternion(values)
+            x = x * np.cumprod(np.append(1.0, np.sign(np.sum(x[1:] * x[:-1], axis=1)) + 0.0))[:, None]
+        found = []
+        for order in range(3, 10):
+            near = np.stack([t[k : len(t) - order + k] for k in range(order + 1)])
+            gaps = near[:, None] - near[None] + np.eye(order + 1)[:, :, None] * np.ptp(near, axis=0)
+            weights = 1 / np.prod(gaps / np.ptp(near, axis=0), axis=1)
+            weights = weights / np.sqrt((weights**2).sum(axis=0))
+            d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
+            found.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
+        noise[i] = min(found)
+        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < TINY
+    return noise, resolved

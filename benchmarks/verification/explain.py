@@ -1,0 +1,717 @@
+"""The search for the mistakes that explain the error of a recorded motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain, combinations, product
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array, to_quaternion
+
+from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
+from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
+from .find_steps import PARTS, STEPS_AT_MOST, find_steps
+from .mistakes import BY_KEY
+from .mistakes.attitudes import RULES, align, integrate
+from .mistakes.equations import EQUATIONS
+from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
+from .mistakes.mistake import Number
+from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
+from .mistakes.scenes import PARTS as SCENE_PARTS
+from .mistakes.scenes import SCENES, SceneMistake, with_inertia
+from .mistakes.steps import INTEGRATORS
+from .mistakes.times import DROPPED, JITTERED, TIMES
+from .solution import Equations, closed, truth
+from .trials import by_habit, by_rule, compose, fits, remark_on_damping
+
+FEWEST, MOST = 100, 2500  # rows that are explained
+EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle core
+MOST_BREAKS = 50  # of loads, if numbers are fitted
+STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
+LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
+SHRUNK = 1e-3  # of the exact motion: a motion in other units of time that is smaller stands still
+SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
+_INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
+ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
+PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
+"""Kinds of mistakes that a program can have beside the errors of its method."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The mistakes that explain an error, or the best candidates if none does, all that were tried, best first, and notes."""
+
+    named: list[Explanation] = field(default_factory=list)
+    tried: list[Explanation] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def diagnose(
+    whole: Compared,
+    quaternion: bool = True,
+    tell: Callable[[str], object] = lambda _: None,
+    kinds: frozenset[str] = ALL_KINDS,
+) -> Diagnosis:
+    """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
+
+    A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
+    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes
+    that make attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions
+    can be wrong. The work is counted, so that the answer is the same on a busy machine.
+    """
+    whole = _before_divergence(whole)
+    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
+    if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
+        case = whole  # the error is later
+    stride = -(-len(case.t) // MOST)
+    case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(0.0))
+    early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
+    tried, over = list[Explanation](), False
+    for name, search in SEARCHES.items():
+        if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
+            continue
+        tell(name)
+        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # and what earlier parts have left
+        for each in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
+            if each is not None:
+                tried.append(each)
+            if case.effort.over:
+                over = True
+                break
+        if search.ends and any(each.explains for each in tried):
+            break  # the searches that follow take longer and fit more numbers
+    bounds = np.maximum(case.plain.max(axis=1), case.allowed)
+    tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
+    tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
+    # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
+    doubtful = all(each.rest > PROVEN and each.keys != (JITTERED.key,) for each in tried if each.explains)
+    if case.step is None and doubtful:
+        tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
+    explaining = [each for each in tried if each.explains]
+    if not explaining:
+        notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
+        if (corners := len(case.scene.breaks)) > MOST_BREAKS:
+            notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
+        return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)
+    least = min(each.size for each in explaining)
+    good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
+    fewest = min((each.numbers, len(each.keys)) for each in good)
+    good = [each for each in good if (each.numbers, len(each.keys)) == fewest]
+    named = [each for each in good if _normalised(each)] or good
+    return Diagnosis(named, tried, _separate(case, named))
+
+
+def _normalised(found: Explanation) -> bool:
+    """Return whether quaternions are normalised. Rates alone do not show it."""
+    return all(each.step.normalised for each in INTEGRATORS if each.key in found.keys)
+
+
+def _before_divergence(case: Compared) -> Compared:
+    """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
+    w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
+    size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
+    if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
+        return case  # no rows, or single ones
+    case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
+    return case.rescale(float(size[: len(case.t)].max()))
+
+
+def _separate(case: Compared, named: list[Explanation]) -> list[str]:
+    """Return the sentence on what would separate several mistakes that explain a file."""
+    motions = [each.made for each in named if each.made is not None]
+    for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
+        apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
+        if case.data[i] is None and apart > 2 * case.allowed[i]:
+            return [f"Columns of {kind} would separate these: they differ by up to {apart:.2g} {unit}."]
+    return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
+
+
+class _Asked(NamedTuple):
+    """What the caller of the search asks for: whether quaternions can have another order, kinds, and what was tried before."""
+
+    quaternion: bool
+    kinds: frozenset[str]
+    tried: tuple[Explanation, ...]
+
+
+Found = Iterator[Explanation | None]
+
+
+def _known(mistakes: Any) -> list[Any]:
+    """Return mistakes without numbers, in the order of their keys."""
+    return sorted((each for each in mistakes if not each.numbers), key=lambda each: each.key)
+
+
+def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
+    """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
+    usable = [each for each in _known(READINGS) if fits(each, case) and (quaternion or not each.quaternions)]
+    if case.from_row and case.scene.free:  # whatever the axes of the world are
+        usable = [each for each in usable if not each.of_world]
+    of = {name: [(), *((each,) for each in usable if each.of == name)] for name in (ATTITUDES, RATES)}
+    pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
+    return pairs[1:] + [(each,) for each in usable if each.of == AXES]
+
+
+def _readings(case: Compared, asked: _Asked) -> Found:
+    """Yield other readings of attitudes and rates."""
+    near = case.take(slice(0, 10))
+    for mistakes in _apply_readings(case, asked.quaternion):
+        trial = compose(*mistakes)
+        motion = trial.build(near)
+        if motion is None:
+            continue
+        R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
+        if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
+            yield attempt(case, trial)
+
+
+def _changes(case: Compared, asked: _Asked) -> Found:
+    """Yield motions of scenes and equations with a mistake."""
+    known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
+    several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
+    known.sort(key=lambda each: each[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
+    trials = [compose(*mistakes) for mistakes in (*known, *(several if "scenes" in asked.kinds else ()))]
+    if case.free:  # fits of the start take most of the work: the nearest motions first
+        trials = _nearest_first(case, trials)
+    for each in trials:
+        yield attempt(case, each)
+
+
+def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
+    """Return trials without numbers that make a difference, by the size of what they leave from the start of the scene.
+
+    Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
+    """
+    ranked, rest, least, case = [], list[Trial](), case.effort.left / 2, case.screen or case
+    for number, each in enumerate(trials):
+        motion = each.build(case)
+        if motion is None:
+            continue
+        if case.effort.left < least:
+            rest.append(each)
+            continue
+        R, w = case.evaluate(motion, np.zeros((1, 6)))
+        if np.isfinite(w).all():
+            ranked.append((case.size(case.errors(R[0], w[0])), number, each))
+    return [each for *_, each in sorted(ranked)] + rest
+
+
+def _numbers(case: Compared, asked: _Asked) -> Found:
+    """Yield motions of scenes and equations with a mistake whose numbers are fitted."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    for each in sorted((*SCENES, *EQUATIONS), key=lambda each: each.key):
+        if each.numbers and each.kind in asked.kinds:
+            remark = remark_on_damping(case.scene) if each is BY_KEY["damping"] else ""
+            found = attempt(case, compose(each, remark=remark))
+            yield None if found is None else _within_digits(case, found)
+    if "equations" in asked.kinds:
+        remark = remark_on_damping(case.scene)
+        yield attempt(case, compose(BY_KEY["no gyroscopic term"], BY_KEY["damping"], remark=remark))
+
+
+def _within_digits(case: Compared, found: Explanation) -> Explanation:
+    """Return an explanation, with a remark if the number differs from the scene's by less than the digits of the scene."""
+    if found.keys != ("rate of the orbit",):
+        return found
+    rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
+    text = f"{rate:.17g}".partition("e")[0] if len(repr(rate)) > 18 else repr(rate).partition("e")[0]
+    digits = len(text.replace(".", "").strip("0"))
+    if abs(found.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
+        return found
+    return replace(found, sentence=found.sentence + ", which is within the digits of the scene file")
+
+
+def _units(case: Compared, asked: _Asked) -> Found:
+    """Yield times in other units than seconds."""
+    for each in TIMES:
+        if not each.unit or case.turned * each.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
+            continue
+        if case.step is None:
+            found = attempt(case, compose(each))
+            yield found if _moves(case, found) else None
+
+
+def _moves(case: Compared, found: Explanation | None) -> bool:
+    """Return whether a motion differs from standing still: what only shrinks the motion explains nothing.
+
+    The error of a program is proportional to what it moves, however little its tolerance tells.
+    """
+    if found is None or found.made is None:
+        return False
+    some = case.take(slice(0, len(found.made[0])))
+    still = _still(some)
+    moved, whole = some.apart(found.made, still), some.apart(some.exact, still)
+    if case.step is None:
+        return bool((moved > np.maximum(SHOWN * some.allowed, SHRUNK * whole)).any())
+    return bool(((moved > SHRUNK / 2 * whole) & (np.array(found.left) < HALF * moved)).any())
+
+
+def _still(case: Compared) -> tuple[Array, Array]:
+    """Return the rows of a body that stands still, with the rates of the start."""
+    n = len(case.t)
+    return np.broadcast_to(case.scene.R_WB0, (n, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (n, 3))
+
+
+def _times(case: Compared, asked: _Asked) -> Found:
+    """Yield the right states at other times: shifted, in proportion, with rows missing, jittered, or rates apart."""
+    if case.step is not None:
+        for each in TIMES:
+            if each.of_step or (each.unit and case.turned * each.unit < 2 * LONGEST):
+                found = attempt(case, compose(each))
+                yield found if not each.unit or _moves(case, found) else None
+        return
+    later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
+    for each in TIMES:
+        if not each.of_step and not each.unit:
+            yield attempt(case.take(later), compose(each))
+    if "rows" in asked.kinds:
+        gap = float(np.median(np.diff(case.t)))
+        yield from _own_times(case, gap, float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap))
+
+
+def _own_times(case: Compared, gap: float, end: float) -> Found:
+    """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
+    starts = [case]
+    if case.free:  # a first row with noise, or jitter that a fit of the start takes for noise
+        starts.append(case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0]))
+    found = [one for each in starts if (one := _by_own_times(each, gap, end)) is not None]
+    yield min(found, key=lambda each: (not each.explains, each.size), default=None)
+
+
+def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
+    """Return the explanation by the times at which the motion from the initial state is nearest to the rows."""
+    tau, e = case.t.copy(), 1e-6 / case.scale
+    end += min(end - case.start, 50 * gap)
+    flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
+
+    def sample(t: Array) -> tuple[Array, Array]:
+        R, w = flow.at(np.clip(t, case.start, end + e))
+        return R[0], w[0]
+
+    weights = 1 / np.repeat(case.noise, [9, 3]) ** 2
+    for _ in range(8):
+        d = case.differences(*sample(tau))
+        v = (case.differences(*sample(tau + e)) - d) / e
+        tau = tau - (d * v * weights).sum(axis=1) / ((v * v * weights).sum(axis=1) + 1e-300)
+        tau = np.clip(tau, case.start, end)
+        tau[0] = case.t[0]
+    off = tau - case.t
+    lost, size = np.rint(off / gap), float(np.sqrt(np.mean(off**2)))
+    if lost.max() >= 1 and np.abs(off - lost * gap).max() < 0.2 * gap and (np.diff(lost) >= 0).all():
+        at = float(case.t[np.flatnonzero(lost)[0]])
+        values = {"rows": float(lost.max()), "at": at}
+        return explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
+    if abs(float(np.mean(off))) < 0.5 * size:
+        return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
+    return None
+
+
+def _nowhere(case: Compared) -> None:
+    """Return no motion: the mistake belongs to one recording."""
+
+
+def _attitudes(case: Compared, asked: _Asked) -> Found:
+    """Yield attitudes by usual rules from the exact rates, if the rates of the file are exact."""
+    R, w = case.data
+    if R is None or w is None:
+        return
+    if case.step is not None:
+        if (case.errors(*case.exact)[1] <= case.allowed[1]).all():
+            for rule in RULES:
+                yield attempt(case, by_rule(rule, 1), known={"step": case.step})
+        return
+    alone = replace(case, data=(None, w), free=case.free[3:])
+    if alone.free:  # the integral collects what the first row is off
+        case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+    made = case.exact
+    if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
+        return
+    for rule in RULES:
+        wanted, seen, found = [case.stride, 1], set[int](), list[Explanation]()
+        while wanted and len(seen) < 8:
+            parts = wanted.pop()
+            if parts in seen or not 1 <= parts <= PARTS or parts * len(case.t) > 4 * STEPS_AT_MOST:
+                continue
+            seen.add(parts)
+            case.effort.spend(parts * len(case.t) / 100)
+            fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
+            rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
+            turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
+            error, gone = turned - made[0], R - made[0]
+            small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
+            ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
+            if case.free:  # the first attitude has noise too
+                turned = align(turned, R, rule.world)
+            step = float(np.median(np.diff(case.t))) / parts
+            found.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
+            if found[-1].explains:
+                break
+            if ratio > 0:
+                wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
+        yield min(found, key=lambda each: each.share)
+
+
+def _habits(case: Compared, asked: _Asked) -> Found:
+    """Yield motions whose state is changed after each step, or that stand still."""
+    for each in STANDSTILLS:
+        yield _standstill(case, each)
+    w = case.data[1]
+    if w is None or len(case.scene.breaks) > MOST_BREAKS:
+        return
+    before = _rates_before(case)
+    rows = w if case.from_row else np.vstack([case.scene.w_WB_B0, w])
+    for habit in HABITS:
+        numbers = habit.guess(rows[1:], before[-len(rows) + 1 :])
+        if not numbers:
+            continue
+        known = dict(zip((number.name for number in habit.numbers), numbers, strict=True))
+        found = list[Explanation]()
+        for parts in (1, 2, 5, 10) if case.step is None else (1,):
+            step = case.step or float(np.median(np.diff(case.t))) / parts
+            first = case.take(slice(0, int(np.flatnonzero(case.error.max(axis=0) > case.allowed.min())[:1].sum()) + 30))
+            for some in (first, case) if len(first.t) < len(case.t) and len(first.t) > 3 else (case,):
+                one = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
+                if one is None or one.share > 0.5 or some is case:
+                    break
+            if one is not None:
+                found.append(replace(one, trial=by_habit(habit, step), numbers=len(numbers)))
+                if one.explains:
+                    break
+        yield from found
+
+
+def _at_numbers(trial: Trial, numbers: tuple[float, ...]) -> Trial:
+    """Return a trial whose numbers are known."""
+
+    def build(case: Compared) -> Solution | None:
+        motion = trial.build(case)
+        if motion is None:
+            return None
+        return lambda R, w, p, n: motion(R, w, np.broadcast_to(numbers, (len(R), len(numbers))), n)
+
+    return replace(trial, build=build, numbers=())
+
+
+def _rates_before(case: Compared) -> Array:
+    """Return the rates (n, 3) of exact motions from the row before, or if these are unknown, of the whole exact motion."""
+    R, w = case.data
+    equations = case.equations()
+    gaps = np.diff(case.t)
+    R = np.broadcast_to(np.eye(3), (len(case.t), 3, 3)) if R is None and case.scene.free else R
+    if R is None or w is None or not equations.steady or np.ptp(gaps) > 1e-6 * gaps.min():
+        return case.exact[1]
+    case.effort.spend(len(case.t) / 10)
+    made = equations.solve(0.0, R[:-1], w[:-1], np.array([gaps.mean()]))[1][:, 0]
+    return np.vstack([case.exact[1][:1], made])
+
+
+def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
+    """Return the explanation by a body that stands still from a time on; None if the rows do not."""
+    R, w = case.data
+    moved = np.zeros(len(case.t) - 1)
+    for x, scale in ((R, 1.0), (w, case.scale)):
+        if x is not None:
+            moved = np.maximum(moved, np.abs(np.diff(x, axis=0)).reshape(len(moved), -1).max(axis=1) / scale)
+    going = np.flatnonzero(moved > STILL)
+    k = int(going[-1]) + 1 if len(going) else 0
+    rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
+    if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
+        return None
+    still = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), _still(case)[1]), _still(case))[0] <= STILL
+    if mistake.from_start != still or (R is None and not rest):
+        return None
+    stop = float(case.t[k])
+
+    def build(of: Compared) -> Solution | None:
+        equations = of.equations()
+
+        def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+            at = np.clip(p[:, :1] if p.shape[1] else of.start, of.start, None)
+            t = np.minimum(of.t[:n], at) if p.shape[1] else np.full((len(R), n), of.start)
+            flow = equations.flow(of.start, R, w, float(max(t.max(), of.start)) + 1e-9 * (of.t[-1] - of.start))
+            a, b = flow.shifted(t)
+            return a, np.where((of.t[:n] >= stop)[:, None], mistake.rest, 1.0) * b
+
+        return motion
+
+    trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _standstill(other, mistake))
+    if R is None or mistake.from_start:  # rates alone do not show when between two rows
+        known = {each.name: stop for each in mistake.numbers}
+        found = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
+        return None if found is None else replace(found, trial=trial)
+    return attempt(case, trial, [stop if k == 0 else float(case.t[k - 1] + case.t[k]) / 2])
+
+
+def _rows(case: Compared, asked: _Asked) -> Found:
+    """Yield right motions of which some rows are written wrongly: every n-th, or where the quaternion changes its sign."""
+    error = (case.error / case.allowed[:, None]).max(axis=0)
+    off = _off_rows(error)
+    if off is None:
+        return
+    rest = ~off
+    noise = np.maximum(np.sqrt((case.error[:, rest] ** 2).mean(axis=1)), 1e-13)
+    allowed = np.maximum(1e-9, np.minimum(case.allowed, 10 * noise))
+    fine = case.change(noise=noise, allowed=allowed)
+    places, q = np.flatnonzero(off), to_quaternion(case.exact[0])
+    signs = (q[1:] * q[:-1]).sum(axis=1) < 0 if case.flipped is None else case.flipped[1:]  # the scalar is not negative
+    near = bool(signs.any()) and all(np.abs(np.flatnonzero(signs) + 1 - k).min() <= 1 for k in places)
+    gaps = np.diff(places)
+    periodic = len(places) > 2 and np.ptp(gaps) == 0
+    for each in ROWS:
+        if periodic if each.periodic else near:
+            made: Any = each.change(case.exact, case.data, off)
+            values = {"first": float(places[0] * case.stride + 1)}
+            values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
+            yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
+    if not periodic and not near:
+        worst = float(case.error[:, places[0]].max())
+        values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
+        made = ROWS[-1].change(case.exact, case.data, off)
+        yield explain(fine, Trial((BY_KEY["single rows"],), _nowhere), made, values, numbers=9)
+
+
+def _off_rows(error: Array) -> Any:
+    """Return which rows are off, if all others are much nearer: those of one residue, or up to a tenth of the rows."""
+    n = len(error)
+    for period in range(2, 7):
+        for first in range(period):
+            off = np.arange(n) % period == first
+            if off.sum() > 3 and np.median(error[off]) > 100 * error[~off].max():
+                return off & (error > 10 * error[~off].max())
+    order = np.sort(error)
+    small = order[: int(0.9 * n)].max()
+    off = error > 100 * max(small, 1e-6)
+    return off if 0 < off.sum() <= 0.1 * n else None
+
+
+def _turned_axes(case: Compared, asked: _Asked) -> Found:
+    """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    R, w = case.data
+    if R is not None and w is not None:
+        right = case.exact[1]
+        if case.from_row:  # the rates that the attitudes have
+            turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
+            right, w = turns, (w[1:] + w[:-1]) / 2
+        for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
+            U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
+            C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
+            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
+            yield best and _shortest_turn(best)
+        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
+        size = float((w * right).sum() / ((right * right).sum() or 1.0))
+        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
+    trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+    motion = trial.build(near)
+    assert motion is not None
+    many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
+    left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
+    found = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
+    shortest = [_shortest_turn(each) for each in found if each is not None]
+    yield min(shortest, key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
+
+
+def _shortest_turn(found: Explanation) -> Explanation:
+    """Return an explanation by a turn of at most half a revolution."""
+    turn = Rotation.from_rotvec([*found.values.values()]).as_rotvec().tolist()
+    values, trial = dict(zip(found.values, turn, strict=True)), found.trial
+    return replace(found, values=values, sentence=found.sentence if trial is None else trial.sentence(values))
+
+
+def _bodies(case: Compared, asked: _Asked) -> Found:
+    """Yield other first rows and other bodies."""
+    if len(case.scene.breaks) > MOST_BREAKS:
+        return
+    if case.from_row:
+        have = [*range(3)] * (case.data[0] is not None) + [*range(3, 6)] * (case.data[1] is not None)
+        rest = replace(case.take(slice(1, None)), free=tuple(have), start=case.start)
+        if len(rest.t) > 3:
+            initial, _extra, fitted = rest.fit(exact(rest), np.empty(0), np.empty(0))
+            names = [f"start_{kind}_{i}" for kind in ("turn", "rate") for i in (1, 2, 3)]
+            values = {names[i]: float(initial[i]) for i in have}
+            found = explain(replace(rest, free=()), Trial((BY_KEY["first row"],), _nowhere), fitted, values)
+            yield replace(found, numbers=len(have), explains=found.explains and found.size < 100)
+    moments = fit_moments(case)
+    sentence = BY_KEY["other moments"].sentence.format(text=moments.sentence)
+    yield replace(moments, sentence=sentence)
+    if not moments.explains:
+        yield _other_body(case)
+
+
+def fit_moments(case: Compared) -> Explanation:
+    """Return the explanation by other principal moments in the same axes, ratios only if the motion depends on no more.
+
+    The sentence has intervals of two standard deviations for the noise of the rows.
+    """
+    body, ratios = case.scene.body, case.scene.free and case.scene.body.rotor_momentum is None
+    have = [*range(3)] * (case.data[0] is not None) + [*range(3, 6)] * (case.data[1] is not None)
+    case = case.first(LONGEST, FEWEST)
+    case = replace(case.take(slice(None, None, -(-len(case.t) // MOST))), free=tuple(have))
+
+    def inertia(p: Array) -> Array:
+        return body.R_BP @ np.diag(body.moments * np.exp(np.clip([*[0.0] * ratios, *p], -3, 3))) @ body.R_BP.T
+
+    initial, p, made = case.fit(_with_inertia(case, inertia), np.zeros(3 - ratios), np.full(3 - ratios, 1e-5))
+    unit = body.moments[0] if ratios else 1.0
+    moments, own = np.diag(body.R_BP.T @ inertia(p) @ body.R_BP) / unit, " : ".join(f"{x:.4g}" for x in body.moments / unit)
+    off = [0.0] * ratios + (2 * case.deviations(_with_inertia(case, inertia), np.append(initial, p), 1e-5)[6:]).tolist()
+    known = " : ".join(f"{x:.6g}" + f" ± {x * d:.1g}" * (d > 0) for x, d in zip(moments, off, strict=True))
+    text = f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {known} (of the body: {own})"
+    found = explain(case, Trial((BY_KEY["other moments"],), _nowhere), made, {"text": 0.0}, numbers=len(p))
+    return _possible(replace(found, sentence=text, values=_components(inertia(p))))
+
+
+def _components(inertia: Array) -> dict[str, float]:
+    return dict(zip(_INERTIA, inertia[np.triu_indices(3)].tolist(), strict=True))
+
+
+def _possible(found: Explanation) -> Explanation:
+    """Return an explanation by another inertia, which explains nothing if no body has it."""
+    moments = np.linalg.eigvalsh(np.array([*found.values.values()])[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+    return replace(found, explains=found.explains and bool(2 * moments.max() < (1 + 1e-6) * moments.sum()))
+
+
+def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution:
+    """Return the motion as a function of initial states and the numbers of an inertia."""
+
+    def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+        scenes = [with_inertia(case.scene, inertia(numbers)) or case.scene for numbers in p]
+        made = [case.equations(scene).solve(case.start, R[[i]], w[[i]], case.t[:n]) for i, scene in enumerate(scenes)]
+        return np.concatenate([a for a, _ in made]), np.concatenate([b for _, b in made])
+
+    return motion
+
+
+def _other_body(case: Compared) -> Explanation:
+    """Return the explanation by another inertia."""
+    free = case.scene.free and case.scene.body.rotor_momentum is None
+    J = case.scene.body.inertia
+
+    def inertia(p: Array) -> Array:
+        stretch = expm(np.clip(p, -3, 3)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+        made = stretch @ J @ stretch
+        return made * (np.trace(J) / np.trace(made)) if free else made
+
+    mistake = BY_KEY["another body"]
+    numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
+    trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
+    found = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))
+    assert found is not None
+    (a, b, c), (d, e, f) = (
+        (made := inertia(np.array([*found.values.values()])))[[0, 1, 2], [0, 1, 2]],
+        made[[0, 0, 1], [1, 2, 2]],
+    )
+    text = f"the inertia ({a:.6g}, {b:.6g}, {c:.6g}; {d:.6g}, {e:.6g}, {f:.6g}) kg m^2" + " or a multiple of it" * free
+    return _possible(replace(found, sentence=mistake.sentence.format(text=text), values=_components(made), trial=None))
+
+
+def _steps(case: Compared, asked: _Asked) -> Found:
+    """Yield integrators, of the scene whose number was fitted best if it leaves little, or of the scene."""
+    sized = [each for each in asked.tried if each.keys[1:] == () and "factor" in each.values and each.rest < LITTLE]
+    for each in sorted(sized, key=lambda each: (each.size, each.keys))[:1]:
+        mistake = BY_KEY[each.keys[0]]
+        if not isinstance(mistake, SceneMistake) or each.explains:
+            continue
+        factor = _round_factor(case, each)
+        other = mistake.change(case.scene, factor)
+        found = [*find_steps(replace(case, scene=other))] if other is not None else []
+        for one in found:
+            if one.trial is not None and one.made is not None:
+                both = Trial((mistake, *one.trial.mistakes), _in_scene(mistake, factor, one.trial))
+                yield explain(case.take(slice(0, len(one.made[0]))), both, one.made, {"factor": factor} | one.values)
+        if any(one.explains for one in found):
+            return
+    if not any(each.explains for each in asked.tried):
+        yield from find_steps(case)
+
+
+def _round_factor(case: Compared, found: Explanation) -> float:
+    """Return the factor with the fewest digits that leaves at most twice as much as the one that was fitted."""
+    factor, trial = found.values["factor"], found.trial
+    motion = None if trial is None else trial.build(case)
+    for digits in (1, 2, 3, 4) if motion is not None else ():
+        rounded = float(f"{factor:.{digits}g}")
+        if rounded != 1 and motion is not None:
+            R, w = case.evaluate(motion, np.append(np.zeros(6), rounded)[None])
+            if case.size(case.errors(R[0], w[0])) <= 2 * found.size:
+                return rounded
+    return factor
+
+
+def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[Compared], Solution | None]:
+    """Return the motion of a trial in the scene with a mistake."""
+
+    def build(case: Compared) -> Solution | None:
+        other = mistake.change(case.scene, number)
+        return None if other is None else trial.build(replace(case, scene=other))
+
+    return build
+
+
+def _several(case: Compared, asked: _Asked) -> Found:
+    """Yield two to four mistakes of a program at once: of its scene or equations, attitudes, rates and times."""
+    if case.step is None or any(each.explains for each in asked.tried):
+        return
+    moved = [(), *((each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds)]
+    times = [(), *((each,) for each in TIMES if not each.numbers and fits(each, case))] if "times" in asked.kinds else [()]
+    readings = [(), *_apply_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
+    ranked = []
+    start = case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t)
+    for first, second in product(moved, times):
+        if second and second[0].unit and not case.allowed.max() < case.turned * second[0].unit <= LONGEST:
+            continue
+        motion = compose(*first, *second).build(case) if first or second else exact(case)
+        if motion is None:
+            continue
+        case.effort.spend(1 + case.turned)
+        R, w = motion(*start)
+        R, w = R[0], w[0]
+        for third in readings:
+            a, b = R, w
+            for each in third:
+                a, b = each.write(a, b)
+            if len(mistakes := (*first, *second, *third)) > 1:
+                ranked.append((len(mistakes), case.size(case.errors(a, b)), mistakes))
+    allowed = float((case.allowed / case.noise).max())
+    for _, _, mistakes in sorted(ranked, key=lambda each: (max(each[1], allowed) * 10 ** each[0], each[1]))[:3]:
+        yield attempt(case, compose(*mistakes))
+
+
+@dataclass(frozen=True)
+class Search:
+    """A part of the search: it finds explanations of some kinds with a share of the work.
+
+    If it `ends` the search, mistakes that explain the error end it after this part. `whole` is True for a part that takes rows
+    at any angle; `least` is the number of rows that it needs.
+    """
+
+    find: Callable[[Compared, _Asked], Found]
+    kinds: frozenset[str]
+    share: float
+    ends: bool = False
+    whole: bool = False
+    least: int = 4
+
+
+SEARCHES = {
+    "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
+    "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
+    "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
+    "other times": Search(_times, frozenset({"times"}), 0.1),
+    "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
+    "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
+    "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
+    "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
+    "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
+    "other bodies": Search(_bodies, frozenset({"bodies"}), 0.1),
+}
+"""Parts of the search by the work that they do, in their order."""

@@ -1,0 +1,207 @@
+"""A mistake, or several at once, that was tried as an explanation of a recorded motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from conservative.attitude import Array
+
+from .compare import HOPELESS, Compared, Solution
+from .finding import Cause
+from .mistakes.mistake import Mistake, Number
+
+HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
+OWN_SHARE = 0.02  # of the effect of a mistake that another motion showed: what the steps of a program may change in it
+OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Mistakes that are tried together.
+
+    Attributes
+    ----------
+    mistakes
+        One or several.
+    build
+        From a case to the motion with the mistakes, as a function of initial states and numbers; None if they make no
+        difference, or if the case does not have what they need.
+    numbers
+        Numbers that `build` takes; by default all of the mistakes.
+    remark
+        End of the sentence.
+    anew
+        For a mistake with numbers that belong to each recording, such as the time at which a body falls asleep: from another
+        case to the explanation.
+    """
+
+    mistakes: tuple[Mistake, ...]
+    build: Callable[[Compared], Solution | None]
+    numbers: tuple[Number, ...] = ()
+    remark: str = ""
+    anew: Callable[[Compared], Explanation | None] | None = None
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the mistakes."""
+        return tuple(each.key for each in self.mistakes)
+
+    def sentence(self, values: Mapping[str, float]) -> str:
+        """Return what is wrong, with numbers."""
+        return ". ".join(each.sentence.format(**values) for each in self.mistakes) + self.remark
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Mistakes that were tried: their keys, the sentence that they state about the file, and their numbers in SI units.
+
+    `left` and `plain` are the largest errors with them and without, over the rows that they were tried on: of attitudes, rad,
+    and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
+    units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
+    the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
+    `of_program` is True if a program answered, and not a file.
+    """
+
+    keys: tuple[str, ...]
+    sentence: str
+    values: dict[str, float]
+    left: list[float]
+    plain: list[float]
+    share: float
+    size: float = math.inf
+    explains: bool = False
+    numbers: int = 0
+    made: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
+    rest: float = 0.0
+    trial: Trial | None = field(default=None, compare=False, repr=False)
+    of_program: bool = False
+
+    @property
+    def name(self) -> str:
+        """The keys as one text."""
+        return self.cause.key
+
+    @property
+    def cause(self) -> Cause:
+        """The mistakes as the cause of a finding, with the error of attitudes or rates, whichever is larger without them."""
+        worst = int(np.argmax(self.plain))
+        mistakes = () if self.trial is None else self.trial.mistakes
+        remedies = filter(None, (each.remedy if self.of_program else each.option for each in mistakes))
+        values = MappingProxyType(self.values)
+        return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
+
+    def again(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes with the same numbers, without any fit.
+
+        None if they make no difference there, or cannot be applied.
+        """
+        if self.trial is None:
+            return None
+        if self.trial.anew is not None:
+            return self.trial.anew(case)
+        motion = self.trial.build(case)
+        if motion is None:
+            return None
+        values = np.array([self.values[each.name] for each in self.trial.numbers])
+        R, w = case.evaluate(motion, np.concatenate([np.zeros(6), values])[None])
+        made = R[0], w[0]
+        if (case.apart(made, case.exact) <= case.allowed).all():
+            return None
+        return explain(case, self.trial, made, self.values, self.numbers, OWN_SHARE)
+
+    def refit(self, case: Compared) -> Explanation | None:
+        """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
+        if self.trial is None or self.trial.anew is not None:
+            return None
+        fitted = {each.name for each in self.trial.numbers}
+        known = {name: value for name, value in self.values.items() if name not in fitted}
+        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers], known=known)
+
+
+def explain(
+    case: Compared,
+    trial: Trial,
+    made: tuple[Array, Array],
+    values: Mapping[str, float] = MappingProxyType({}),
+    numbers: int | None = None,
+    share: float = 0.0,
+) -> Explanation:
+    """Return the explanation by the motion that mistakes make; `numbers` counts those that were fitted, by default all.
+
+    `share` is the share of the error that the steps of a program may leave, beside its tolerance.
+    """
+    plain, error = case.plain.max(axis=1), case.errors(*made)
+    rest = case.size(error) / max(case.size(case.plain), 1e-15)
+    return Explanation(
+        trial.keys,
+        trial.sentence(values),
+        dict(values),
+        error.max(axis=1).tolist(),
+        plain.tolist(),
+        float(error.max() / max(plain.max(), 1e-15)),
+        case.size(error),
+        _is_allowed(case, error, share * plain) and rest < HALF,
+        len(values) if numbers is None else numbers,
+        made,
+        rest,
+        trial,
+        case.step is not None,
+    )
+
+
+def _is_allowed(case: Compared, error: Array, more: Array) -> bool:
+    """Return whether a mistake may leave errors (2, n).
+
+    A program with a mistake has an error of its steps as well: some tolerances, or errors `more` (2,) that are proportional to
+    the step and to the effect of the mistake, such as of damping after each step.
+    """
+    if case.step is None:
+        return case.passes(error)
+    return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, more)).all())
+
+
+def attempt(
+    case: Compared,
+    trial: Trial,
+    start: Sequence[float] | None = None,
+    small: float = 1e-6,
+    most: int = 8,
+    known: Mapping[str, float] = MappingProxyType({}),
+) -> Explanation | None:
+    """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
+
+    `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
+    iterations. Mistakes that explain too little of the first rows are not tried on all. `known` are other numbers of the
+    sentence, which `build` has. None if the mistakes cannot be applied.
+    """
+    if case.screen is not None:
+        found = _attempt(case.screen, trial, start, small, most, known)
+        if found is None or (not found.explains and found.rest > HALF):
+            return found
+        start = [found.values[each.name] for each in trial.numbers]
+    return _attempt(case, trial, start, small, most, known)
+
+
+def _attempt(
+    case: Compared, trial: Trial, start: Sequence[float] | None, small: float, most: int, known: Mapping[str, float]
+) -> Explanation | None:
+    motion = trial.build(case)
+    if motion is None:
+        return None
+    units = np.array([each.size(case.scale) for each in trial.numbers])
+    p = np.array([each.start for each in trial.numbers] if start is None else start, float) / units
+
+    def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+        return motion(R, w, p * units, n)
+
+    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
+    error = case.errors(*made)
+    if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
+        _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
+    names = (each.name for each in trial.numbers)
+    return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

@@ -1,0 +1,258 @@
+"""The search for the integrator and the step that made a recorded motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, to_quaternion
+
+from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
+from .explanation import Explanation, Trial, attempt
+from .mistakes.steps import INTEGRATORS, Integrator, Step
+from .solution import Equations, truth
+
+CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
+ROWS, STEP_EFFORT = 400, 0.15  # rows that candidates are compared with, and the work of one step from all of them
+STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows
+
+
+@dataclass(frozen=True, eq=False)
+class Slope:
+    """The derivative of states (7, n), at one time or at a time for each of them, s."""
+
+    equations: Equations
+    known: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def body(self) -> Any:
+        return self.equations.scene.body
+
+    def rates(self, t: Any, y: Array) -> Array:
+        """Return the angular velocities (3, n) of states."""
+        return y[4:] if self.body.motor is None else y[4:] - self.equations.wheel(np.atleast_1d(t))
+
+    def __call__(self, t: Any, y: Array) -> Array:
+        if self.equations.steady:
+            if "slope" not in self.known:
+                self.known["slope"] = self.equations.at(np.zeros(1))
+            return self.known["slope"](y[:, :, None])[:, :, 0]
+        if np.ndim(t) == 0:
+            return self.equations.at(np.array([t]))(y[:, :, None])[:, :, 0]
+        return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+
+
+def march(case: Compared, method: Step, parts: int) -> Solution:
+    """Return the motion by a method with so many steps between two rows, which are equally far apart."""
+    equations = Equations(case.scene)
+    weight = weigh(case.scene)
+    f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
+
+    def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
+        y, past, kept, numbers = equations.pack(case.start, R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
+        last, wanted = int(numbers[-1]), set(numbers.tolist())
+        with np.errstate(all="ignore"):
+            for number in range(last + 1):
+                if number % CHUNK == 0:
+                    case.effort.spend(CHUNK_EFFORT * weight)
+                    if case.effort.over:
+                        kept += [y * np.nan] * (n - len(kept))
+                        break
+                if number in wanted:
+                    kept.append(y)
+                if number < last:
+                    new = method.next(f, case.start + number * h, y, h, past)
+                    past = [y, *past][: method.past]
+                    y = new
+                    if method.normalised:
+                        y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
+            return equations.states(np.stack(kept, axis=2), case.t[:n])
+
+    return motion
+
+
+def by_step(integrator: Integrator, parts: int) -> Trial:
+    """Return the trial of an integrator with so many steps between two rows."""
+    return Trial((integrator,), lambda case: march(case, integrator.step, parts))
+
+
+def count_gaps(case: Compared) -> Any:
+    """Return the numbers of the rows, counted in the least distance of two."""
+    return np.rint((case.t - case.start) / np.diff(case.t).min()).astype(int)
+
+
+def find_steps(case: Compared) -> Iterator[Explanation]:
+    """Yield motions by methods with a step that divides the distance of the rows.
+
+    Candidates leave least of the differences between a row and the exact motion from the row before (`RowByRow`), or of the
+    differences from the exact motion, to first order (`Linearised`). They then run from the first row.
+    """
+    numbers, gaps = count_gaps(case), np.diff(case.t)
+    if case.data[0] is not None and case.data[1] is not None and case.error[1].max() <= case.allowed[1]:
+        return  # no method has exact rates
+    if np.abs(case.t - case.start - numbers * (case.t[-1] - case.start) / numbers[-1]).max() > 1e-3 * gaps.min():
+        return
+    if numbers[-1] > 2 * STEPS_AT_MOST or numbers[0] > 0 or len(case.t) < 3:
+        return
+    case = case.take(slice(0, int(np.searchsorted(numbers, STEPS_AT_MOST))))
+    if np.ptp(np.diff(count_gaps(case))) > 0:  # rows of which only some were written
+        return
+    for ranking in (RowByRow, Linearised):
+        if ranking is Linearised or (all(x is not None for x in case.data) and Equations(case.scene).steady):
+            explained = False
+            for each in _run_best(case, ranking(case)):
+                yield each
+                explained |= each.explains
+            if explained:
+                return
+
+
+def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
+    """Yield motions by the methods that leave the smallest shares."""
+    step_of_rows = float(np.diff(case.t).mean())
+    ranked = sorted(((*linear.best(each.step), each.key, each) for each in INTEGRATORS), key=lambda each: each[:3])
+    proven = False
+    for left, parts, _, integrator in ranked[:5]:
+        if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
+            continue
+        if case.effort.over:
+            return
+        for count in sorted({parts, *linear.others(integrator.step, parts)}, key=lambda n: abs(n - parts)):
+            for most in (2000, STEPS_AT_MOST):  # steps
+                some = case.take(slice(0, max(4, most // count)))
+                if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
+                    continue  # these rows do not differ from the exact motion
+                step = step_of_rows / count
+                found = attempt(some, by_step(integrator, count), known={"step": step})
+                if found is None or found.share > 0.5 or len(some.t) == len(case.t):
+                    break
+            if found is None:
+                continue
+            yield found
+            if found.explains:
+                proven = True
+                break
+
+
+class Linearised:
+    """The rows' differences from the exact motion, and those that a method makes, to first order."""
+
+    def __init__(self, case: Compared) -> None:
+        self.case, equations = case, Equations(case.scene)
+        self.R, self.w, self.flow = linearise(case)
+        data = self.R if case.data[0] is None else case.data[0], self.w if case.data[1] is None else case.data[1]
+        self.wanted = differ(self.R, self.w, *data, case.scale)
+        size = np.linalg.norm(self.wanted, axis=1)
+        self.used = int(np.argmax(size > LINEAR)) if (size > LINEAR).any() else len(size)
+        self.used = min(max(self.used, min(len(size), 8)), ROWS)
+        have = [x is not None for x in case.data]
+        self.weights = np.repeat(np.array(have) / case.noise, 3)
+        self.f, self.equations = Slope(equations), equations
+        self.inverse = np.linalg.pinv(self.flow[: self.used])
+        self.made: dict[tuple[int, int], Array] = {}
+        free = list(case.free) if (case.error.max(axis=1) <= HOPELESS * case.noise * case.growth).any() else []
+        self.starts = np.stack([(self.flow[: self.used, :, k] * self.weights).ravel() for k in free], axis=1) if free else None
+        self.wanted = self.beside_start(self.wanted)
+
+    def errors(self, method: Step, parts: int) -> Array:
+        """Return the errors (n, 6) of a method in the rows that are used."""
+        if (id(method), parts) in self.made:
+            return self.made[id(method), parts]
+        case, n = self.case, self.used
+        case.effort.spend(STEP_EFFORT * parts * weigh(case.scene))
+        if method.recurrent:
+            R, w = march(case.take(slice(0, n)), method, parts)(self.R[:1], self.w[:1], np.zeros((1, 0)), n)
+            self.made[id(method), parts] = found = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
+            return found
+        t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
+        y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
+        past: list[Array] = []
+        for back in range(1, method.past + 1):
+            a, b = truth(case.scene, case.start, np.maximum(t - back * h, case.start))
+            past.append(np.concatenate([to_quaternion(a).T, b.T + self.equations.wheel(t)]))
+            past[-1][:4] *= np.sign((past[-1][:4] * y[:4]).sum(axis=0))
+        first, before = y[:, :1], list[Array]()  # a method begins without a past
+        with np.errstate(all="ignore"):
+            for number in range(parts):
+                new = method.next(self.f, t + number * h, y, h, past)
+                past, y = [y, *past][: method.past], new
+                if method.past:
+                    new = method.next(self.f, t[:1] + number * h, first, h, before)
+                    first, before = new, [first, *before][: method.past]
+            y[:, :1] = first if method.past else y[:, :1]
+            a, b = self.equations.states(y[:, None], case.t[1:n])
+        defect = differ(self.R[1:n], self.w[1:n], a[0], b[0], case.scale)
+        carried = np.cumsum((self.inverse[1:n] @ defect[..., None])[..., 0], axis=0)
+        found = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
+        self.made[id(method), parts] = found
+        return found
+
+    def beside_start(self, differences: Array) -> Array:
+        """Return weighted differences without the part that a fitted start explains."""
+        x = (differences[: self.used] * self.weights).ravel()
+        return x if self.starts is None else x - self.starts @ np.linalg.lstsq(self.starts, x, rcond=None)[0]
+
+    def share(self, method: Step, parts: int) -> tuple[float, float]:
+        """Return the share of the differences that a method leaves, and the factor by which its errors fit best."""
+        made = self.beside_start(self.errors(method, parts))
+        left, size = np.linalg.norm(self.wanted - made), np.linalg.norm(self.wanted)
+        return float(left / (size or 1.0)), float(made @ self.wanted / (made @ made or 1.0))
+
+    def best(self, method: Step) -> tuple[float, int]:
+        """Return the smallest share that a method leaves, and its number of steps between two rows."""
+        found, parts = dict[int, float](), self.case.stride
+        sizes = [np.linalg.norm(self.beside_start(self.errors(method, n))) for n in (parts, 2 * parts)]
+        order = float(np.clip(np.log2(sizes[0] / (sizes[1] or 1.0) or 1.0), 1, method.order))  # a torque can lower it
+        while parts not in found and len(found) < 8 and not (found and self.case.effort.over):
+            found[parts], factor = self.share(method, parts)
+            if factor <= 0:
+                break
+            most = max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used))
+            wanted = parts * max(factor, 1e-12) ** (-1 / order)
+            if wanted > 2 * most:
+                break  # its errors are too large with the shortest step
+            parts = int(np.clip(np.rint(wanted), 1, most))
+        return min((left, n) for n, left in found.items())
+
+    def others(self, method: Step, parts: int) -> list[int]:
+        """Return the numbers of steps next to the best one that leave almost as little."""
+        near = [n for n in (parts - 1, parts + 1) if n >= 1]
+        best = self.share(method, parts)[0]
+        return [n for n in near if self.share(method, n)[0] < max(1.5 * best, best + 0.1)]
+
+
+class RowByRow(Linearised):
+    """Differences of each row from the exact motion of the row before, and those that a method of one step makes there.
+
+    They need attitudes, rates, and equations that do not depend on time. They hold at any distance from the exact motion.
+    """
+
+    def __init__(self, case: Compared) -> None:
+        self.case, self.equations = case, Equations(case.scene)
+        self.used = n = min(len(case.t), 200)
+        self.f, self.made, self.starts = Slope(self.equations), {}, None
+        R, w = case.data
+        assert R is not None
+        assert w is not None
+        self.gap = float(case.t[1] - case.t[0])
+        self.R, self.w = R[:n], w[:n]
+        a, b = self.equations.solve(0.0, self.R[:-1], self.w[:-1], np.array([self.gap]))
+        self.exact, self.weights = (a[:, 0], b[:, 0]), np.repeat(1 / case.noise, 3)
+        self.wanted = self.beside_start(differ(*self.exact, self.R[1:], self.w[1:], case.scale))
+
+    def errors(self, method: Step, parts: int) -> Array:
+        """Return the errors (n, 6) of a method from row to row; 0 for methods that need earlier states."""
+        if method.past or method.recurrent:
+            return np.zeros((self.used - 1, 6))
+        if (id(method), parts) not in self.made:
+            self.case.effort.spend(STEP_EFFORT * parts)
+            y = self.equations.pack(0.0, self.R[:-1], self.w[:-1])
+            with np.errstate(all="ignore"):
+                for _ in range(parts):
+                    y = method.next(self.f, 0.0, y, self.gap / parts, [])
+                a, b = self.equations.states(y[:, :, None], np.zeros(1))
+            self.made[id(method), parts] = differ(*self.exact, a[:, 0], b[:, 0], self.case.scale)
+        return self.made[id(method), parts]

@@ -1,0 +1,48 @@
+"""Mistakes that simulators and their files have, each once: a key, a sentence, and an effect, typed by its kind.
+
+Kind        Effect
+readings    samples to samples
+times       times to times of attitudes and of rates
+scenes      a scene to the one that was simulated
+equations   a scene to other equations of motion
+steps       an integrator: the state after a step
+attitudes   rates to the matrices that turn attitudes
+habits      the state after a step to the one that is kept, or the body stands still
+rows        right rows to the ones that were written
+bodies      a mass distribution to another one
+
+Numbers of a mistake are fitted to a recording. Mistakes know nothing of files, fits and verdicts, and can be planted as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+from .attitudes import RULES
+from .bodies import FITTED, LOADED
+from .equations import EQUATIONS
+from .habits import HABITS, OTHER_ROWS, ROWS, STANDSTILLS
+from .mistake import Mistake
+from .readings import READINGS
+from .scenes import BODIES, SCENES
+from .steps import INTEGRATORS
+from .times import ROW_TIMES, TIMES
+
+
+def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
+    """Return mistakes by key."""
+    table: dict[str, Mistake] = {}
+    for each in mistakes:
+        if each.key in table:
+            raise ValueError(f"key: got {each.key!r} twice; expected another key for each mistake")
+        table[each.key] = each
+    return MappingProxyType(table)
+
+
+BY_KEY = table_of([
+    *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES,
+    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *FITTED,
+    *(each for each in LOADED if each.key not in {other.key for other in SCENES}),
+])  # fmt: skip
+"""All mistakes by key. Dropped products of inertia are one mistake with two effects, on a scene and on the links of a file."""

@@ -1,0 +1,128 @@
+"""Attitudes: they are integrated by a rule of low order from rates that are right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from conservative.attitude import Array, from_quaternion, hat, to_quaternion
+
+from .mistake import Mistake, Number
+
+Effect = Callable[[Array, Array, Array], Array]
+"""From rates (n, 3) at the start and the end of steps, rad/s, body axes, and their lengths (n,), s, to matrices.
+
+Matrices (n, 4, 4) act on quaternions, and (n, 3, 3) multiply rotation matrices.
+"""
+
+
+@dataclass(frozen=True)
+class Rule(Mistake):
+    """A rule that integrates attitudes from rates. With `world` its rates in body axes are taken for rates in world axes."""
+
+    kind: ClassVar[str] = "attitudes"
+    matrices: Effect
+    world: bool = False
+
+
+def _linear(w: Array, h: Array) -> Array:
+    """Return the matrices (n, 4, 4) of q + h/2 q w."""
+    x, y, z = (w * h[:, None] / 2).T
+    one = np.ones_like(x)
+    return np.stack([np.stack(row, -1) for row in ((one, -x, -y, -z), (x, one, z, -y), (y, -z, one, x), (z, y, -x, one))], 1)
+
+
+def _map(w: Array, h: Array) -> Array:
+    """Return the matrices (n, 4, 4) of the exponential map."""
+    angle = np.linalg.norm(w, axis=1) * h
+    size = np.sinc(angle / (2 * np.pi))
+    return _linear(w * size[:, None], h) - (1 - np.cos(angle / 2))[:, None, None] * np.eye(4)
+
+
+def _other_side(M: Array) -> Array:
+    """Return the matrices that multiply from the left instead of the right: the vector part's block is transposed."""
+    out = M.copy()
+    out[:, 1:, 1:] = np.swapaxes(M[:, 1:, 1:], 1, 2)
+    return out
+
+
+def _in_place(w: Array, h: Array) -> Array:
+    """Return the matrices of the first-order step, whose components are updated one after another, from new ones."""
+    increments, out = _linear(w, h) - np.eye(4), np.broadcast_to(np.eye(4), (len(h), 4, 4)).copy()
+    for row in range(4):
+        out[:, row] += (increments[:, row : row + 1] @ out)[:, 0]
+    return out
+
+
+def _atan(w: Array, h: Array) -> Array:
+    """Return the matrices (n, 4, 4) of a rotation by the arc tangent of the angle, to which R + h R [w] is repaired."""
+    angle = np.linalg.norm(w, axis=1) * h
+    return _map(w * (np.arctan(angle) / np.where(angle == 0, 1.0, angle))[:, None], h)
+
+
+UPDATES: dict[str, tuple[str, Callable[[Array, Array], Array]]] = {
+    "attitude by normalisation": ("the first-order step q + h/2 q w, normalised,", _linear),
+    "attitude by rotation": ("a rotation", _map),
+    "attitude in place": (
+        "the first-order step of the quaternion, whose components are updated in place, one after another,",
+        _in_place,
+    ),
+    "attitude not repaired": (
+        "the first-order step R + h R [w], whose loss of orthonormality is not repaired,",
+        lambda w, h: np.eye(3) + hat(w * h[:, None]),
+    ),
+    "attitude made orthonormal": ("the first-order step R + h R [w], made orthonormal,", _atan),
+}
+RATES: dict[str, tuple[str, Callable[[Array, Array], Array]]] = {
+    "old rates": ("by the rates of the start of the step (coning error)", lambda a, b: a),
+    "new rates": ("by the rates of the end of the step", lambda a, b: b),
+    "mean rates": ("by the mean of the rates of both ends (coning error)", lambda a, b: (a + b) / 2),
+}
+SHORT = {"attitude by rotation, old rates": "stale rates", "attitude by normalisation, new rates": "attitude by normalisation"}
+IN_WORLD = ("attitude by normalisation", "attitude by rotation")
+
+
+def _rule(update: str, rates: str, world: bool) -> Rule:
+    (how, matrices), (which, choose) = UPDATES[update], RATES[rates]
+    key = f"{update}, {rates}"
+    key = SHORT.get(key, key) + " on the wrong side" * world
+    what = f"{how} {which}" + ", which are in body axes, as if they were in world axes" * world
+    text = f"The rates are right, but the attitudes are not their integral: they follow {what}, with a step of {{step:.4g}} s"
+
+    def effect(a: Array, b: Array, h: Array) -> Array:
+        made = matrices(choose(a, b), h)
+        return _other_side(made) if world else made
+
+    return Rule(key, text, effect, world, numbers=(Number("step", unit="s"),))
+
+
+RULES = tuple(
+    _rule(update, rates, world) for update in UPDATES for rates in RATES for world in (False, True)[: 1 + (update in IN_WORLD)]
+)
+
+
+def integrate(rule: Effect, R0: Array, w: Array, h: Array, parts: int) -> Array:
+    """Return attitudes (n, 3, 3) by a rule from the first, at every `parts`-th of the rates w (m, 3), rad/s, steps h, s."""
+    matrices = rule(w[:-1], w[1:], h)
+    if matrices.shape[1] == 3:  # of rotation matrices, which are not repaired before they are compared
+        products = [R0]
+        for matrix in matrices:
+            products.append(products[-1] @ matrix)
+        U, _, V = np.linalg.svd(np.array(products[::parts]))
+        return U @ V
+    q, kept = to_quaternion(R0), []
+    for number, matrix in enumerate(matrices):
+        if number % parts == 0:
+            kept.append(q)
+        q = matrix @ q
+        q = q / np.sqrt(q @ q)
+    return from_quaternion(np.array([*kept, q]))
+
+
+def align(R: Array, to: Array, right: bool) -> Array:
+    """Return attitudes (n, 3, 3) with the constant rotation in the world, or in the body (`right`), that fits others best."""
+    U, _, V = np.linalg.svd((np.swapaxes(R, 1, 2) @ to if right else to @ np.swapaxes(R, 1, 2)).sum(axis=0))
+    return R @ (U @ V) if right else (U @ V) @ R

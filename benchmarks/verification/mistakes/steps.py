@@ -1,0 +1,238 @@
+"""Steps: the motion is the one of an integrator with a step that is too long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from conservative.attitude import Array
+
+from ..solution import cross
+from .mistake import Mistake, Number
+
+Slope = Any
+"""The derivative of states (7, ...) at a time or times, s, with an attribute `body`, and `rates` of times and states."""
+
+
+def _rotate(q: Array, turn: Array) -> Array:
+    """Return quaternions (4, ...) turned by rotation vectors (3, ...) in body axes."""
+    angle = np.sqrt((turn * turn).sum(axis=0))
+    part = np.concatenate([np.cos(angle / 2)[None], np.sinc(angle / (2 * np.pi)) * turn / 2])
+    return _product(q, part)
+
+
+def _product(p: Array, q: Array) -> Array:
+    a, v, b, u = p[0], p[1:], q[0], q[1:]
+    return np.concatenate([(a * b - (v * u).sum(axis=0))[None], a * u + b * v + cross(v, u)])
+
+
+def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rates: int, use: str, exact: bool) -> Array:
+    """Return the state after rates with so many corrections of their torque, then attitudes by old, new or mean rates."""
+    new = y.copy()
+    for _ in range(rates):
+        before = new[4:].copy()
+        new[4:] = y[4:] + h * f(t, new)[4:]
+        if np.abs(new[4:] - before).max() <= 2e-16 * np.abs(y[4:]).max():
+            break
+    old, later = f.rates(t, y), f.rates(t + h, new)
+    with_rates = {"old": old, "new": later, "mean": (old + later) / 2}[use]
+    if exact:
+        new[:4] = _rotate(y[:4], h * with_rates)
+    else:
+        new[:4] = y[:4] + h / 2 * _product(y[:4], np.concatenate([0 * y[:1], with_rates]))
+    return new
+
+
+def _tableau(
+    f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], A: Sequence[Sequence[float]], b: Sequence[float]
+) -> Array:
+    slopes: list[Array] = []
+    for row in ((), *A):
+        slopes.append(f(t + h * sum(row), y + h * sum((a * k for a, k in zip(row, slopes, strict=True)), np.zeros_like(y))))
+    return y + h * sum((weight * k for weight, k in zip(b, slopes, strict=True)), np.zeros_like(y))
+
+
+def _turned_tableau(
+    f: Slope,
+    t: Any,
+    y: Array,
+    h: float,
+    past: Sequence[Array],
+    A: Sequence[Sequence[float]],
+    b: Sequence[float],
+    corrected: bool,
+) -> Array:
+    """Return the state of a Runge-Kutta method whose stages turn the body by sums of rates, or of those of rotation vectors."""
+    slopes, turns = list[Array](), list[Array]()
+
+    def state(weights: Sequence[float]) -> tuple[Array, Array]:
+        new = y + h * sum((a * k for a, k in zip(weights, slopes, strict=True)), np.zeros_like(y))
+        turn = h * sum((a * w for a, w in zip(weights, turns, strict=True)), np.zeros_like(y[4:]))
+        new[:4] = _rotate(y[:4], turn)
+        return new, turn
+
+    for row in ((), *A):
+        (stage, turn), at = state(row), t + h * sum(row)
+        slopes.append(f(at, stage))
+        w = f.rates(at, stage)
+        turns.append(_vector_rates(turn, w) if corrected else w)
+    return state(b)[0]
+
+
+def _vector_rates(turn: Array, w: Array) -> Array:
+    """Return the derivatives of rotation vectors (3, ...) for rates in body axes."""
+    angle = np.sqrt((turn * turn).sum(axis=0))
+    small = angle < 1e-2
+    half = np.where(small, 1.0, angle / 2)
+    factor = np.where(small, 1 / 12 + angle**2 / 720, (1 - half / np.tan(half)) / np.where(small, 1.0, angle**2))
+    across = cross(turn, w)
+    return w + across / 2 + factor * cross(turn, across)
+
+
+def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: float) -> Array:
+    """Return the state of implicit Euler (at = 1) or of the implicit midpoint rule (at = 1/2)."""
+    stage = y
+    for _ in range(60):
+        new = y + at * h * f(t + at * h, stage)
+        if np.abs(new - stage).max() <= 2e-16 * np.abs(y).max():
+            break
+        stage = new
+    return y + (stage - y) / at
+
+
+def _trapezoid(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    new, slope = y, f(t, y)
+    for _ in range(60):
+        before, new = new, y + h / 2 * (slope + f(t + h, new))
+        if np.abs(new - before).max() <= 2e-16 * np.abs(y).max():
+            break
+    return new
+
+
+def _adams(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], weights: Sequence[float]) -> Array:
+    """Return the state of Adams and Bashforth's method; steps without enough history are of lower order."""
+    known = [y, *past][: len(weights)]
+    lower = {1: (1.0,), 2: (1.5, -0.5), 3: weights}[len(known)]
+    return y + h * sum((a * f(t - i * h, each) for i, (a, each) in enumerate(zip(lower, known, strict=True))), np.zeros_like(y))
+
+
+def _leapfrog(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    """Return the state after half a kick, a drift and half a kick (velocity Verlet)."""
+    half = y.copy()
+    half[4:] += h / 2 * f(t, y)[4:]
+    half[:4] = _rotate(y[:4], h * f.rates(t + h / 2, half))
+    new = half.copy()
+    new[4:] += h / 2 * f(t + h, half)[4:]
+    return new
+
+
+def _stormer(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    """Return the state of Störmer's method on the quaternion, q_{n+1} = 2 q_n - q_{n-1} + h^2 q''; rates by the same f."""
+    k, e = f(t, y), 1e-6
+    second = (f(t + e * h, y + e * h * k) - f(t - e * h, y - e * h * k))[:4] / (2 * e * h)
+    new = y + h * k
+    new[:4] = y[:4] + h * k[:4] + h * h / 2 * second if not past else 2 * y[:4] - past[0][:4] + h * h * second
+    new[4:] = y[4:] + h / 2 * (k + f(t + h, new))[4:]
+    return new
+
+
+def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: int) -> Array:
+    """Return the state of Buss's augmented method of order 2 or 3: one rotation; the momentum stays in world axes."""
+    k, w, e, J = f(t, y), f.rates(t, y), 1e-5 * h, f.body.inertia
+    slope = (f.rates(t + e, y + e * k) - f.rates(t - e, y - e * k)) / (2 * e)
+    turn = h * w + h * h / 2 * slope + h**3 / 12 * cross(slope, w)  # w' x w has the same components in world and body axes
+    if order == 3:  # and w'' is w'' + w x w' in body axes
+        turn = turn + h**3 / 6 * ((f(t + e, y + e * k) - f(t - e, y - e * k))[4:] / (2 * e) + cross(w, slope))
+    rotor = np.zeros(3) if f.body.rotor_momentum is None or f.body.motor else f.body.rotor_momentum
+    L = (J @ y[4:].reshape(3, -1) + rotor[:, None]).reshape(w.shape)
+    L = L + h * ((J @ k[4:].reshape(3, -1)).reshape(w.shape) - cross(L, w))
+    back = _rotate(np.concatenate([np.ones_like(w[:1]), 0 * w]), -turn)
+    carried = _product(
+        _product(back, np.concatenate([0 * w[:1], L])), back * np.array([1, -1, -1, -1]).reshape(4, *(1,) * (y.ndim - 1))
+    )[1:]
+    new = y.copy()
+    new[:4] = _rotate(y[:4], turn)
+    new[4:] = np.linalg.solve(J, carried.reshape(3, -1) - rotor[:, None]).reshape(w.shape)
+    return new
+
+
+KUTTA = (((0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6))
+RK4 = (((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
+
+
+TURNED = " with the exponential map of weighted rates"
+BARE = " without normalisation"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A method: its order, the number of earlier states, and the function to the next state, whose quaternion is normalised.
+
+    The errors of a `recurrent` method do not add up step by step, because its new state contains differences of earlier ones.
+    """
+
+    order: int
+    past: int
+    next: Callable[..., Array]
+    normalised: bool = True
+    recurrent: bool = False
+
+
+STEPS: dict[str, Step] = {
+    "explicit Euler": Step(1, 0, partial(_tableau, A=(), b=(1.0,))),
+    "explicit Euler with the exponential map": Step(1, 0, partial(_split_step, rates=1, use="old", exact=True)),
+    "semi-implicit Euler with an explicit gyroscopic term": Step(1, 0, partial(_split_step, rates=1, use="new", exact=False)),
+    "semi-implicit Euler with an explicit gyroscopic term and the exponential map": Step(
+        1, 0, partial(_split_step, rates=1, use="new", exact=True)
+    ),
+    "semi-implicit Euler with an implicit gyroscopic term": Step(1, 0, partial(_split_step, rates=40, use="new", exact=False)),
+    "semi-implicit Euler with an implicit gyroscopic term and the exponential map": Step(
+        1, 0, partial(_split_step, rates=40, use="new", exact=True)
+    ),
+    "explicit Euler of the rates, and mean rates for the attitude": Step(
+        1, 0, partial(_split_step, rates=1, use="mean", exact=True)
+    ),
+    "implicit Euler": Step(1, 0, partial(_implicit, at=1.0)),
+    "the explicit midpoint rule (RK2)": Step(2, 0, partial(_tableau, A=((0.5,),), b=(0.0, 1.0))),
+    "Heun's method": Step(2, 0, partial(_tableau, A=((1.0,),), b=(0.5, 0.5))),
+    "Ralston's method": Step(2, 0, partial(_tableau, A=((2 / 3,),), b=(0.25, 0.75))),
+    "the implicit midpoint rule": Step(2, 0, partial(_implicit, at=0.5)),
+    "the trapezoidal rule": Step(2, 0, _trapezoid),
+    "leapfrog (velocity Verlet)": Step(2, 0, _leapfrog),
+    "Störmer's method on the quaternion": Step(2, 1, _stormer, recurrent=True),
+    f"Störmer's method on the quaternion{BARE}": Step(2, 1, _stormer, normalised=False, recurrent=True),
+    "Adams-Bashforth 2 (first step Euler)": Step(2, 1, partial(_adams, weights=(1.5, -0.5))),
+    f"Adams-Bashforth 2 (first step Euler){BARE}": Step(2, 1, partial(_adams, weights=(1.5, -0.5)), normalised=False),
+    "Buss 2 (augmented)": Step(2, 0, partial(_buss, order=2)),
+    "Buss 3 (augmented)": Step(3, 0, partial(_buss, order=3)),
+    "Adams-Bashforth 3": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12))),
+    f"Adams-Bashforth 3{BARE}": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12)), normalised=False),
+    "RK3 (Kutta)": Step(3, 0, partial(_tableau, A=KUTTA[0], b=KUTTA[1])),
+    "RK3 (Heun)": Step(3, 0, partial(_tableau, A=((1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))),
+    "RK3 (SSP)": Step(3, 0, partial(_tableau, A=((1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))),
+    "RK4": Step(4, 0, partial(_tableau, A=RK4[0], b=RK4[1])),
+    f"the explicit midpoint rule (RK2){TURNED}": Step(
+        2, 0, partial(_turned_tableau, A=((0.5,),), b=(0.0, 1.0), corrected=False)
+    ),
+    f"Heun's method{TURNED}": Step(2, 0, partial(_turned_tableau, A=((1.0,),), b=(0.5, 0.5), corrected=False)),
+    f"RK4{TURNED}": Step(2, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=False)),
+    "RK4 on rotation vectors (Munthe-Kaas)": Step(4, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=True)),
+}
+
+
+@dataclass(frozen=True)
+class Integrator(Mistake):
+    """The motion by an integrator. Rates alone do not show whether it normalises quaternions."""
+
+    kind: ClassVar[str] = "steps"
+    step: Step
+
+
+INTEGRATORS = tuple(
+    Integrator(name, f"The rows follow {name} with a step of {{step:.4g}} s", step, numbers=(Number("step", unit="s"),))
+    for name, step in STEPS.items()
+)

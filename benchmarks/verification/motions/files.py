@@ -1,0 +1,147 @@
+"""The files of motions, JSON and CSV."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import conservative
+from conservative.attitude import Array
+from conservative.files import make_folder, write_text
+
+from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
+from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
+from .signatures import Found, signatures
+
+FACTOR = 2.0
+"""Smallest error of a mistake that is listed, over the tolerance of order 2 at the smallest step."""
+ROUND_OFF = 1e-11
+"""Errors that depend on the machine."""
+
+
+def describe(motion: Motion, measured: Measured, found: dict[str, Found]) -> dict[str, Any]:
+    """Return a motion as the keys and values of its JSON file; README.md of references/motions explains them."""
+    exact = motion.exact
+    parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
+    return {
+        "name": motion.name,
+        "about": motion.about,
+        "needs": motion.needs,
+        "inertia_B": motion.inertia_B,
+        "R_WB0": exact["R_WB"][0].tolist(),
+        "quaternion_wxyz0": exact["quaternion_wxyz"][0].tolist(),
+        "w_WB_B0": [float(x) for x in motion.rates],
+        **parts,
+        **({"gravity_W": [0.0, 0.0, -GRAVITY]} if motion.weight else {}),
+        "t": motion.t,
+        **{name: exact[name][1:].tolist() for name in SAMPLE},
+        "scale": dict(zip(QUANTITIES[1:], (float(f"{x:.6g}") for x in measured.scale), strict=True)),
+        "tolerance": [
+            {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
+            for at, ((order, angle), values) in enumerate(measured.tolerances.items())
+        ],
+        "single": _short(single(motion)),
+        "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], found),
+    }
+
+
+def catches(motion: Motion, allowed: Array, found: dict[str, Found]) -> list[dict[str, Any]]:
+    """Return the mistakes that the tolerances of order 2 show, with their errors, first the one with the largest error."""
+    (scale,) = sizes([motion])
+    made = {name: error(motion, scale, samples) for name, samples in found.items()}
+    made = {name: np.where(each < ROUND_OFF, 0.0, each) for name, each in made.items() if (each / allowed).max() >= FACTOR}
+    return [
+        {"mistake": name, **_named(each)}
+        for name, each in sorted(made.items(), key=lambda item: -float(f"{item[1].max():.1e}"))
+    ]
+
+
+def _short(x: float) -> float:
+    return float(f"{x:.2g}")
+
+
+def _named(values: Any) -> dict[str, float]:
+    return dict(zip(QUANTITIES, map(_short, values), strict=True))
+
+
+def as_csv(keys: dict[str, Any]) -> str:
+    """Return a motion as lines of a key and its values, matrices by rows; a line for each sample, tolerance and mistake."""
+    lines = ["key,values"]
+    for key, value in keys.items():
+        if key == "t":
+            lines += [_line("sample", t, [keys[name][i] for name in SAMPLE]) for i, t in enumerate(value)]
+        elif key in ("tolerance", "catches"):
+            lines += [_line(key, each) for each in value]
+        elif key not in SAMPLE:
+            lines.append(_line(key, value))
+    return "\n".join([*lines, ""])
+
+
+def _line(*values: Any) -> str:
+    return ",".join(str(x).replace(",", ";") for x in _flat(values))
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    for x in value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ():
+        yield from _flat(x) if isinstance(x, dict | list | tuple) else [x]
+
+
+def as_json(keys: dict[str, Any]) -> str:
+    """Return a motion as JSON, a line for each key, sample, tolerance and mistake."""
+    texts = []
+    for key, value in keys.items():
+        rows = isinstance(value, list) and value and isinstance(value[0], list | dict)
+        text = "[\n" + ",\n".join(map(json.dumps, value)) + "\n]" if rows else json.dumps(value)
+        texts.append(f'"{key}": {text}')
+    return "{\n" + ",\n".join(texts) + "\n}\n"
+
+
+def contents() -> Iterator[tuple[str, str]]:
+    """Yield the names and texts of the files of all motions."""
+    motions = load()
+    for motion, measured, found in zip(motions, measure(motions), signatures(motions), strict=True):
+        keys = describe(motion, measured, found)
+        yield f"{motion.name}.json", as_json(keys)
+        yield f"{motion.name}.csv", as_csv(keys)
+
+
+def read(name: str) -> dict[str, Any]:
+    """Return a motion from its file in this package."""
+    folder = Path(conservative.__file__).parent / "references" / "motions"
+    return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[float, float]:
+    """Return the largest allowed errors of a program of an order at |w| h = 0.01: of the attitude, rad, and relative, of rates.
+
+    Order 3 and a program that chooses its steps (None) have the tolerances of order 2.
+    """
+    kept = read(motion.name)
+    (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (tested_order(order), ANGLES[-1]))
+    more = kept["single"] if single else 0.0
+    return row["attitude"] + more, row["rates"] + more
+
+
+def tested_order(order: int | None) -> int:
+    """Return the order whose tolerances a program of an order has to meet; None is a program that chooses its steps."""
+    return {1: 1, 2: 2, 3: 2, None: 2}.get(order, 4)
+
+
+def marks() -> Iterator[tuple[str, str]]:
+    """Yield the names of all files, and a text in the beginning of each."""
+    for motion in load():
+        yield f"{motion.name}.json", f'"name": "{motion.name}"'
+        yield f"{motion.name}.csv", f"key,values\nname,{motion.name}\n"
+
+
+def write(folder: Path) -> list[str]:
+    """Write the files into a folder and return their names. Raise `NotWritten` if that is not possible."""
+    make_folder(folder, "out")
+    texts = dict(contents())
+    for name, text in texts.items():
+        write_text(folder / name, text, "out")
+    return list(texts)

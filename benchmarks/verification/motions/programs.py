@@ -1,0 +1,106 @@
+"""Tolerances of motions: the errors that right programs make on them, of every design in `integrators`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from conservative import registry
+from conservative.attitude import Array, angle_between
+from conservative.errors import Unsupported
+from conservative.grid import Grid
+
+from .integrators import designs
+from .motion import Motion
+
+ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)  # declared orders; |w| h, and steps in 0.1 rad
+LEAST = {1: 1e-6, 2: 1e-6, 4: 1e-10}
+"""Errors that are allowed in addition, by order: implicit steps are iterated to a tolerance."""
+MARGIN = 2.0
+"""Tolerances over the largest error of right programs."""
+HELD = 4.0
+"""Factor of tolerances of order 1 with a fixed point: Jolt and Rapier hold it by a joint, and err on `heavy_fast` nine times as
+much as Euler steps on quaternions and body rates, which is two to three times as much as `MARGIN` allows."""
+OURS = {1: (), 2: ("no_squish", "moser_veselov:order=2"), 4: ("no_squish:order=4", "splitting:order=4")}
+"""Methods of this package by order, on motions that they take: NoSquish errs up to 23 times as much as Runge and Kutta's."""
+QUANTITIES = ("attitude", "rates", "energy", "momentum")
+
+
+class Measured(NamedTuple):
+    """Sizes (3,) of rates, energy and momentum, and tolerances (4,) by order and |w| h."""
+
+    scale: Array
+    tolerances: dict[tuple[int, float], Array]
+
+
+def measure(motions: Sequence[Motion], parts: Sequence[int] = PARTS) -> list[Measured]:
+    """Return the tolerances of motions, all motions at once, by steps of 0.1 rad over each of `parts`."""
+    scales, held = sizes(motions), np.array([motion.weight is not None for motion in motions])
+    tolerances = {}
+    for order in ORDERS:
+        for n in parts:
+            runs = [errors(motions, scales, design.run(motions, n)) for design in designs(order)]
+            largest = np.max([*runs, *(_errors_of(name, motions, scales, n) for name in OURS[order])], axis=0)
+            margin = MARGIN * np.where(held & (order == 1), HELD, 1.0)[:, None]
+            tolerances[order, ANGLES[PARTS.index(n)]] = _round_up(margin * largest + LEAST[order])
+    return [Measured(scales[i], {key: each[i] for key, each in tolerances.items()}) for i in range(len(motions))]
+
+
+def single(motion: Motion) -> float:
+    """Return what single precision may add to errors: rounding of each step.
+
+    It is larger if a momentum is, from which rates are computed: with a rotor, or a moment that is small.
+    """
+    exact, J = motion.exact, np.linalg.eigvalsh(motion.inertia_B)
+    momentum = np.linalg.norm(exact["momentum_W"], axis=1).max() / np.linalg.norm(exact["w_WB_B"], axis=1).max()
+    return float(2e-5 + 1e-6 * motion.steps * motion.samples * PARTS[-1] * (1 + momentum / J[0] / 3))
+
+
+def _round_up(x: Array) -> Array:
+    """Return numbers rounded up to two digits."""
+    size = 10.0 ** (np.floor(np.log10(x)) - 1)
+    return np.array([float(f"{each:.1e}") for each in (np.ceil(x / size) * size).ravel()]).reshape(x.shape)
+
+
+def sizes(motions: Sequence[Motion]) -> Array:
+    """Return the sizes (n, 3) of rates, kinetic energy and momentum, which errors are relative to."""
+    return np.array([
+        [np.linalg.norm(w, axis=1).max(), (w @ m.inertia_B * w).sum(axis=1).max() / 2, np.linalg.norm(L, axis=1).max()]
+        for m in motions for w, L in [(m.exact["w_WB_B"], m.exact["momentum_W"])]
+    ])  # fmt: skip
+
+
+def errors(motions: Sequence[Motion], scales: Array, found: Any) -> Array:
+    """Return the largest errors (n, 4) of the attitudes and rates of motions."""
+    return np.array([error(*each) for each in zip(motions, scales, found, strict=True)])
+
+
+def error(motion: Motion, scale: Array, found: tuple[Array, Array]) -> Array:
+    """Return the largest errors (4,) of the attitudes and rates at the samples of a motion."""
+    body, exact = motion.scene.body, {name: each[1:] for name, each in motion.exact.items()}
+    return compare(body.inertia, body.rotor_momentum, motion.arm, exact, scale, *found)
+
+
+def _errors_of(name: str, motions: Sequence[Motion], scales: Array, parts: int) -> Array:
+    """Return the largest errors (n, 4) of a method of this package; 0 for motions that it does not take."""
+    method, out = registry.method(name), np.zeros((len(motions), 4))
+    for i, motion in enumerate(motions):
+        every = motion.steps * parts
+        with suppress(Unsupported):
+            found = method.solve(motion.scene, Grid(motion.step / parts, every * motion.samples, every))
+            out[i] = error(motion, scales[i], (found.R_WB[1:], found.w_WB_B[1:]))
+    return out
+
+
+def compare(J: Any, rotor: Any, arm: Any, exact: Any, scale: Any, R: Any, w: Any) -> Array:
+    """Return the largest errors (4,) of attitudes (n, 3, 3) and rates (n, 3) against samples by name, in `QUANTITIES`."""
+    with np.errstate(all="ignore"):
+        L = w @ np.array(J)
+        energy = (w * L).sum(axis=1) / 2 + R[:, 2] @ np.array(arm)
+        momentum = (R @ (L if rotor is None else L + rotor)[..., None])[..., 0]
+        found = (w, exact["w_WB_B"]), (energy[:, None], np.array(exact["energy"])[:, None]), (momentum, exact["momentum_W"])
+        sizes = [np.linalg.norm(a - b, axis=1).max() / size for (a, b), size in zip(found, scale, strict=True)]
+        return np.nan_to_num([angle_between(R, np.array(exact["R_WB"])).max(), *sizes], nan=1e6, posinf=1e6)

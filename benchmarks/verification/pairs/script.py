@@ -1,0 +1,73 @@
+"""The pair that differs as a short script in the engine's own language, which needs the engine only."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from string import Template
+from types import SimpleNamespace
+from typing import Any
+
+from conservative.method import Method
+from conservative.references.engines import shared
+from conservative.references.environments.adapter import AdapterMethod
+from conservative.registry import read_name
+
+from .pairs import Description, Pair
+
+MARK = "conservative pairs: "
+"""Text in the first line of every script, by which an earlier one is recognized."""
+SCRIPTS_OF_NODE = ("rapier_js", "jolt")
+FOLDER = Path(__file__).with_name("scripts")
+SAME = {"rapier_deterministic": "rapier_js"}
+"""Engines that have the script of another one."""
+IN_THE_NUMBERS = ("", "quaternion", "frame", "zero")
+"""Variants that only change the numbers that a script has."""
+ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping"), "rapier_js": ("setter",)}
+"""Further variants of the scripts."""
+
+
+def script_of(method: Method, pair: Pair, first: Description, scale: float | None) -> str:
+    """Return the script of a pair that differs, for the engine's own language; "" if the engine has none for it."""
+    family = read_name(method.family).base
+    file = FOLDER / f"{SAME.get(family, family)}.txt"
+    variants = IN_THE_NUMBERS + ALSO.get(file.stem, ())
+    if not isinstance(method, AdapterMethod) or not file.is_file() or pair.run or pair.variant not in variants:
+        return ""
+    if (first.gravity and file.stem != "mujoco") or method.settings.get("as_installed"):
+        return ""
+    second = pair.second(first) if scale is None else pair.second(first, scale)
+    words: dict[str, Any] = {"n_steps": first.n_steps, "package": method.data.package}
+    for name, one in (("first", first), ("second", second)):
+        numbers = _numbers(one)
+        text = json.dumps(numbers) if file.stem in SCRIPTS_OF_NODE else repr(numbers)
+        words |= {name: text, f"{name}_q": numbers["q"], f"{name}_w": numbers["w"], f"{name}_dt": one.dt}
+        if file.stem == "mujoco":
+            words[f"{name}_mjcf"] = _mjcf(method, one)
+    solver, _, integrator = str(method.settings.get("solver", "")).partition("_")
+    options = f', integrator="{integrator}", disable_contacts=True' if integrator else ", angular_damping=0.0"
+    words |= {"solver": solver, "options": options if integrator or solver in ("SemiImplicit", "Featherstone") else ""}
+    title = f"{'//' if file.stem in SCRIPTS_OF_NODE else '#'} {MARK}{method.label}: {pair.name}. {pair.relation}\n"
+    return title + Template(file.read_text(encoding="utf-8")).substitute(words)
+
+
+def script_name(method: Method, pair: str) -> str:
+    """Return the name of the file of a script."""
+    family = read_name(method.family).base
+    return re.sub(r"\W+", "_", f"{method.name} {pair}") + (".mjs" if SAME.get(family, family) in SCRIPTS_OF_NODE else ".py")
+
+
+def _numbers(one: Description) -> dict[str, Any]:
+    given = one.numbers
+    names = {"mass": "mass", "com": "com", "moments": "moments_com", "axes": "q_com", "inertia": "inertia_com", "q": "q0"}
+    names |= {"R": "R0", "w": "w0", "w_W": "w0_W", "dt": "dt"}
+    plain = {name: getattr(given[key], "tolist", lambda key=key: given[key])() for name, key in names.items()}
+    return plain | ({"description": one.variant} if one.variant else {})
+
+
+def _mjcf(method: AdapterMethod, one: Description) -> str:
+    option = f'<option gravity="0 0 {-one.gravity!r}" integrator="{method.settings["integrator"]}" timestep="{one.dt!r}"/>'
+    write: Any = shared.write_mjcf  # it runs in environments too, without types
+    lines = write(SimpleNamespace(**one.numbers), option).splitlines()
+    return "\n".join(line.strip() for line in lines if line.strip())

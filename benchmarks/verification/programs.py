@@ -1,0 +1,504 @@
+"""Verification of what integrates motions: programs, engines and methods.
+
+Each exact motion is a recording of the subject: its samples are compared with the exact solution, at |w| h = 0.01 rad. An error
+within the tolerance of the declared order is right. Near the tolerance the motion is run again with half the step, and right is
+an error that falls as the declared order says. The mistakes that explain the motions that fail are found by the search for
+recordings.
+
+Programs and engines are given bodies in principal axes, so their motions are compared in these axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, to_quaternion
+from conservative.errors import IntegrationFailed, Unsupported
+from conservative.grid import Grid
+from conservative.method import Method
+from conservative.programs import Program
+from conservative.references.environments.adapter import AdapterMethod
+from conservative.references.environments.engine_method import EngineMethod
+from conservative.references.environments.programs import UnusableProgram, program_class
+from conservative.references.worker.client import EngineTimeout, time_limit
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from . import protocol
+from .compare import Compared, compare_answers
+from .explain import PROGRAM_KINDS, diagnose
+from .explanation import HALF, OWN_ERROR, Explanation
+from .finding import Finding, Verdict, Verification, uncapitalised
+from .motions.files import tolerance
+from .motions.motion import Motion, load
+from .motions.programs import ORDERS, PARTS
+
+PATIENCE = 30.0
+"""Time in s that a program may take to start, and for each answer. A program that takes longer does not answer."""
+ROWS = 40
+"""Largest number of samples of a motion, for the search."""
+NEAR = 3.0
+"""Errors up to so many tolerances are right if they fall with the step as the declared order says."""
+FEW = 3
+"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is that of the method."""
+HANGS = 2
+"""Motions of a program that does not answer, after which the others are not run."""
+SLOPE = 0.5
+"""Largest difference between the order and the exponent with which an error falls."""
+FINE = PARTS[-1]
+"""Steps in 0.1 rad at the smallest step of the motions."""
+LADDER = (1, 2, 5, 10)
+"""Steps in 0.1 rad at which the order is measured."""
+GENERIC = 5
+"""Motions that the order is measured on: free bodies with three different moments."""
+RESOLVED = {"f64": 1e-11, "f32": 1e-4}
+"""Smallest errors, rad, that show an order, above round-off in each precision."""
+ROUNDS = 5
+"""Largest number of motions that are searched for mistakes."""
+CANDIDATES = 6
+"""Largest number of mistakes that explain one motion and are applied to the others."""
+REFITS = 4
+"""Largest number of motions that make the numbers of a mistake more precise."""
+CLEAR = 2.0
+"""Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
+ALIKE, ROUNDED = 3.0, 1e-9
+"""Mistakes explain equally well if they leave shares within this factor; smaller shares are rounding."""
+LEAST = 0.1
+"""Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
+Solve = Callable[[Scene, Grid], Trajectory]
+"""Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ran:
+    """A motion that was run with a step, s: its samples, and errors and tolerances (2,) of attitude, rad, and rates."""
+
+    motion: Motion
+    case: Compared
+    error: Array
+    allowed: Array
+    step: float
+    ended: str = ""
+    hangs: bool = False
+
+    @property
+    def ratio(self) -> float:
+        """The largest error over its tolerance."""
+        return float((self.error / self.allowed).max())
+
+
+def solver(method: Method) -> Solve:
+    """Return the function that runs a method without the check of its result, which would refuse wrong samples."""
+    return lambda scene, grid: method.prepare(scene, grid)()
+
+
+def in_principal_axes(motion: Motion) -> Motion:
+    """Return the motion of the same body in its principal axes."""
+    body = motion.scene.body
+    C = body.R_BP
+    if np.array_equal(C, np.eye(3)):
+        return motion
+
+    def turned(vector: Sequence[float] | None) -> Any:
+        return None if vector is None else (np.array(vector) @ C).tolist()
+
+    return replace(
+        motion,
+        inertia=[*body.moments.tolist(), 0.0, 0.0, 0.0],
+        quaternion=to_quaternion(motion.scene.R_WB0 @ C).tolist(),
+        rates=turned(motion.rates),
+        rotor_momentum_B=turned(motion.rotor_momentum_B),
+        torque_B=turned(motion.torque_B),
+        com_B=turned(motion.com_B),
+        damping=None if motion.damping is None else (C.T @ np.array(motion.damping) @ C).tolist(),
+    )
+
+
+def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) -> Ran:
+    """Return a motion run with so many steps in 0.1 rad. Raise `Unsupported`."""
+    every = motion.steps * parts
+    thin = max(n for n in range(1, every + 1) if every % n == 0 and n * motion.samples <= max(ROWS, motion.samples))
+    grid = Grid(motion.step / parts, every * motion.samples, every // thin)
+    scene, ended = motion.scene, ""
+    try:
+        found = solve(scene, grid)
+        t, R, w, failure = found.t, found.R_WB, found.w_WB_B, found.failure
+    except Unsupported:
+        raise
+    except IntegrationFailed as ended_early:
+        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), ended_early
+    if len(t) < grid.n_samples:
+        ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
+    elif not (np.isfinite(R).all() and np.isfinite(w).all()):
+        ended = "samples are not finite"
+    case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
+    at = slice(thin - 1, None, thin)  # the samples of the motion
+    error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
+    return Ran(motion, case, error, allowed, grid.dt, ended, isinstance(failure, EngineTimeout))
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """The motions that a subject ran, those that it does not support with the reason, its declared order and precision."""
+
+    solve: Solve
+    ran: list[Ran]
+    unsupported: dict[str, str]
+    order: int | None
+    single: bool
+
+    @property
+    def failing(self) -> list[Ran]:
+        """The motions with an error above the tolerance."""
+        return [each for each in self.ran if not each.ratio <= 1]
+
+
+def run_motions(
+    solve: Solve,
+    order: int | None,
+    single: bool = False,
+    principal: bool = False,
+    unsupported: Callable[[Scene], str | None] = lambda scene: None,
+    tell: Callable[[str], object] = lambda what: None,
+) -> Answers:
+    """Run the exact motions, in principal axes of their bodies for a subject that gets no others.
+
+    `unsupported` returns why a scene is not supported, None if it is.
+    """
+    ran, reasons = list[Ran](), dict[str, str]()
+    for every in load():
+        tell(every.name)
+        motion = in_principal_axes(every) if principal else every
+        allowed = np.array(tolerance(motion, order, single))
+        if sum(each.hangs for each in ran) == HANGS:
+            reasons[motion.name] = f"it did not answer in {HANGS} motions before"
+            continue
+        if reason := unsupported(motion.scene):
+            reasons[motion.name] = reason
+            continue
+        try:
+            ran.append(run_motion(solve, motion, allowed))
+        except Unsupported as error:
+            reasons[motion.name] = str(error)
+    return Answers(solve, ran, reasons, order, single)
+
+
+def _falls(answers: Answers, ran: Ran) -> float:
+    """Return the exponent with which the error falls from the step to half of it; 0 if it is below the declared order."""
+    with suppress(Unsupported):
+        again = run_motion(answers.solve, ran.motion, ran.allowed, 2 * FINE)
+        slope = float(np.log2(ran.ratio / max(again.ratio, 1e-300)))
+        return slope if math.isfinite(slope) and slope >= (answers.order or 2) - SLOPE else 0.0
+    return 0.0
+
+
+def measure_order(answers: Answers) -> float:
+    """Return the exponent with which errors of free bodies fall with the step, the median of some motions; nan if unknown.
+
+    Of each motion the shortest two steps count whose errors are above round-off.
+    """
+    slopes, floor = [], RESOLVED["f32" if answers.single else "f64"]
+    free = [
+        each for each in answers.ran if not each.motion.needs and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
+    ]
+    for each in free[:GENERIC]:
+        errors = [float(run_motion(answers.solve, each.motion, each.allowed, n).error[0]) for n in LADDER]
+        good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < 0.3]
+        if len(good) > 1:
+            (a, first), (b, last) = good[-2:]
+            slopes.append(math.log(first / last) / math.log(b / a))
+    return float(np.median(slopes)) if slopes else math.nan
+
+
+@dataclass(frozen=True)
+class Named:
+    """Mistakes that explain some failing motions equally well, and the names of these motions."""
+
+    explanations: tuple[Explanation, ...]
+    motions: tuple[str, ...]
+
+
+def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[Named]:
+    """Return the mistakes that explain failing motions, first the one that explains most.
+
+    A mistake is searched in one motion, with numbers that are fitted to it. It is then applied to all others with the same
+    numbers, which the motions that it nearly explains make more precise. Of several mistakes the one is named that explains
+    most, less the `right` motions that it would make wrong. Motions that it does not explain are searched next, up to `ROUNDS`
+    of them.
+    """
+    rest = {each.motion.name: each for each in sorted(failing, key=_rank) if not each.ended}
+    named: dict[tuple[tuple[str, ...], ...], Named] = {}
+    searched = list(rest.values())
+    for _ in range(ROUNDS):
+        searched = [each for each in searched if each.motion.name in rest]
+        if not searched or (named and len(rest) < LEAST * len(failing)):
+            break
+        each = searched.pop(0)
+        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains]
+        found = sorted(found, key=lambda one: (one.numbers, len(one.keys), one.share))[:CANDIDATES]  # the simplest first
+        applied = [_apply(one, list(rest.values()), right) for one in found]
+        if not applied or max(one.score for one in applied) <= 0:
+            continue
+        best = max(applied, key=lambda one: one.rank)
+        good = [one for one in applied if (one.motions, one.rank) == (best.motions, best.rank)]
+        least = min(one.share for one in good)
+        equal = [one for one in good if one.share <= ALIKE * max(least, ROUNDED)]
+        names, before = best.motions, named.get(keys := tuple(one.explanation.keys for one in equal))
+        # Numbers of the first search stand: it had the motions that show them best.
+        explanations = before.explanations if before else tuple(one.explanation for one in equal)
+        named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
+        for name in names:
+            del rest[name]
+    return sorted(named.values(), key=lambda each: -len(each.motions))
+
+
+def _rank(ran: Ran) -> tuple[bool, bool, float]:
+    """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
+    return bool(ran.motion.needs), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A mistake that was applied to all motions: the failing ones that it explains, and the mean share of the errors it leaves.
+
+    `score` is the number of these motions, less the right ones that it would make wrong.
+    """
+
+    explanation: Explanation
+    motions: tuple[str, ...]
+    score: int
+    share: float
+
+    @property
+    def rank(self) -> tuple[int, int, int]:
+        """What explains more is better, then fewer fitted numbers, then fewer mistakes."""
+        return self.score, -self.explanation.numbers, -len(self.explanation.keys)
+
+
+def _apply(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> Applied:
+    """Return a mistake that was found in one motion, applied to all."""
+    names, shares, best, refits = list[str](), list[float](), one, 0
+    for each in sorted(failing, key=lambda each: each.ratio):
+        again = best.again(each.case)
+        if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
+            refined, refits = best.refit(each.case), refits + 1
+            applied = None if refined is None else refined.again(each.case)
+            if refined is not None and applied is not None and applied.explains:
+                best, again = refined, applied
+        if again is not None and again.explains:
+            names.append(each.motion.name)
+            shares.append(again.share)
+    refuted = sum(
+        (again := best.again(each.case)) is not None and bool((np.array(again.left) > OWN_ERROR * each.allowed).any())
+        for each in right
+    )
+    return Applied(best, tuple(names), len(names) - refuted, float(np.mean(shares)) if shares else math.inf)
+
+
+def _is_generic(motion: Motion) -> bool:
+    """Return whether the three principal moments differ."""
+    moments = np.sort(motion.scene.body.moments)
+    return bool((np.diff(moments) > 1e-3 * moments[-1]).all())
+
+
+def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], float]:
+    """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
+    few = len(answers.failing) < FEW
+    near = {
+        each.motion.name: slope
+        for each in answers.failing
+        if (few or each.ratio <= NEAR) and not each.ended and (slope := _falls(answers, each))
+    }
+    failing = [each for each in answers.failing if each.motion.name not in near]
+    named = explain_motions(failing, [each for each in answers.ran if each not in failing])
+    named = [each for each in named if len(each.motions) >= min(FEW, len(failing))]  # what one motion shows is chance
+    explained = {name: each for each in named for name in each.motions}
+    # What converges as it declares, and is no known mistake, has a large error constant.
+    rest = [each for each in failing if each.motion.name not in explained and not each.ended]
+    near |= {each.motion.name: slope for each in rest if (slope := _falls(answers, each))}
+    failing = [each for each in failing if each.motion.name not in near]
+    order, lower = math.nan, dict[str, str]()
+    if failing and len(explained) < len(failing) / 2:
+        order = measure_order(answers)
+        lower = _of_lower_order(answers, failing, order)
+    findings = []
+    for each in answers.ran:
+        name = each.motion.name
+        k = int(np.argmax(each.error / each.allowed))
+        value = float(each.error[k]), float(each.allowed[k]), ("rad", "of the largest rate")[k], "order"
+        if each not in failing:
+            detail = f"{_above(each.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
+            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=detail))
+        elif name in lower:
+            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=lower[name]))
+        else:
+            causes = tuple(one.cause for one in explained[name].explanations) if name in explained else ()
+            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *value, causes=causes, detail=each.ended))
+    findings += [
+        Finding(subject, "motions", name, Verdict.NOT_TESTED, detail=reason) for name, reason in answers.unsupported.items()
+    ]
+    return findings, named, order
+
+
+def _above(ratio: float) -> str:
+    return f"{100 * (ratio - 1):.0f} % above" if ratio < 2 else f"{ratio:.2g} times"
+
+
+def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> dict[str, str]:
+    """Return the failing motions that are right for a lower order than the declared one, each with that sentence."""
+    lower = max((each for each in ORDERS if each < (answers.order or 2) and abs(order - each) < SLOPE), default=None)
+    if lower is None:
+        return {}
+    found = {}
+    for each in failing:
+        if (each.error <= tolerance(each.motion, lower, answers.single)).all():
+            found[each.motion.name] = f"within the tolerance of order {lower}"
+    return found
+
+
+def order_finding(subject: str, answers: Answers, order: float) -> Finding:
+    """Return the finding on the order: an error that falls more slowly than the declared order says is wrong."""
+    declared = answers.order
+    if declared is None:
+        return Finding(subject, "order", "", Verdict.NOT_TESTED, detail="it chooses its steps")
+    if not answers.ran or math.isnan(order):
+        return Finding(subject, "order", "", Verdict.NOT_TESTED, detail="no error is above rounding and falls with the step")
+    detail = f"order {order:.2f}"
+    if order < declared - SLOPE:
+        detail = f"this program has order {order:.2f}, {declared} was declared"
+        return Finding(subject, "order", "", Verdict.WRONG, order, float(declared), "", "declared", detail=detail)
+    if order > declared + SLOPE:
+        detail += f"; {declared} was declared, so that tolerances are those of order {declared}"
+    return Finding(subject, "order", "", Verdict.RIGHT, order, float(declared), "", "declared", detail=detail)
+
+
+def repeatability(subject: str, method: Method, answers: Answers) -> Iterator[Finding]:
+    """Yield whether a second run of a model has the same bits, for the first free motion and the first other one."""
+    done = set[bool]()
+    for each in answers.ran:
+        if (free := not each.motion.needs) in done or each.ended:
+            continue
+        done.add(free)
+        run = method.prepare(each.motion.scene, Grid(each.step, 100, 10))
+        first = run()
+        R, w = first.R_WB.copy(), first.w_WB_B.copy()
+        again = run()
+        same = np.array_equal(R, again.R_WB) and np.array_equal(w, again.w_WB_B)
+        detail = "" if same else "a second run has other samples: each run starts from the initial state"
+        verdict = Verdict.RIGHT if same else Verdict.WRONG
+        yield Finding(subject, "repeatability", each.motion.name, verdict, by="bits", detail=detail)
+
+
+def verify_method(
+    method: Method,
+    kind: str,
+    checks: Sequence[str],
+    pairs: Sequence[str] = (),
+    tell: Callable[[float, str], object] = lambda share, what: None,
+    subject: str = "",
+) -> Verification:
+    """Verify a method or an engine by the exact motions, its order, repeatability, and pairs of descriptions.
+
+    `pairs` are names of pairs, by default all.
+    """
+    subject = subject or method.name
+    single = getattr(method, "precision", "f64") == "f32"
+    findings, named, order = list[Finding](), list[Named](), math.nan
+    if {"motions", "order", "repeatability"} & set(checks):
+        principal = isinstance(method, AdapterMethod)
+        answers = run_motions(
+            solver(method), method.order, single, principal, method.unsupported, lambda what: tell(0.0, f"{subject}: {what}")
+        )
+        if "motions" in checks:
+            some, named, order = motion_findings(subject, answers)
+            findings += some
+        if "order" in checks and not named:
+            order = measure_order(answers) if math.isnan(order) else order
+            findings.append(order_finding(subject, answers, order))
+        if "repeatability" in checks:
+            findings += repeatability(subject, method, answers)
+    if "pairs" in checks:
+        from .pairs import verify_pairs
+
+        findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"), subject)
+    return Verification(subject, kind, findings, summary(findings, named))
+
+
+def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
+    """Return what decides the verdict, with the number of cases of each check that are right."""
+    parts = []
+    for check in dict.fromkeys(each.check for each in findings):
+        some = [each for each in findings if each.check == check and each.verdict is not Verdict.NOT_TESTED]
+        if check == "order":
+            parts += [each.detail for each in some]
+        elif some and check in ("motions", "pairs", "repeatability"):
+            right = sum(each.verdict is Verdict.RIGHT for each in some)
+            words = {"repeatability": "repeated runs"}.get(check, check)
+            parts.append(f"{right} of {len(some)} {words}{'' if right == len(some) else ' are right'}")
+            if ended := [
+                each.detail for each in some if each.check == "motions" and each.verdict is Verdict.WRONG and each.detail
+            ]:
+                parts.append(f"in {len(ended)} {ended[0]}")
+        else:
+            parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
+    failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
+    reasons = [
+        f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
+        f"(explains {len(each.motions)} of {failing} failing motions)"
+        for each in named
+    ]
+    return "; ".join([*reasons, ", ".join(parts)])
+
+
+def find_cause(solve: Solve, order: int | None = None, single: bool = False, principal: bool = True) -> str:
+    """Return the sentences of the mistakes in the exact motions of a function that integrates scenes; "" if all are right."""
+    answers = run_motions(solve, order, single, principal)
+    findings, named, _ = motion_findings("", answers)
+    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    if wrong and not named:
+        return next((each.detail for each in wrong if each.detail), UNKNOWN)
+    return "; ".join(" or ".join(one.cause.sentence for one in each.explanations) for each in named)
+
+
+UNKNOWN = "no known mistake explains its motion"
+
+
+def verify_program(
+    subject: str,
+    program: Program,
+    checks: Sequence[str],
+    pairs: Sequence[str] = (),
+    tell: Callable[[float, str], object] = lambda share, what: None,
+    method: EngineMethod | None = None,
+) -> Verification:
+    """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
+
+    `method` is the program with one of its settings, by default with their defaults.
+    """
+    findings = list[Finding]()
+    try:
+        with time_limit(PATIENCE):
+            method = method or program_class(program, PATIENCE)()
+            if "protocol" in checks:
+                findings += protocol.findings(subject, method)
+            if any(each.verdict is Verdict.WRONG for each in findings):
+                return Verification(subject, "program", findings, "; ".join(each.detail for each in findings if each.detail))
+            if "times" in checks:
+                findings += protocol.times(subject, method)
+            rest = [check for check in checks if check not in ("protocol", "times")]
+            found = verify_method(method, "program", rest, pairs, tell, subject)
+    except (UnusableProgram, IntegrationFailed) as failure:
+        findings.append(protocol.unusable(subject, failure))
+        return Verification(subject, "program", findings, findings[-1].detail)
+    every = [*findings, *found.findings]
+    return replace(found, findings=every, reason="; ".join(filter(None, [found.reason, *(_wrong(findings))])))
+
+
+def _wrong(findings: Sequence[Finding]) -> list[str]:
+    return [each.detail for each in findings if each.verdict is Verdict.WRONG]

@@ -1,0 +1,52 @@
+"""Attitudes and rates of rows, from each kind of column."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array
+from conservative.check import SMALLEST
+
+from ..solution import States
+from .layout import Layout, Options
+
+
+def convert(values: Array, layout: Layout, options: Options) -> tuple[Array, States, Array | None]:
+    """Return times, motion and shape of rows in SI units.
+
+    The shape (n,) is measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
+    """
+    count = 1 + len(layout.used["rates"])
+    w, (R, shape) = values[:, 1:4] if count > 1 else None, to_matrices(values[:, count:], layout.attitude, options)
+    if w is not None:
+        w = np.where(np.abs(w) < SMALLEST, 0.0, w)  # no scene has such rates
+        if options.world and R is not None:
+            w = (w[:, None] @ R)[:, 0]
+    return values[:, 0], (R, w), shape
+
+
+def to_matrices(x: Array, kind: str | None, options: Options) -> tuple[Array | None, Array | None]:
+    """Return matrices (n, 3, 3) and the shape (n,) of attitudes of a kind; None without attitudes, or without a shape."""
+    if kind is None:
+        return None, None
+    if kind == "quaternion":
+        turns = Rotation.from_quat(x, scalar_first=options.quaternion != "xyzw")
+        return turns.as_matrix(), np.linalg.norm(x, axis=1) - 1
+    if kind == "matrix":
+        R = x.reshape(-1, 3, 3)
+        U, _, V = np.linalg.svd(R)
+        return U @ V, np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
+    if kind in ("angles", "aircraft angles"):
+        sequence = (options.euler or "zyx") if kind == "angles" else "zyx"
+        turns = Rotation.from_euler(sequence.upper(), x)
+    elif kind == "rotation vector":
+        turns = Rotation.from_rotvec(x)
+    elif kind == "axis and angle":
+        size = np.linalg.norm(x[:, :3], axis=1, keepdims=True)  # an angle of 0 may have an axis of 0
+        turns = Rotation.from_rotvec(x[:, 3:] * x[:, :3] / np.where(size == 0, 1, size))
+    elif kind == "modified Rodrigues":
+        turns = Rotation.from_mrp(x)
+    else:
+        turns = Rotation.from_quat(np.column_stack([np.ones(len(x)), x]), scalar_first=True)
+    return turns.as_matrix(), None

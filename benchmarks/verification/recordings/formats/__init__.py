@@ -1,0 +1,41 @@
+"""Formats of recordings, one file for each family. To add one, write a file with a `read` function, and add it to `FORMATS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from . import delimited, json_lines, messages, parquet
+from .table import Start, Table
+
+
+class Format(NamedTuple):
+    """A family of formats: its name, the usual endings of its files, and the function that reads them.
+
+    `read` returns the table of a file, or None for a file of another family. Endings are for folders; the content decides.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    read: Callable[[Start], Table | None]
+
+
+FORMATS = (
+    Format("Parquet", (".parquet",), parquet.read),
+    Format("JSON lines", (".jsonl", ".ndjson", ".json"), json_lines.read),
+    Format("STK attitudes", (".a",), messages.read),
+    Format("CSV", (".csv", ".tsv", ".txt", ".dat"), delimited.read),
+)
+"""The families; the first one that returns a table counts."""
+ENDINGS = tuple(f"{ending}{packed}" for each in FORMATS for ending in each.endings for packed in ("", ".gz"))
+"""Endings of recordings, plain and compressed."""
+
+
+def open_table(path: Path) -> Table:
+    """Return the table of a file. Raises `BadInput` for a file without one."""
+    start = Start(path, ", ".join(f"{each.name} ({each.endings[0]})" for each in FORMATS))
+    for each in FORMATS:
+        if (table := each.read(start)) is not None:
+            return table
+    raise start.fail("it has no row of numbers" if any(line.strip() for line in start.lines) else "it is empty")

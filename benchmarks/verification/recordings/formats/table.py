@@ -1,0 +1,166 @@
+"""What the formats share: the table that they return, the start of a file, and its lines in parts of bounded size."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import warnings
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import TextIOWrapper
+from itertools import islice
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, Any
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.errors import BadInput
+from conservative.files import open_file
+
+CHUNK = 50_000  # rows that are read at a time
+LOOKED = 200  # lines among which the header and the first row of numbers are
+LONGEST = 1_000_000  # characters of a line, and of the lines that are looked at
+AT_ONCE = 64 * LONGEST  # characters that are read at a time
+UNREADABLE = OSError, ValueError, TypeError, EOFError, RecursionError, zlib.error
+"""Errors of files that are damaged, and of values such as JSON in a thousand brackets."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The table of a file: names of columns, and a function from some of these names to chunks of rows (n, columns).
+
+    The function raises `BadInput` for text in the place of a number; empty fields are nan. `unused` has reasons of columns that
+    the format defines and that cannot be compared.
+    """
+
+    names: list[str]
+    rows: Callable[[Sequence[str]], Iterator[Array]]
+    unused: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True)
+class Start:
+    """The start of a file, from which its format is recognised. `formats` are the names of all formats."""
+
+    path: Path
+    formats: str
+
+    @property
+    def ending(self) -> str:
+        """The ending of the name, lower case, without .gz."""
+        return (self.path.with_suffix("") if self.path.suffix == ".gz" else self.path).suffix.lower()
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """The first lines."""
+        try:
+            with self.open() as stream:
+                return next(chunks(_each_line(stream), LOOKED, LONGEST), [])
+        except UNREADABLE as error:
+            raise self.fail(error) from None
+
+    def open(self) -> IO[str]:
+        """Open the file as text, gzipped or not."""
+        stream: Any = open_file(self.path)
+        packed = stream.read(2) == b"\x1f\x8b"
+        stream.seek(0)
+        if packed:  # a GzipFile closes only a file that it has opened itself
+            stream.close()
+            stream = gzip.GzipFile(self.path)
+        return TextIOWrapper(stream, encoding="utf-8-sig", errors="replace")
+
+    def fail(self, reason: object) -> BadInput:
+        """Return the error of a file without a table."""
+        text = (str(reason).strip().splitlines() or ["empty"])[0]
+        return BadInput("run", f"{self.path} ({text})", f"a table: {self.formats}")
+
+    def parts(self, skip: int = 0, end: str | None = None, comments: bool = True) -> Iterator[list[str]]:
+        """Yield the lines behind the first ones, to one that begins with `end`, in parts; without empty lines and comments."""
+        try:
+            with self.open() as stream:
+                yield from chunks(_wanted(islice(_each_line(stream), skip, None), end, comments), CHUNK, AT_ONCE)
+        except UNREADABLE as error:
+            raise self.fail(error) from None
+
+    def separated(
+        self,
+        names: Sequence[str],
+        wanted: Sequence[str],
+        separator: str | None,
+        skip: int,
+        end: str | None = None,
+        comma: bool = False,
+    ) -> Iterator[Array]:
+        """Yield the numbers in some columns of lines whose fields are separated, by blanks if `separator` is None."""
+        places, done = [names.index(name) for name in wanted], 0
+        for lines in self.parts(skip, end):
+            yield _parse(
+                self.path, [line.replace(",", ".") for line in lines] if comma else lines, separator, wanted, places, done
+            )
+            done += len(lines)
+
+
+def words(line: str, separator: str | None) -> list[str]:
+    """Return the fields of a line; a separator in quotation marks is none."""
+    if '"' in line and separator is not None:
+        line = re.sub(r'"([^"]*)"', lambda match: match[1].replace(separator, " "), line)
+    return [word.strip().strip('"').strip() for word in line.strip("\r\n").split(separator)]
+
+
+def _each_line(stream: IO[str]) -> Iterator[str]:
+    number = 0
+    while line := stream.readline(LONGEST + 1):
+        number += 1
+        if len(line) > LONGEST:
+            raise ValueError(f"line {number} has more than {LONGEST} characters")
+        yield line
+
+
+def _wanted(lines: Iterable[str], end: str | None, comments: bool) -> Iterator[str]:
+    for line in lines:
+        if end is not None and line.startswith(end):
+            return
+        if line.strip() and not (comments and line.lstrip().startswith(("#", "%"))):
+            yield line
+
+
+def chunks(lines: Iterable[str], count: int, size: int) -> Iterator[list[str]]:
+    """Yield lists of lines: of a number of lines at most, and up to the line that exceeds a number of characters."""
+    chunk, length = list[str](), 0
+    for line in lines:
+        chunk.append(line)
+        length += len(line)
+        if len(chunk) == count or length > size:
+            yield chunk
+            chunk, length = [], 0
+    if chunk:
+        yield chunk
+
+
+def _parse(path: Path, lines: list[str], separator: str | None, wanted: Sequence[str], places: list[int], done: int) -> Array:
+    """Return the numbers in lines, nan for empty fields; name the row and the column that has another text."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return np.loadtxt(lines, delimiter=separator, usecols=places, ndmin=2, quotechar='"', comments=None)
+    except ValueError:
+        rows = [words(line, separator) for line in lines]
+    dates = bool(rows) and len(rows[0]) > places[0] and bool(re.match(r"\d{4}-\d\d-\d\d", rows[0][places[0]]))
+    out = np.full((len(rows), len(places)), np.nan)
+    for number, row in enumerate(rows):
+        for i, place in enumerate(places):
+            text = row[place] if place < len(row) else ""
+            if not text and separator is not None:
+                continue
+            try:
+                out[number, i] = (
+                    np.datetime64(text.rstrip("Z"), "ns").astype(np.int64) * 1e-9 if dates and i == 0 else float(text)
+                )
+            except ValueError:
+                got = f"{path}, row {done + number + 1}, column {wanted[i]}: {text!r}"
+                raise BadInput("run", got, "a number there, or the row removed; decimals with one sign throughout") from None
+    return out

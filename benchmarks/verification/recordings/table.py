@@ -1,0 +1,179 @@
+"""Recorded motions in files of simulators, loggers and telephones: the rows that are kept, and all rows in chunks."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.check import SMALLEST
+from conservative.errors import BadInput
+
+from ..solution import States
+from .also import Other, compare_others
+from .attitudes import convert
+from .columns import choose
+from .digits import find_digits
+from .formats import open_table
+from .layout import Layout, Options
+from .rows import Cleaner
+from .units import find_units, guess_time
+
+ROWS = 2000  # rows that are kept for fits, evenly chosen: this to twice as many
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recorded motion at times t (n,), s, which are those of the file; it has `rows` rows, of which n are kept for fits.
+
+    `shape` (n,) has what is measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
+    `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
+    rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
+    are rows in the file, from 1, `left` has the numbers of rows that were left out by reason, and `ended` is the number of rows
+    without numbers at the end. `others` are attitudes in other columns.
+    """
+
+    t: Array
+    data: States
+    shape: Array | None = None
+    order_known: bool = True
+    degrees: bool = False
+    rows: int = 0
+    digits: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    layout: Layout = field(default_factory=lambda: Layout([]))
+    options: Options = field(default_factory=Options)
+    path: Path | None = None
+    numbers: Any = None
+    left: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    ended: int = 0
+    others: Sequence[Other] = ()
+
+    def label(self, text: str) -> str:
+        """Return a description of rows after the name of the file."""
+        return text if self.path is None else f"{self.path}: {text}"
+
+    def number(self, row: Any) -> int:
+        """Return the number in the file, from 1, of a row that is kept."""
+        return int(row) + 1 if self.numbers is None else int(self.numbers[row])
+
+    def doubt(self, error: float | None) -> str:
+        """Return the sentence on parts of the file that were not compared, or that differ from those that were; or ""."""
+        if self.ended:
+            return f"The last {self.ended} rows have no numbers, so the file does not show the end of its motion"
+        for other in self.others:
+            allowed = other.allowed(self.digits[1]) if error is None else error
+            if not other.difference <= allowed:
+                return f"{', '.join(other.names)} are {other.text}, and not the attitude that is compared. --columns decides"
+        return self.layout.doubt
+
+    def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
+        """Yield times, motion, shape and numbers of all rows, in chunks."""
+        if self.path is None or self.rows == len(self.t):
+            numbers = 1 + np.arange(len(self.t)) if self.numbers is None else self.numbers
+            yield self.t, self.data, self.shape, numbers
+            return
+        cleaner = Cleaner(self.path, self.layout, self.options)
+        for values in open_table(self.path).rows(self.layout.columns):
+            chosen, numbers = cleaner.choose(*cleaner.continue_times(values))
+            if len(chosen):
+                yield *convert(chosen * self.layout.sizes, self.layout, self.options), numbers
+
+
+def read(path: Path, options: Options) -> Recording:
+    """Return the motion in a file: CSV, STK attitudes, Parquet or JSON lines, gzipped or not. Every row is checked, in chunks.
+
+    Raises `BadInput` for files, columns, options and rows that cannot be used, and `MissingEngine` for Parquet without pyarrow.
+    """
+    return read_all([path], options)[0]
+
+
+def read_all(paths: Sequence[Path], options: Options) -> list[Recording]:
+    """Return the motions in files. Raises errors of `read`, and `BadInput` for an option that none of the files uses."""
+    made = [_read(path, options) for path in paths]
+    for argument, error in made[0][1].items() if made else ():
+        if all(argument in unused for _, unused in made):
+            raise error
+    return [recording for recording, _ in made]
+
+
+def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]:
+    """Return the motion in a file, and the errors of options that it does not use."""
+    if options.euler is not None and not re.fullmatch("(?!.*(.)\\1)[xyz]{3}", options.euler):
+        raise BadInput("euler", repr(options.euler), "three of the letters x, y, z without equal neighbours, such as zyx")
+    start, end = options.start_time, options.end_time
+    if start is not None and end is not None and not start < end:
+        raise BadInput("until", f"{end:g}, not after {start:g} s", "a time after the first one, s")
+    table = open_table(path)
+    layout = choose(path, Layout(table.names, unused=dict(table.unused)), options)
+    if options.world and layout.used["rates"] and layout.attitude is None:
+        raise BadInput(
+            "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"
+        )
+    unused = _unused(layout, options)
+    if "quaternion" in unused:  # named columns have their order
+        options = replace(options, quaternion=None)
+    cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
+    every, rows, first, last = 1, 0, True, math.nan
+    extra = [name for part in layout.also.values() for name in part]
+    width = 1 + sum(map(len, [*layout.used.values()][1:]))
+    for chunk in table.rows([*layout.columns, *extra]):
+        if first and len(chunk):
+            guess_time(chunk, layout)
+        values, at = cleaner.continue_times(chunk)
+        if first and len(values):
+            usable = ~np.any([*cleaner.bad(values[:, :width]).values()], axis=0)
+            find_units(path, values[usable, :width], layout, options)
+            first = False
+        values, at = cleaner.choose(values, at)
+        kept.append(values[-rows % every :: every])
+        numbers.append(at[-rows % every :: every])
+        rows += len(values)
+        while sum(map(len, kept)) > 2 * ROWS:
+            kept, numbers, every = [np.concatenate(kept)[::2]], [np.concatenate(numbers)[::2]], 2 * every
+        last = values[-1, 0] if len(values) else last
+    if rows < 2:
+        left = "".join(f", and {count} {reason}" for reason, count in cleaner.left.items() if count)
+        raise BadInput("run", f"{path} with {rows} rows{left}", "a header and two rows or more")
+    raw = np.concatenate(kept)
+    if (duration := float(last - raw[0, 0]) * float(layout.sizes[0])) < SMALLEST:
+        raise BadInput("run", f"{path} with rows within {duration:g} s", f"times that differ by {SMALLEST:g} s or more")
+    t, data, shape = convert(raw[:, :width] * layout.sizes, layout, options)
+    layout.notes += cleaner.notes
+    recording = Recording(
+        t,
+        data,
+        shape,
+        order_known=options.quaternion is not None or not layout.numbered,
+        degrees=any(abs(size - math.pi / 180) < 1e-6 for size in layout.used["rates"].values()),
+        rows=rows,
+        digits=find_digits(raw[:, :width], layout),
+        layout=layout,
+        options=options,
+        path=path,
+        numbers=np.concatenate(numbers),
+        left={reason: count for reason, count in cleaner.left.items() if count},
+        ended=cleaner.ended,
+        others=compare_others(data[0], raw[:, width:], layout, options),
+    )
+    return recording, unused
+
+
+def _unused(layout: Layout, options: Options) -> dict[str, BadInput]:
+    """Return the errors of options that apply to none of the columns, by their arguments."""
+    out = dict[str, tuple[str, str]]()
+    if options.euler is not None and layout.attitude != "angles":
+        out["euler"] = f"{options.euler!r}, for a file without columns of angles that it applies to", "no --euler"
+    if options.quaternion is not None and not layout.numbered:
+        out["quaternion"] = f"{options.quaternion!r}, for a file without numbered quaternions", "no --quaternion"
+    if options.world and not layout.used["rates"]:
+        out["rates"] = "'world', for a file without rates", "body, or a file with attitudes and rates"
+    if options.units is not None and "unit" not in layout.notes:
+        out["units"] = f"{options.units!r}, for a file whose columns name their units", "no --units"
+    return {argument: BadInput(argument, got, allowed) for argument, (got, allowed) in out.items()}

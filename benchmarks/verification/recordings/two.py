@@ -1,0 +1,224 @@
+"""Two recordings of one scene that disagree: which one is wrong, and by which mistake?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from conservative.attitude import Array
+from conservative.errors import BadInput
+from conservative.flight import rotation_only
+from conservative.scene import Scene
+
+from ..compare import Compared, differ
+from ..finding import Finding, Verdict, Verification
+from ..solution import States, truth
+from .comparison import Rows, prepare
+from .table import Recording
+from .verdict import UNITS, verify_recording
+
+BODIES = {"another body", "other moments"}
+"""Keys of mistakes that are not in the recordings if both have them, but in the body that they are compared with."""
+Named = tuple[str, Recording]
+"""A recording and the name of its file."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The largest difference between two recordings: of attitudes, rad, and of rates, relative to the largest, or nan.
+
+    `allowed` has what digits, noise and the interpolation between rows allow. `rows` is the number of rows that were compared,
+    `common` is True if both files have rows at these times, and `missing` says why nothing was compared.
+    """
+
+    error: tuple[float, float] = (math.nan, math.nan)
+    allowed: tuple[float, float] = (math.nan, math.nan)
+    time: float = math.nan
+    rows: int = 0
+    common: bool = False
+    missing: str = ""
+
+    @property
+    def worse(self) -> int:
+        """0 if attitudes differ more beside what is allowed, 1 if rates do."""
+        return int(np.nanargmax(np.divide(self.error, self.allowed)))
+
+    @property
+    def agrees(self) -> bool:
+        """True if the difference is allowed."""
+        return not self.missing and self.error[self.worse] <= self.allowed[self.worse]
+
+
+@dataclass(frozen=True)
+class Two:
+    """The verifications of two recordings, and the difference between them."""
+
+    first: Verification
+    second: Verification
+    difference: Difference
+
+
+def verify_two(
+    scene: Scene,
+    first: Named,
+    second: Named,
+    from_row: bool = True,
+    error: float | None = None,
+    tell: Callable[[str], object] = lambda _: None,
+) -> Verification:
+    """Verify two recordings of one scene, and compare them with each other.
+
+    They may have other columns, times and starts. The result has the findings of both and their difference, `Two` as details,
+    and a sentence on which one is wrong, and by which mistake. The other arguments are arguments of `verify_recording`.
+
+    Raises
+    ------
+    BadInput
+        For the first recording that cannot be compared, with the name of its file.
+    """
+    if first[0] == second[0]:
+        first, second = (f"{first[0]} (first)", first[1]), (f"{second[0]} (second)", second[1])
+    rows, made = dict[str, Rows](), dict[str, Verification]()
+    for name, recording in sorted((first, second), key=_missing):
+        started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
+        try:
+            rows[name] = prepare(rotation_only(started), recording, from_row, error)
+            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
+        except BadInput as refused:
+            if refused.argument != "run" or name in str(refused.got):
+                raise
+            raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
+    tell("difference")
+    a, b = made[first[0]], made[second[0]]
+    found = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
+    names = f"{a.subject} and {b.subject}"
+    verdicts = {a.verdict, b.verdict}
+    verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
+    verdict = Verdict.NOT_TESTED if found.missing else Verdict.RIGHT if found.agrees else verdict
+    worse = 0 if found.missing else found.worse
+    finding = Finding(
+        names,
+        "recording",
+        "difference",
+        verdict,
+        found.error[worse],
+        found.allowed[worse],
+        UNITS[worse],
+        rows[first[0]].allowed.by[worse],
+        detail=found.missing,
+    )
+    notes = [f"{each.subject}: {note}" for each in (a, b) for note in each.notes]
+    return Verification(names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, found), notes, Two(a, b, found))
+
+
+def _reason(a: Verification, b: Verification, found: Difference) -> str:
+    """Return which of two recordings is wrong, and by which mistake."""
+    size = "" if found.missing else f"{found.error[found.worse]:.2g} {UNITS[found.worse]}"
+    both = (a.verdict, b.verdict)
+    (one,), (other,) = a.findings, b.findings
+    if both == (Verdict.RIGHT, Verdict.RIGHT):
+        if found.missing:
+            return f"both are right; they are not compared with each other: {found.missing}"
+        if found.agrees:
+            return f"both are right, and differ by at most {size}"
+        return (
+            f"both are motions of this body, from different starts: they differ by {size} at {found.time:g} s. "
+            "--start scene decides"
+        )
+    if both == (Verdict.WRONG, Verdict.WRONG):
+        same = bool(one.mistake) and one.mistake == other.mistake
+        if found.agrees and (not same or one.mistake in BODIES):
+            return (
+                f"both have the same motion (they differ by at most {size}), but not the motion of this body: check --body. "
+                f"{a.subject}: {a.reason}"
+            )
+        if same:
+            numbers = (
+                "" if one.causes[0].sentence == other.causes[0].sentence else f" ({b.subject}: {other.causes[0].sentence})"
+            )
+            return f"both are wrong by the same mistake: {one.causes[0].sentence}{numbers}"
+    return ". ".join(f"{each.subject} is {each.verdict}: {each.reason}" for each in sorted((a, b), key=_order))
+
+
+def _order(each: Verification) -> bool:
+    """Sort the right one before the other one."""
+    return each.verdict is not Verdict.RIGHT
+
+
+def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], object]:
+    return lambda what: tell(f"{name}: {what}")
+
+
+def _missing(named: Named) -> int:
+    """Return the number of quantities, of attitudes and rates, that a recording does not have."""
+    return sum(x is None for x in named[1].data)
+
+
+def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verification]]) -> Scene:
+    """Return the scene with the start of a recording, as far as it does not have it, from another one that is right."""
+    for rows, verification in before:
+        case, first = rows.case, float(recording.t[0])
+        at = first + float(case.t[0] - rows.recording.t[0])
+        if verification.verdict is Verdict.RIGHT and any(x is None for x in recording.data) and case.t[0] <= at <= case.t[-1]:
+            R, w = truth(case.scene, case.start, np.array([case.start, at]))
+            if not scene.loads:  # whose motion begins at t = 0
+                return scene.rename(scene.name, R_WB0=R[1], w_WB_B0=w[1])
+    return scene
+
+
+def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
+    """Return the largest difference between two recordings at common times.
+
+    Without common times, the departure of the second one from an exact motion is interpolated: it changes slowly where the rows
+    themselves do not. What linear interpolation misses in its own rows is allowed.
+    """
+    a, b = (each.case for each in rows)
+    shift = float(a.t[0] - recordings[0].t[0])  # of the file's times to those of the exact motion
+    times = recordings[1].t[0] + shift + (b.t - b.t[0])
+    if times[0] > a.t[-1] or a.t[0] > times[-1]:
+        if not from_row or b.start != 0:
+            return Difference(missing="their times do not overlap")
+        times = a.t[0] + (b.t - b.t[0])
+    have = [x is not None and y is not None for x, y in zip(a.data, b.data, strict=True)]
+    if not any(have):
+        return Difference(missing="one has attitudes, the other one rates")
+    inside = np.flatnonzero((a.t >= times[0]) & (a.t <= times[-1]))
+    later = np.clip(np.searchsorted(times, a.t), 1, len(times) - 1)
+    nearest = np.where(np.abs(times[later] - a.t) < np.abs(times[later - 1] - a.t), later, later - 1)
+    near = sum(each.digits[0] for each in recordings) + 4 * np.spacing(max(abs(a.t[-1]), abs(times[-1])))
+    common = np.flatnonzero(np.abs(times[nearest] - a.t) <= near)
+    direct = len(common) >= max(2, 0.1 * min(len(inside), len(times)))
+    picked, off = common if direct else inside, np.zeros(2)
+    if not len(picked):
+        return Difference(missing="no row of one is between rows of the other one")
+    ours, theirs = _depart(a, a.t, a.data)[picked], _depart(a, times, b.data)
+    if direct:
+        theirs = theirs[nearest[picked]]
+    else:
+        if len(times) > 2:
+            share = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
+            missed = theirs[1:-1] - (1 - share) * theirs[:-2] - share * theirs[2:]
+            off = np.array([np.linalg.norm(missed[:, part], axis=1).max() for part in (slice(3), slice(3, 6))])
+        theirs = np.stack([np.interp(a.t[picked], times, column) for column in theirs.T], axis=1)
+    turned = (Rotation.from_rotvec(ours[:, :3]).inv() * Rotation.from_rotvec(theirs[:, :3])).magnitude()
+    errors = np.stack([turned, np.linalg.norm(ours[:, 3:] - theirs[:, 3:], axis=1)])
+    allowed = rows[0].allowed.errors + rows[1].allowed.errors * [1, b.scale / a.scale] + off
+    largest = np.where(have, errors.max(axis=1), np.nan)
+    at = int(np.argmax(errors[int(np.nanargmax(largest / allowed))]))
+    return Difference(
+        (float(largest[0]), float(largest[1])),
+        (float(allowed[0]), float(allowed[1])),
+        float(a.t[picked][at]) - shift,
+        len(picked),
+        direct,
+    )
+
+
+def _depart(reference: Compared, t: Array, data: States) -> Array:
+    """Return the departures (n, 6) of samples from an exact motion: turns, rad, and rates, relative; 0 without data."""
+    R, w = truth(reference.scene, reference.start, t)
+    return differ(R, w, R if data[0] is None else data[0], w if data[1] is None else data[1], reference.scale)

@@ -1,0 +1,339 @@
+"""The verdict on a recorded motion: right, wrong or undecided. It does not depend on the mistakes that explain it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.check import describe, real_number
+from conservative.errors import BadInput, shorten
+from conservative.flight import rotation_only
+from conservative.invariants import find_energy, kinetic_energy, sizes
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..compare import SIGMAS, UNITS_OF_DIGITS, Compared
+from ..explain import Diagnosis, diagnose, fit_moments
+from ..explanation import Explanation
+from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
+from .comparison import MOST_NOISE, Comparison, compare, prepare
+from .table import Recording
+
+ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4  # errors that a good solver may leave, in double and in single precision
+SHAPE = 1e-6  # departure from a rotation that a good solver may leave
+UNITS = "rad", "of the largest rate"
+FAR = 0.05  # rad, or of the largest rate: of another motion
+HIDDEN = (
+    "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
+    "(--until), or --start scene decide"
+)
+
+
+class Unit(NamedTuple):
+    """The unit in which errors are shown, and its number for an error of 1: 1 rad, or the largest rate; 0 without data."""
+
+    name: str
+    size: float
+
+    def show(self, error: float) -> str:
+        """Return an error as a number with its unit."""
+        return f"{error * self.size:.2g} {self.name}"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """An error or a drift: its name with its unit, the largest value, the value in the last row, and the allowed one or nan."""
+
+    name: str
+    largest: float
+    final: float
+    allowed: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Details:
+    """What the verification of a recording compared, how, and what it measured.
+
+    Pairs are of attitudes, rad, and of rates, relative to the largest rate of the motion.
+
+    Attributes
+    ----------
+    error, allowed, by, noise
+        Largest errors, the allowed ones, what allows them, and the noise of one axis.
+    digits
+        Largest rounding of times, s, attitudes, rad, and rates, rad/s, by the digits of the file.
+    first_row
+        Errors of the motion that starts exactly in the first row, if a fitted start has smaller ones; else 0.
+    units
+        Units in which attitudes and rates are shown.
+    compared, in_file
+        Numbers of rows.
+    used
+        Columns by quantity, such as rates.
+    unused
+        Reasons of the columns that were not used.
+    shape
+        Sentence on quaternions or matrices that are not rotations; "" if they are.
+    explaining
+        The mistakes that explain the file, all equally well.
+    candidates
+        The best mistakes, if none explains the file.
+    tried
+        All mistakes that were tried, best first.
+    quantities
+        Errors and drifts.
+    times, series
+        Times (n,), s, and values (n,) of each quantity at them.
+    """
+
+    error: tuple[float, float]
+    allowed: tuple[float, float]
+    by: tuple[str, str]
+    noise: tuple[float, float]
+    digits: tuple[float, float, float]
+    first_row: tuple[float, float]
+    units: tuple[Unit, Unit]
+    compared: int
+    in_file: int
+    used: Mapping[str, Sequence[str]]
+    unused: Mapping[str, str]
+    shape: str
+    explaining: Sequence[Explanation]
+    candidates: Sequence[Explanation]
+    tried: Sequence[Explanation]
+    quantities: Sequence[Quantity]
+    times: Array = field(repr=False)
+    series: Mapping[str, Array] = field(repr=False)
+
+    def show(self, errors: Sequence[float]) -> str:
+        """Return errors of attitudes and rates, as far as the recording has them, in their units."""
+        return " and ".join(unit.show(error) for error, unit in zip(errors, self.units, strict=True) if unit.size)
+
+    @property
+    def worse(self) -> int:
+        """0 if errors of attitudes are larger beside what is allowed, 1 if those of rates are."""
+        return int(np.argmax([e / a * bool(u.size) for e, a, u in zip(self.error, self.allowed, self.units, strict=True)]))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield all values of all quantities as rows with t, quantity and value."""
+        for name, values in self.series.items():
+            for t, value in zip(self.times.tolist(), values.tolist(), strict=True):
+                yield {"t": t, "quantity": name, "value": value}
+
+
+def verify_recording(
+    scene: Scene,
+    recording: Recording,
+    from_row: bool = True,
+    error: float | None = None,
+    tell: Callable[[str], object] = lambda _: None,
+    name: str = "",
+) -> Verification:
+    """Verify that a recording is a motion of a scene. The result has one finding, and `Details`.
+
+    Times of the file are times of the scene. The exact motion has the state of the first row at its time, or, if that has noise
+    or few digits, the state that fits all rows best; or the scene's initial state at t = 0.
+
+    Parameters
+    ----------
+    scene, recording
+        The motion that it should be, and the rows.
+    from_row
+        False if the exact motion starts as the scene does.
+    error
+        Allowed error, rad and relative to the largest rate. By default digits and noise decide.
+    tell
+        Receives the name of the next piece of work.
+    name
+        Name of the subject; by default the name of the file.
+
+    Raises
+    ------
+    BadInput
+        For an error that is not a number of 1e-12 or more, and for times at which a load has no value.
+    """
+    if error is not None and not 1e-12 <= (real_number(error) or 0.0) < math.inf:
+        got = describe(error) if real_number(error) is None else f"{error:g}"
+        raise BadInput("error", got, "a finite number of 1e-12 or more, which the exact motion is rounded to")
+    name = name or (recording.path.name if recording.path else "recording")
+    rows = prepare(rotation_only(scene), recording, from_row, error)
+    recording, notes = rows.recording, rows.notes
+    tell("compare")
+    found = compare(rows.case, recording, from_row)
+    shape_allowed = max(SHAPE, UNITS_OF_DIGITS * recording.digits[1], SIGMAS * rows.noise[0]) if error is None else error
+    shaped, explained = found.shape[0] <= shape_allowed, Diagnosis()
+    if found.outliers and not found.passed:
+        explained = Diagnosis([_single_rows(found)])
+    elif not found.passed:
+        tell("explain")
+        whole = replace(found.case, growth=found.parts[0].growth)
+        explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
+    # Numbers that are fitted to rows that a start can explain as well prove nothing.
+    hidden = not (found.passed or found.outliers) and error is None and found.case.hidden()
+    proven = [each for each in explained.named if each.explains and not (hidden and each.numbers)]
+    verdict, doubt = Verdict.WRONG, ""
+    if found.passed and shaped:
+        verdict, doubt = Verdict.RIGHT, found.undecided or recording.doubt(error)
+    elif error is None and shaped and not proven:
+        doubt = HIDDEN if hidden else _doubt(found.case, found.errors, rows.resolved, recording)
+    verdict = Verdict.UNDECIDED if doubt else verdict
+    case = found.case
+    if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
+        tell("moments")
+        fit = fit_moments(case)
+        notes += [f"{fit.sentence}."] * bool((np.array(fit.left) <= case.allowed).all())
+    notes += explained.notes
+    if len(found.parts) > 1:
+        notes.append(
+            f"The exact motion starts again in {len(found.parts) - 1} rows: it multiplies the rounding of a row too much."
+        )
+    if found.compared < recording.rows:
+        notes.append(f"{found.compared:,} of {recording.rows:,} rows are compared.")
+    series, units = _series(found, recording, from_row)
+    limits = [size * x for (_, size), x in zip(units, case.allowed.tolist(), strict=True) if size]
+    largest = found.worst.max(axis=1)
+    details = Details(
+        error=_pair(largest),
+        allowed=_pair(case.allowed),
+        by=rows.allowed.by,
+        noise=_pair(rows.noise),
+        digits=recording.digits,
+        first_row=_pair(found.alone),
+        units=units,
+        compared=found.compared,
+        in_file=recording.rows + sum(recording.left.values()),
+        used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
+        unused={shorten(column): reason for column, reason in recording.layout.unused.items()},
+        shape="" if shaped else _misshapen(found, recording),
+        explaining=tuple(proven),
+        candidates=() if proven else tuple(explained.named[:3]),
+        tried=tuple(explained.tried),
+        quantities=[
+            Quantity(quantity, float(x.max()), float(x[-1]), limits[i] if i < len(limits) else math.nan)
+            for i, (quantity, x) in enumerate(series.items())
+        ],
+        times=found.case.t[: len(found.errors[0])] + found.shift,
+        series=series,
+    )
+    worse = details.worse
+    causes = tuple(_cause(each, worse) for each in proven)
+    finding = Finding(
+        name,
+        "recording",
+        "",
+        verdict,
+        details.error[worse],
+        details.allowed[worse],
+        UNITS[worse],
+        details.by[worse],
+        causes,
+        doubt or details.shape,
+    )
+    notes += [*_instability(found), *(note for note in recording.layout.notes if note != "unit")]
+    return Verification(name, "recording", [finding], _reason(finding, details, proven), notes, details)
+
+
+def _pair(values: Array) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
+
+
+def _cause(found: Explanation, worse: int) -> Cause:
+    return replace(found.cause, left=found.left[worse], of=found.plain[worse])
+
+
+def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
+    """Return what decides the verdict: the errors, what is allowed, and the mistakes with what they leave."""
+    allowed = details.show(details.allowed)
+    verb = "are" if " and " in allowed else "is"
+    decided = [
+        f"its largest error is {details.show(details.error)}",
+        f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",
+        *([details.shape] if details.shape else []),
+    ]
+    causes = [
+        uncapitalised(each.sentence) + (f" (leaves {details.show(each.left)})" if max(each.plain) else "") for each in proven
+    ]
+    if finding.verdict is Verdict.UNDECIDED:
+        return "; ".join([finding.detail, *decided])
+    if causes:
+        return "; ".join([" or ".join(causes), *decided])
+    unknown = finding.verdict is Verdict.WRONG and not details.shape
+    return "; ".join([*decided, *(["no known mistake explains it"] if unknown else [])])
+
+
+def _single_rows(found: Comparison) -> Explanation:
+    number, at, size = found.outliers[0]
+    unit = UNITS[int(np.argmax(found.worst.max(axis=1)))]
+    text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
+    values = {"row": float(number), "time": at, "error": size}
+    return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
+
+
+def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
+    """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
+    single = max(recording.digits[1:]) > 1e-9
+    if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
+        return (
+            f"The error is larger than the digits of the file allow, and as small as that of a good solver in "
+            f"{'single' if single else 'double'} precision. An allowed error decides: --error"
+        )
+    if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
+        d = case.differences(*case.exact)
+        lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
+        if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
+            return "What is left looks like noise, but the rows are too far apart to tell. More rows a turn, or --error, decide"
+    return ""
+
+
+def _misshapen(found: Comparison, recording: Recording) -> str:
+    """Return the finding that matrices are not rotations, or quaternions not of norm 1."""
+    matrix, (size, t) = recording.layout.attitude == "matrix", found.shape
+    what = "The matrices are not rotations: |R'R - 1| is" if matrix else "The quaternions are not of norm 1: it differs by"
+    return f"{what} up to {size:.3g}, at {t:g} s. They are repaired before they are compared"
+
+
+def _series(found: Comparison, recording: Recording, from_row: bool) -> tuple[dict[str, Array], tuple[Unit, Unit]]:
+    """Return errors and drifts (n,) by their names, and the unit of errors of attitudes and rates, with its size or 0."""
+    case = found.case.take(slice(0, len(found.errors[0])))
+    R, w = case.data
+    unit = ("deg/s", float(np.degrees(case.scale))) if recording.degrees else ("rad/s", case.scale)
+    units = Unit("rad", float(R is not None)), Unit(unit[0], unit[1] * (w is not None))
+    series: dict[str, Array] = {
+        f"{name} error, {unit}": each * size
+        for name, (unit, size), each in zip(("attitude", "rate"), units, found.errors, strict=True)
+        if size
+    }
+    series |= _drifts(case, from_row)
+    if recording.shape is not None:
+        name = "|R'R - 1|" if recording.layout.attitude == "matrix" else "quaternion norm, minus 1"
+        series[name] = np.abs(recording.shape)[: len(case.t)]
+    return series, units
+
+
+def _instability(found: Comparison) -> list[str]:
+    """Return the note on energies that approach that of the intermediate axis."""
+    scene, w = found.case.scene, found.case.data[1]
+    if w is None or not scene.free or scene.body.rotor_momentum is not None or found.errors.max() <= FAR:
+        return []
+    J, L = np.sort(scene.body.moments), np.linalg.norm(scene.body.momentum(w), axis=1)
+    gap = np.abs(kinetic_energy(scene.body, w) * 2 * J[1] / np.where(L == 0, math.inf, L) ** 2 - 1)
+    near = gap[-len(gap) // 10 :].max() < 0.1 * gap[0]
+    return ["The energy approaches L^2/(2 I2): intermediate axis instability is created by the integrator."] * bool(near)
+
+
+def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
+    """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
+    (R, w), drifts = case.data, dict[str, Array]()
+    energy = None if case.scene.potential else find_energy(case.scene.invariants)  # rates alone determine that of a free body
+    for each in case.scene.invariants if w is not None else ():
+        if w is not None and each.supplied is None and (R is not None or each is energy):
+            R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R
+            drift = Trajectory(case.scene, case.t, R_WB, w, "file").drift(each)
+            # The initial value is that at t = 0, and the field may have turned until the first row.
+            drifts[f"drift of {each.name}"] = sizes(drift - drift[0] if from_row else drift)
+    return drifts

@@ -1,0 +1,277 @@
+"""Verification of anything: recordings, methods, engines, programs and model files, each by the checks that fit it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from shutil import which
+from typing import TYPE_CHECKING, Any
+
+from conservative import registry
+from conservative.check import choice
+from conservative.errors import BadInput
+from conservative.programs import list_programs
+from conservative.scene import Scene
+
+from .finding import CHECKS, Verification
+from .recordings.formats import ENDINGS
+
+if TYPE_CHECKING:
+    from conservative.method import Method
+
+Tell = Callable[[float, str], object]
+"""Called with the share of the work that is done, 0 to 1, and the next piece of it."""
+
+
+class Kind(StrEnum):
+    """What a subject is."""
+
+    RECORDING = "recording"
+    METHOD = "method"
+    ENGINE = "engine"
+    PROGRAM = "program"
+    MODEL = "model file"
+
+
+CHECKS_OF: dict[Kind, tuple[str, ...]] = {
+    Kind.RECORDING: ("recording",),
+    Kind.METHOD: ("motions", "order", "repeatability", "pairs"),
+    Kind.ENGINE: ("motions", "order", "repeatability", "pairs"),
+    Kind.PROGRAM: ("protocol", "motions", "order", "repeatability", "pairs", "times"),
+    Kind.MODEL: ("bodies",),
+}
+"""Checks of each kind of subject, in their order."""
+MODELS = (".urdf", ".sdf", ".mjcf", ".xml", ".usd", ".usda", ".usdc", ".usdz")
+"""Suffixes of model files."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A subject as the user wrote it, its kind, its file or None, and whether the user named its folder only."""
+
+    text: str
+    kind: Kind
+    path: Path | None = None
+    in_folder: bool = False
+
+
+def kind_of(text: str) -> Kind:
+    """Return the kind of a subject: a file, the name of a method or an engine, or a program. Raise `BadInput`."""
+    path = Path(text)
+    if path.is_file():
+        if path.suffix.lower() in MODELS:
+            return Kind.MODEL
+        return (
+            Kind.PROGRAM
+            if os.access(path, os.X_OK) and not path.suffix.lower().startswith((".csv", ".json"))
+            else Kind.RECORDING
+        )
+    words = _words(text)
+    if len(words) > 1 and which(words[0]):
+        return Kind.PROGRAM
+    name = registry.read_name(text, "subject") if len(words) == 1 and not set("/\\") & set(text) else None
+    if name is not None and name.base in list_programs():
+        return Kind.PROGRAM
+    if name is not None and name.base in registry.list_engines():
+        return Kind.ENGINE
+    if name is not None and name.base in registry.list_methods():
+        return Kind.METHOD
+    if len(words) == 1 and which(text):
+        return Kind.PROGRAM
+    allowed = "a file that exists, the name of an engine, a method or a program, or the command line of a program"
+    raise BadInput("subject", repr(text), allowed)
+
+
+def _words(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError:
+        return [text]
+
+
+def expand(texts: Sequence[str]) -> list[Subject]:
+    """Return the subjects of texts; a folder stands for its recordings and model files, by name. Raise `BadInput`."""
+    subjects = []
+    for text in texts:
+        if (folder := Path(text)).is_dir():
+            endings = (*ENDINGS, *MODELS)
+            files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(endings))
+            if not files:
+                raise BadInput("subject", f"the folder {text!r}", f"a folder with files that end in {', '.join(endings)}")
+            subjects += [Subject(str(path), kind_of(str(path)), path, in_folder=True) for path in files]
+        else:
+            kind = kind_of(text)
+            subjects.append(Subject(text, kind, Path(text) if kind in (Kind.RECORDING, Kind.MODEL) else None))
+    return subjects
+
+
+def verify(
+    subjects: str | os.PathLike[str] | Method | Sequence[str | os.PathLike[str] | Method],
+    body: str | os.PathLike[str] | Scene | None = None,
+    *,
+    engines: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    pairs: str | Sequence[str] = (),
+    search: Sequence[Path] = (),
+    start: str = "row",
+    error: float | None = None,
+    rates: str | None = None,
+    tell: Tell = lambda share, what: None,
+    **reading: Any,
+) -> list[Verification]:
+    """Verify subjects, and name the mistakes that explain what is wrong.
+
+    Parameters
+    ----------
+    subjects
+        Files of recorded motions, names of methods, engines or programs, command lines of programs, model files, folders of
+        files, or methods themselves. Two recordings are also compared with each other.
+    body
+        Scene, its name or its file, for recordings.
+    engines
+        Engines that load model files; by default those that are installed.
+    only
+        Names of checks, see `finding.CHECKS`; by default all that fit a subject.
+    pairs
+        Names of pairs of descriptions; by default all.
+    search
+        Folders of meshes and packages, for model files.
+    start, error, rates, **reading
+        For recordings: "row" or "scene", the allowed error, "body" or "world" for the axes of rates, and the other options of
+        `recordings.table.Options`.
+    tell
+        Called with the share of the work that is done and the next piece of it.
+
+    Returns
+    -------
+    list of Verification
+        One for each subject; one for two recordings.
+
+    Raises
+    ------
+    BadInput
+        A subject, a body or an option is unknown, or an option is not used by any subject.
+    MissingEngine
+        An engine is not installed.
+    """
+    given = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
+    if not given:
+        raise BadInput("subjects", "an empty list", "a path, a name, a method, or a list of them")
+    methods: list[Any] = [each for each in given if not isinstance(each, str | os.PathLike)]
+    for each in methods:
+        from conservative.method import Method  # here: recordings need no kernels
+
+        if not isinstance(each, Method):
+            raise BadInput("subjects", repr(each), "a path, a name, a method, or a list of them")
+    engines, only, pairs = ([each] if isinstance(each, str) else each for each in (engines, only, pairs))
+    choice("start", start, ("row", "scene"))
+    if rates is not None:
+        choice("rates", rates, ("body", "world"))
+        reading["world"] = rates == "world"
+    found = expand([os.fspath(each) for each in given if isinstance(each, str | os.PathLike)])
+    for name in only:
+        choice("only", name, tuple(CHECKS))
+    kinds = {each.kind for each in found} | ({Kind.METHOD} if methods else set())
+    begin = None if start == "row" else start
+    _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, start=begin, error=error, **reading)
+    if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
+        allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
+        raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
+    if pairs and only and "pairs" not in only:
+        raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
+    results: list[Verification] = []
+    if files := [each.path for each in found if each.kind is Kind.MODEL and each.path]:
+        from .bodies import verify_files
+
+        results += verify_files(files, engines, tell, search)
+    recordings = [each for each in found if each.kind is Kind.RECORDING]
+    if tables := [each.path for each in recordings if each.path]:
+        together = len(tables) == 2 and not any(each.in_folder for each in recordings)
+        results += _verify_recordings(tables, together, body, start, error, tell, reading)
+    for each in found:
+        if each.kind is Kind.PROGRAM:
+            results += _verify_program(each.text, only, pairs, tell)
+        elif each.kind in (Kind.ENGINE, Kind.METHOD):
+            from ..studies.selection import methods as select  # here: recordings need no kernels
+
+            results += [_verify_method(method, each.kind, only, pairs, tell) for method in select([each.text])]
+    return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
+
+
+def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
+    from .programs import verify_method
+
+    return verify_method(method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell)
+
+
+def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Iterator[Verification]:
+    """Yield the verification of a program with each of its settings; the protocol and the times are verified once."""
+    from conservative.references.environments.programs import UnusableProgram, find_program, read_program
+
+    from ..studies.selection import methods as select
+    from .programs import verify_program
+
+    checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
+    program = find_program(text.partition(":")[0])
+    if program is None:  # the command line of a program that is not registered
+        yield verify_program(text, read_program(text, "program"), checks, pairs, tell)
+        return
+    try:
+        first, *others = list[Any](select([text]))
+    except UnusableProgram:  # which is a finding
+        yield verify_program(text, program, checks, pairs, tell)
+        return
+    rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]
+    others = others if rest else []
+    yield verify_program(first.name if others else text, program, checks, pairs, tell, first)
+    for method in others:
+        yield _verify_method(method, Kind.PROGRAM, rest, pairs, tell)
+
+
+def _verify_recordings(
+    files: Sequence[Path],
+    together: bool,
+    body: str | os.PathLike[str] | Scene | None,
+    start: str,
+    error: float | None,
+    tell: Tell,
+    reading: Mapping[str, Any],
+) -> Iterator[Verification]:
+    """Yield the verification of each recording, or of two together, which are also compared with each other."""
+    from .recordings import table, verdict
+    from .recordings.layout import Options
+
+    if body is None:
+        raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
+    scene = body if isinstance(body, Scene) else registry.scene(os.fspath(body))
+    from_row = start == "row"
+    read = table.read_all(files, Options(**reading))
+    recordings = [(path.name, recording) for path, recording in zip(files, read, strict=True)]
+    if together:
+        from .recordings.two import verify_two
+
+        first, second = recordings
+        yield verify_two(scene, first, second, from_row, error, partial(tell, 0.0))
+        return
+    for name, recording in recordings:
+        yield verdict.verify_recording(scene, recording, from_row, error, partial(tell, 0.0), name)
+
+
+USED_BY: dict[str, tuple[Kind, ...]] = {
+    "engines": (Kind.MODEL,),
+    "search": (Kind.MODEL,),
+    "pairs": (Kind.METHOD, Kind.ENGINE, Kind.PROGRAM),
+}
+"""Kinds of subjects that use an option; all others are of recordings."""
+
+
+def _refuse_unused(kinds: set[Kind], **options: Any) -> None:
+    for name, value in options.items():
+        users = USED_BY.get(name, (Kind.RECORDING,))
+        if value not in (None, (), [], "") and not kinds & set(users):
+            raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")

@@ -1,0 +1,226 @@
+"""`conservative verify`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from conservative.errors import BadInput, require_extra
+
+from ..document import SVG_MARK
+from . import completion
+from .options import (
+    FilePath,
+    Output,
+    OutputCommand,
+    epilog,
+    error_option,
+    json_option,
+    names_option,
+    option,
+    output_files,
+    picture_file,
+    picture_option,
+    require_replaceable,
+    show,
+    split_names,
+)
+
+if TYPE_CHECKING:
+    from conservative.benchmarks.verification.finding import Verification
+    from conservative.benchmarks.verification.verify import Kind
+
+FILES = {
+    "verify.md": "# Verified: ",
+    "verify.json": '{\n  "verified": ',
+    "verify.csv": "subject,check,case",
+    "errors.csv": "t,quantity,value",
+    "errors.svg": SVG_MARK,
+}
+"""The files of `--out`, and how each begins. Only a recording has errors over time."""
+LISTS = ("only", "pairs", "engines")
+"""Options that take names between commas."""
+
+
+@click.command(
+    cls=OutputCommand,
+    short_help="Verify a recording, an engine, a program or a model file.",
+    codes={1: "a subject is wrong", 3: "none is wrong, and one is undecided or not tested"},
+    epilog=epilog(
+        "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
+        "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
+        "conservative verify ./my_engine 'python my_engine.py'           programs",
+        "conservative verify mujoco@3.12.0 drake:discrete                engines",
+        "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",
+        "conservative verify mujoco --only pairs --scripts scripts       a script for each pair that differs",
+        "conservative verify flight.parquet --body brick_flip --euler zyx --rates world --error 1e-3 --json",
+    ),
+)
+@click.argument("subjects", nargs=-1, metavar="SUBJECT...", shell_complete=completion.subjects)
+@click.option("--body", shell_complete=completion.scenes, help="Recordings: scene file or scene, with body, field and start.")
+@click.option(
+    "--columns",
+    metavar="MAP",
+    help="Recordings: columns by name or number, time=1,w=2:3:4,q=5:6:7:8 (R, euler, rotvec, mrp, crp).",
+)
+@click.option(
+    "--quaternion", type=click.Choice(["wxyz", "xyzw"]), help="Recordings: order of numbered columns.  [default: what fits]"
+)
+@click.option("--euler", metavar="ZYX", help="Recordings: sequence of Euler angles, zyx for yaw, pitch, roll.")
+@click.option(
+    "--rates", type=click.Choice(["body", "world"]), default="body", show_default=True, help="Recordings: axes of the rates."
+)
+@click.option(
+    "--units",
+    type=click.Choice(["deg", "rad", "deg/s", "rad/s"]),
+    help="Recordings: unit of angles and rates whose columns name none; with /s of rates only.",
+)
+@click.option(
+    "--start",
+    type=click.Choice(["row", "scene"]),
+    default="row",
+    show_default=True,
+    help="Recordings: the motion starts in the first row, or at the scene's t = 0.",
+)
+@click.option("--from", "start_time", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
+@click.option("--until", "end_time", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
+@error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: by digits and noise]")
+@names_option("only", "Checks to run: motions, order, repeatability, pairs, protocol, times.  [default: all]", "CHECKS")
+@names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
+@click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
+@names_option(
+    "engines", "Model files: engines or programs that load them.  [default: those installed]", "E,F", completion.engine_lists
+)
+@click.option("--search", multiple=True, type=FilePath(), help="Model files: folder of meshes and packages; repeatable.")
+@json_option
+@click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
+@click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
+@click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
+@option("out", f"Write {', '.join(FILES)} into this folder; the last two of a recording.", type=Output(FILES))
+@picture_option
+@click.pass_context
+def verify(
+    ctx: click.Context,
+    /,
+    subjects: tuple[str, ...],
+    as_json: bool,
+    junit: Path | None,
+    markdown: Path | None,
+    csv: Path | None,
+    out: Path | None,
+    picture: Path | None,
+    scripts: Path | None,
+    **given: Any,
+) -> None:
+    """Decide whether each SUBJECT is right, and name the mistakes that explain what is wrong.
+
+    A SUBJECT is a recording (CSV, STK or CCSDS attitudes, JSON lines, Parquet), an engine with a version or a setting, a method
+    of this package, a program (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder
+    of recordings or of model files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines
+    load the small model files of this package, each with one trap.
+
+    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided.
+    """
+    if picture is not None:
+        require_extra("conservative verify --picture", "report")
+    from conservative.benchmarks.verification.verify import Kind, expand, verify
+
+    from ..sections import verification as section
+    from ..terminal.progress import progress
+
+    names = [name for text in subjects for name in split_subject(text)]
+    if not names:
+        if not given["engines"]:
+            raise click.UsageError("Missing argument 'SUBJECT...'.")
+        from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
+
+        names = [str(CATALOGUE)]
+    every = [each.kind for each in expand(names)]
+    kinds, alone = set(every), every == [Kind.RECORDING]
+    options = used({"picture": picture, "scripts": scripts, **given}, kinds)
+    if picture is not None and not alone:
+        raise BadInput("picture", f"{len(every)} subjects", "one recording")
+    drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
+    left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
+    outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
+    title = f"verifying {', '.join(names)}"
+    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
+        found = verify(names, tell=step, **options)
+        made = {
+            "csv": lambda: section.findings_text(found),
+            "errors.csv": lambda: section.errors_text(found),
+            "errors.svg": lambda: draw(found),
+            "picture": lambda: draw(found, picture),
+        }
+        document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
+        written = write(document, **made)
+    show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
+    if scripts is not None:  # after the result, which a script that cannot be written must not cost
+        write_scripts(found, scripts, ctx.meta["force"])
+    ctx.exit(section.exit_code(found))
+
+
+def split_subject(text: str) -> list[str]:
+    """Return the subjects in an argument: a file or a command line is one, names of engines can be separated by commas."""
+    return [text] if Path(text).exists() or " " in text or "," not in text else split_names("subjects", (text,))
+
+
+def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
+    """Return the options on the command line as `verify` takes them. Raise `BadInput` for one that no subject uses."""
+    from conservative.benchmarks.verification.verify import USED_BY, Kind
+
+    ctx, options = click.get_current_context(), dict[str, Any]()
+    users_of = USED_BY | {"scripts": USED_BY["pairs"], "only": tuple(Kind)}
+    for name, value in given.items():
+        if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
+            continue
+        users = users_of.get(name, (Kind.RECORDING,))
+        if not set(kinds) & set(users):
+            flag = next(each.opts[0] for each in ctx.command.params if each.name == name)
+            got = f"{flag}, which none of the subjects uses ({', '.join(sorted(kinds))})"
+            raise BadInput(flag.lstrip("-"), got, f"a subject of the kind {', '.join(users)}")
+        if name not in ("picture", "scripts"):
+            options[name] = split_names(name, value) if name in LISTS else value
+    return options
+
+
+def facts() -> dict[str, str]:
+    """Return the machine and the versions that runs were made with; a recording has none."""
+    from ..run.provenance import provenance  # here: numba takes a second
+
+    return provenance().facts
+
+
+def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
+    """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
+    import pandas as pd
+
+    from ..charts import figures
+
+    (recording,) = found
+    details: Any = recording.details
+    limits = {each.name: each.allowed for each in details.quantities if math.isfinite(each.allowed)}
+    return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
+
+
+def write_scripts(found: Sequence[Verification], folder: Path, force: bool) -> None:
+    """Write a script of each pair that differs into a folder."""
+    from conservative.benchmarks.verification.pairs import PairFinding
+    from conservative.benchmarks.verification.pairs.script import MARK
+    from conservative.files import make_folder, write_text
+
+    findings = [finding for each in found for finding in each.findings]
+    scripts = {each.script_file: each.script for each in findings if isinstance(each, PairFinding) and each.script}
+    for name in scripts:
+        require_replaceable(folder / name, MARK, "scripts", force)
+    if scripts:
+        make_folder(folder, "scripts")
+    for name, text in scripts.items():
+        write_text(folder / name, text, "scripts")

@@ -1,0 +1,45 @@
+"""The mistakes that explain the motions of a method of a version, by the exact motions of the verification."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from conservative.benchmarks.verification.finding import Verdict
+from conservative.benchmarks.verification.programs import UNKNOWN, motion_findings, run_motions
+from conservative.benchmarks.versions.project import Explained
+from conservative.errors import Unsupported
+from conservative.grid import Grid
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+Solve = Callable[[Scene, Grid], Trajectory]
+
+
+def find_causes(solve: Solve, setting: Mapping[str, Any]) -> tuple[Explained, Explained]:
+    """Return the mistakes of a setting on free and on other bodies; those of free bodies hold for both.
+
+    `solve` raises `Unsupported` for a scene that is not supported. Its trajectories are not checked. `setting` has the keys
+    "order" and "precision".
+    """
+    free = _find(solve, setting, free=True)
+    return free, free if free.key else _find(solve, setting, free=False)
+
+
+def _find(solve: Solve, setting: Mapping[str, Any], free: bool) -> Explained:
+    def solve_some(scene: Scene, grid: Grid) -> Trajectory:
+        if scene.free != free:
+            raise Unsupported("scene", repr(scene.name), "a free body" if free else "a body that is not free")
+        return solve(scene, grid)
+
+    answers = run_motions(solve_some, setting["order"], setting.get("precision") == "f32", principal=True)
+    findings, named, _ = motion_findings("", answers)
+    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    if wrong and not named:
+        sentence = next((each.detail for each in wrong if each.detail), UNKNOWN)
+        return Explained("unknown", sentence)
+    causes = [[one.cause for one in each.explanations] for each in named]
+    return Explained(
+        "; ".join(" or ".join(cause.key for cause in same) for same in causes),
+        "; ".join(" or ".join(cause.sentence for cause in same) for same in causes),
+    )

@@ -1,0 +1,58 @@
+"""A recorded motion, or two: what was compared, what explains the error, and errors and drifts."""
+
+from __future__ import annotations
+
+from conservative.benchmarks.verification.finding import Verdict, Verification
+from conservative.benchmarks.verification.recordings.two import Two
+from conservative.benchmarks.verification.recordings.verdict import Details
+
+from ..document.cells import bound
+from ..document.model import Block, Items, Paragraph, Section, Table, filled
+
+LISTED = 12
+"""Mistakes that the table lists."""
+
+
+def recording_blocks(verification: Verification) -> list[Block]:
+    """Return the blocks on a recording that follow the sentence of its verdict: noise, mistakes, quantities, columns."""
+    details = verification.details
+    assert isinstance(details, Details)
+    (finding,) = verification.findings
+    sentences = []
+    if finding.by == "noise" and max(details.noise) > 0:
+        sentence = f"The noise of an axis is {details.show(details.noise)}"
+        if max(details.first_row) > 0:
+            sentence += f"; from the first row alone the motion is off by {details.show(details.first_row)}"
+            sentence += ", so its start is fitted"
+        sentences.append(f"{sentence}.")
+    proven, candidates = details.explaining, details.candidates
+    left = [
+        f"{each.sentence}: leaves {details.show(each.left)} of {details.show(each.plain)}"
+        for each in (proven if len(proven) > 1 else candidates)
+    ]
+    heading = "These explain the file equally well:" if len(proven) > 1 else ""
+    if verification.verdict is Verdict.WRONG and not proven:
+        heading = "No known mistake explains the error" + (": none of these candidates is proven." if candidates else ".")
+    compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in details.used.items())
+    used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
+    reasons = sorted(set(details.unused.values()), key=list(details.unused.values()).index)
+    unused = [
+        f"Not used: {', '.join(name for name, why in details.unused.items() if why == each)}: {each}." for each in reasons
+    ]
+    quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
+    tried = [] if proven else [[each.name, details.show(each.left)] for each in details.tried[:LISTED]]
+    return filled(
+        Paragraph(" ".join(sentences)) if sentences else None,
+        Paragraph(heading) if heading else None,
+        Items.of(left if heading else []),
+        Table(["quantity", "largest", "at the end"], quantities),
+        Table(["mistake that was tried", "error that is left"], tried),
+        Items.of([*used, *unused, *verification.notes]),
+    )
+
+
+def two_blocks(verification: Verification) -> list[Block]:
+    """Return the blocks on two recordings: those of each, in a section of its own."""
+    details = verification.details
+    assert isinstance(details, Two)
+    return [Section(f"{each.subject}: {each.verdict}", recording_blocks(each)) for each in (details.first, details.second)]

@@ -1,0 +1,245 @@
+"""Findings: the verdict on each subject in one sentence, the mistakes that explain what is wrong, and all cases."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification
+
+from ..document.cells import DASH, bound, listed
+from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
+from .bodies import body_blocks
+from .recording import recording_blocks, two_blocks
+
+Key = TypeVar("Key")
+SIGNS = {
+    Verdict.RIGHT: ("✓", Grade.GOOD),
+    Verdict.WRONG: ("✗", Grade.BAD),
+    Verdict.UNDECIDED: ("?", Grade.FAIR),
+    Verdict.NOT_TESTED: (DASH, Grade.NONE),
+}
+"""Symbol and grade of each verdict."""
+DECIDING = (Verdict.WRONG, Verdict.UNDECIDED, Verdict.NOT_TESTED, Verdict.RIGHT)
+"""Verdicts in the order in which they decide the verdict on several subjects: only right ones together are right."""
+LISTED = 4
+"""Cases that an item of a list names."""
+TERMS = (
+    "Right: the error is at most what is allowed. Undecided: the data does not decide. Not tested: the subject does not have "
+    "what the case needs. A mistake explains an error if it leaves at most what is allowed."
+)
+"""Explanation of the tables."""
+COLUMNS = ("subject", "check", "case", "verdict", "error", "allowed", "unit", "by", "mistakes", "explanation")
+"""Columns of findings as CSV."""
+OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {"recording": recording_blocks, "recordings": two_blocks}
+"""Blocks of kinds of subjects that have other data than cases, by `Verification.kind`."""
+MODEL = "model file"
+"""The kind of subjects that are shown together, in a table of files and engines."""
+
+
+def build(verifications: Sequence[Verification], made: Mapping[str, str] | None = None) -> Document:
+    """Return the document of verifications, which were made with the versions in `made`.
+
+    Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
+    """
+    order = sorted(verifications, key=lambda each: DECIDING.index(each.verdict))
+    models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
+    listed_alone = [*others, *(models if len(models) == 1 else ())]
+    sentences = [
+        Item(f"{each.sentence}.", each.subject * (each.kind == "recordings"), each.verdict is Verdict.WRONG)
+        for each in listed_alone
+    ]
+    lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
+
+    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
+        parts = [*([("Model files", body_blocks(models))] if models else []), *((each.subject, make(each)) for each in shown)]
+        return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
+
+    return Document(
+        "conservative verify",
+        f"Verified: {', '.join(each.subject for each in verifications)}",
+        [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary, [each for each in others if len(order) == 1 or each.verdict is not Verdict.RIGHT]),
+        data={
+            "verified": [each.subject for each in verifications],
+            "verdict": order[0].verdict,
+            "made": dict(made or {}),
+            "subjects": [content(each) for each in verifications],
+        },
+        checks=[_check(each.subject, finding) for each in verifications for finding in each.findings],
+        failures=[f"{each.sentence}." for each in order if each.verdict is Verdict.WRONG],
+    )
+
+
+def exit_code(verifications: Iterable[Verification]) -> int:
+    """Return the exit code of a command: of a wrong subject if there is one, otherwise of an undecided or untested one."""
+    return EXIT_CODES[min((each.verdict for each in verifications), key=DECIDING.index)]
+
+
+def content(verification: Verification) -> dict[str, Any]:
+    """Return a verification for JSON: its fields, its verdict and its sentence."""
+    return {"sentence": verification.sentence, "verdict": verification.verdict, **vars(verification)}
+
+
+def findings_text(verifications: Iterable[Verification]) -> str:
+    """Return the findings as CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for verification in verifications:
+        for each in verification.findings:
+            mistakes = "; ".join(cause.key for cause in each.causes)
+            plain = [getattr(each, name) for name in COLUMNS[:-2]]
+            writer.writerow([*plain, mistakes, explanation(each)])
+    return stream.getvalue()
+
+
+def errors_text(verifications: Sequence[Verification]) -> str:
+    """Return errors and drifts of a recording over time as CSV: t, quantity and value."""
+    (recording,) = verifications
+    details: Any = recording.details
+    return "t,quantity,value\n" + "".join(f'{row["t"]!r},"{row["quantity"]}",{row["value"]!r}\n' for row in details.rows())
+
+
+def summary(verification: Verification) -> list[Block]:
+    """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
+    if verification.kind in OWN:
+        return list(OWN[verification.kind](verification))
+    pairs, others = _pairs(verification)
+    differ = _pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
+    return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
+
+
+def details(verification: Verification) -> list[Block]:
+    """Return the blocks of `summary`, and tables of the cases of each check."""
+    if verification.kind in OWN:
+        return summary(verification)
+    pairs, others = _pairs(verification)
+    tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
+    right = _pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
+    return filled(*summary(verification), *tables, *right)
+
+
+def _pair_blocks(findings: Sequence[Finding]) -> list[Block]:
+    if not findings:
+        return []
+    from .pairs import pair_blocks  # here: it needs kernels, which recordings do without
+
+    return pair_blocks(findings)
+
+
+def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
+    """Return the findings on pairs, which have tables of their own, and the others."""
+    pairs = [each for each in verification.findings if each.check == "pairs"]
+    return pairs, [each for each in verification.findings if each.check != "pairs"]
+
+
+def mistakes(findings: Iterable[Finding]) -> Items:
+    """Return the wrong cases by what explains them, the explanation of the most cases first."""
+    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    groups = sorted(grouped(wrong, lambda each: (each.check, named_by(each))), key=lambda group: -len(group[1]))
+    items = [Item(explanation(some[0]), f"{check}: {_cases_of(some)}".removesuffix(": "), True) for (check, _), some in groups]
+    return Items(items)
+
+
+def explanation(finding: Finding) -> str:
+    """Return the mistakes that explain a finding, or else its detail."""
+    causes = [_cause(each, finding.unit) for each in finding.causes]
+    if len(causes) > 1:
+        return f"{len(causes)} mistakes explain it equally well: {'; '.join(causes)}"
+    if causes:
+        return "; ".join(filter(None, (causes[0], finding.detail)))
+    unknown = "no known mistake explains it" if finding.verdict is Verdict.WRONG and not math.isnan(finding.error) else ""
+    return finding.detail or unknown
+
+
+def _cause(cause: Cause, unit: str) -> str:
+    left = "" if math.isnan(cause.left) else f" (leaves {bound(cause.left)} of {_amount(cause.of, unit)})"
+    return f"{cause.sentence}{left}" + (f": {cause.remedy}" if cause.remedy else "")
+
+
+def _amount(error: float, unit: str) -> str:
+    return DASH if math.isnan(error) else f"{bound(error)} {unit}".rstrip()
+
+
+def _sentence(verifications: Sequence[Verification]) -> str:
+    if len(verifications) == 1:
+        return f"{verifications[0].sentence}."
+    counts = Counter(each.verdict for each in verifications)
+    if len(counts) == 1:
+        return f"All {len(verifications)} subjects are {verifications[0].verdict}."
+    words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
+    return f"Of {len(verifications)} subjects, {listed(words)}."
+
+
+def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
+    """Return findings by their keys, in their order."""
+    groups: dict[Key, list[Finding]] = {}
+    for each in findings:
+        groups.setdefault(key(each), []).append(each)
+    return list(groups.items())
+
+
+def named_by(finding: Finding) -> str:
+    """Return the key of what explains a finding; a finding without a mistake is explained by its detail."""
+    return "; ".join(cause.key for cause in finding.causes) or finding.detail
+
+
+def _cases_of(findings: Sequence[Finding]) -> str:
+    names = [each.case for each in findings if each.case]
+    more = f" and {len(names) - LISTED} more" * (len(names) > LISTED)
+    return ", ".join(names[:LISTED]) + more
+
+
+def _remarks(findings: Sequence[Finding]) -> Items:
+    """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
+    told = (each for each in findings if each.verdict is Verdict.RIGHT and each.detail and each.check != "order")
+    undecided = (each for each in findings if each.verdict is Verdict.UNDECIDED)
+    groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
+    return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
+
+
+def numbers(findings: Sequence[Finding]) -> list[str]:
+    """Return the numbers of findings with each verdict, in the order of `SIGNS`."""
+    return [str(sum(each.verdict is verdict for each in findings)) for verdict in SIGNS]
+
+
+def _counts(verification: Verification) -> Table | None:
+    """Return the number of cases by check and verdict; None of a subject with one case."""
+    body = [[check, *numbers(some)] for check, some in grouped(verification.findings, lambda each: each.check)]
+    return Table(["check", *SIGNS], body, "Cases") if len(verification.findings) > 1 else None
+
+
+def _cases(check: str, findings: Sequence[Finding]) -> Table:
+    body: list[Row] = [
+        [
+            each.case or each.subject,
+            _verdict(each.verdict),
+            Cell(_amount(each.error, each.unit), value=each.error),
+            Cell(_amount(each.allowed, each.unit), value=each.allowed),
+            each.by or DASH,
+            explanation(each) or DASH,
+        ]
+        for each in findings
+    ]
+    return Table(["case", "verdict", "error", "allowed", "allowed by", "explanation"], body, check.capitalize())
+
+
+def _verdict(verdict: Verdict) -> Cell:
+    sign, grade = SIGNS[verdict]
+    return Cell(f"{sign} {verdict}", grade)
+
+
+def _check(subject: str, finding: Finding) -> Check:
+    """Return a finding as a test case. A case that is undecided or not tested is skipped, which says why."""
+    why = explanation(finding)
+    name = f"{finding.check}: {finding.case}".removesuffix(": ")
+    if finding.verdict is Verdict.WRONG:
+        return Check(subject, name, failure=why or str(finding.verdict))
+    if finding.verdict is Verdict.RIGHT:
+        return Check(subject, name, output=why)
+    return Check(subject, name, skipped=f"{finding.verdict}: {why}".removesuffix(": "))

@@ -1,0 +1,396 @@
+"""Motions as files: every digit by a second solution, tolerances, and the tests of references/motions in each language."""
+
+import contextlib
+import csv
+import importlib.util
+import json
+import math
+import re
+import subprocess
+from itertools import product
+
+import mpmath
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from conservative.attitude import angle_between, from_quaternion
+from conservative.benchmarks.verification.motions import files, programs
+from conservative.benchmarks.verification.motions.integrators import ATTITUDES, VARIABLES, designs
+from conservative.benchmarks.verification.motions.motion import SAMPLE, load
+from conservative.benchmarks.verification.motions.signatures import names as mistake_names
+from conservative.benchmarks.verification.motions.signatures import signatures
+from conservative.grid import Grid
+from conservative.potentials.turning import Turning
+from conservative.references import precise
+from conservative.references.collocation import collocate
+from conservative.reports.cli.main import main
+
+from .motions_engines.methods import METHODS
+from .motions_engines.run import LANGUAGES, MOTIONS, missing, run
+from .right_programs import right_programs
+from .wrong_programs import wrong_programs
+
+CATALOGUE = {motion.name: motion for motion in load()}
+FILES = {name: json.loads((MOTIONS / f"{name}.json").read_text()) for name in CATALOGUE}
+RIGHT, WRONG = right_programs(), wrong_programs()
+slow = pytest.mark.slow
+
+
+def test_files_and_their_sizes():
+    sizes = {path.name: path.stat().st_size for path in MOTIONS.iterdir() if path.suffix in (".json", ".csv")}
+    assert sizes.keys() == {f"{name}.{kind}" for name in CATALOGUE for kind in ("json", "csv")}
+    assert len(CATALOGUE) == 48
+    assert sum(sizes.values()) < 600_000
+    assert max(sizes.values()) <= 20_000
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_files_are_the_solution_to_the_last_digit(name):
+    """CSV and JSON have the same numbers, and these are what the solution gives now."""
+    motion, kept = CATALOGUE[name], FILES[name]
+    for key in SAMPLE:
+        np.testing.assert_array_equal(np.array(kept[key]), motion.exact[key][1:])
+    assert (MOTIONS / f"{name}.csv").read_text() == files.as_csv(kept)
+    rows = list(csv.reader((MOTIONS / f"{name}.csv").read_text().splitlines()))
+    numbers = [[float(x) for x in row[1:]] for row in rows if row[0] == "sample"]
+    np.testing.assert_array_equal(np.array(numbers)[:, 10:14], kept["quaternion_wxyz"])
+    np.testing.assert_array_equal(np.array(numbers)[:, 21:], kept["momentum_W"])
+
+
+@pytest.mark.parametrize("name", [name for name, motion in CATALOGUE.items() if not motion.scene.loaded])
+def test_digits_by_heyoka_in_256_bits(name):
+    """heyoka's Taylor integrator shares no code with the solution. Measured: no digit differs."""
+    pytest.importorskip("heyoka")
+    motion = CATALOGUE[name]
+    scene, kept = motion.scene, FILES[name]
+    with mpmath.workprec(300):
+        exact = mpmath.mpf  # products of parameters are not rounded to double
+        values = [exact(x) for x in motion.rotor_momentum_B or (0, 0, 0)]
+        if motion.weight:
+            values += [exact(motion.weight) * exact(x) for x in motion.com_B]
+        if motion.orbit:
+            field = scene.potential
+            assert isinstance(field, Turning)
+            inertia = np.ravel(motion.inertia_B).tolist()
+            values += [motion.orbit, 0, 0, 1, 3 * exact(motion.orbit) ** 2, *inertia, 1, 0, 0]
+        form = precise.find_field(scene.potential)
+        solve = precise._solver(motion.inertia_B, motion.quaternion, list(map(float, motion.rates)), form, values, 256)
+    _, _, reals = solve(precise._reals([0.0, *motion.t], 256), None)
+    found = np.array([[float(x) for x in row] for row in reals])[1:]
+    np.testing.assert_array_equal(found[:, :4], kept["quaternion_wxyz"])
+    np.testing.assert_array_equal(found[:, 4:], kept["w_WB_B"])
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_digits_by_collocation(name):
+    """Collocation in extended precision, for torque and damping too. Measured: 4.5e-16 (matrices), 2e-16, 4e-16 and 3e-16."""
+    motion, kept = CATALOGUE[name], FILES[name]
+    found = collocate(motion.scene, Grid(motion.steps * motion.step, motion.samples), 8)
+    R, w = found.R_WB[1:], found.w_WB_B[1:]
+    L = w @ np.array(motion.inertia_B)
+    energy = (w * L).sum(axis=1) / 2 + (motion.scene.potential.energy(R) if motion.weight else 0)
+    momentum = np.einsum("nij,nj->ni", R, L + np.array(motion.rotor_momentum_B or [0, 0, 0]))
+    assert np.abs(R - kept["R_WB"]).max() <= 1e-15
+    for key, value in (("w_WB_B", w), ("energy", energy), ("momentum_W", momentum)):
+        size = np.abs(kept[key]).max() if key != "energy" else kept["scale"]["energy"] + np.abs(kept["energy"]).max()
+        assert np.abs(value - kept[key]).max() <= 1e-15 * size
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_what_a_sample_says_agrees(name):
+    """The quaternion is that of the matrix, and continuous; world rates are the turned body rates."""
+    kept = FILES[name]
+    R, q = np.array([kept["R_WB0"], *kept["R_WB"]]), np.array([kept["quaternion_wxyz0"], *kept["quaternion_wxyz"]])
+    assert np.abs(from_quaternion(q) - R).max() <= 4e-16
+    assert (np.sum(q[1:] * q[:-1], axis=1) > 0).all()
+    assert np.abs(np.einsum("nij,nj->ni", R[1:], kept["w_WB_B"]) - kept["w_WB_W"]).max() <= 1e-15 * kept["scale"]["rates"]
+    assert np.linalg.eigvalsh(kept["inertia_B"])[2] <= np.trace(kept["inertia_B"]) / 2  # the body exists
+    if "weight" in kept:  # also about its centre of mass
+        c, mass = np.array(kept["com_B"]), kept["weight"] / -kept["gravity_W"][2]
+        own = np.linalg.eigvalsh(np.array(kept["inertia_B"]) - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+        assert own[0] > 0
+        assert own[2] <= own[0] + own[1]
+
+
+def test_quaternions_pass_zero():
+    starts = {name: [kept["quaternion_wxyz0"][0], *(q[0] for q in kept["quaternion_wxyz"])] for name, kept in FILES.items()}
+    assert sum(min(x) < 0 < max(x) for x in starts.values()) >= 5
+
+
+def test_coarse_tolerances_are_measured_again():
+    """At the largest step, with all designs; the command below measures all. A tolerance is rounded up to two digits."""
+    motions = [CATALOGUE[name] for name in ("tiny", "torque_strong", "damped", "rotor_turned", "half_turn", "golden_4")]
+    for motion, measured in zip(motions, programs.measure(motions, (1,)), strict=True):
+        kept = FILES[motion.name]
+        assert kept["single"] == pytest.approx(programs.single(motion), rel=0.05)
+        for (order, angle), values in measured.tolerances.items():
+            (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (order, angle))
+            assert [row[name] for name in programs.QUANTITIES] == values.tolist()
+
+
+def test_signatures_are_computed_again():
+    motions = [CATALOGUE[name] for name in ("damped", "rotor_turned", "torque_strong")]
+    for motion, found in zip(motions, signatures(motions), strict=True):
+        (allowed,) = (each for each in FILES[motion.name]["tolerance"] if (each["order"], each["angle"]) == (2, 0.01))
+        made = files.catches(motion, np.array([allowed[name] for name in programs.QUANTITIES]), found)
+        assert [each["mistake"] for each in made] == [each["mistake"] for each in FILES[motion.name]["catches"]]
+        for new, old in zip(made, FILES[motion.name]["catches"], strict=True):
+            for name in programs.QUANTITIES:
+                assert new[name] == pytest.approx(old[name], rel=0.05)
+
+
+@slow
+def test_the_command_writes_the_files_again(tmp_path):
+    done = CliRunner().invoke(main, ["motions", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert len(list(tmp_path.iterdir())) == 96
+    for path in tmp_path.iterdir():
+        assert path.read_text() == (MOTIONS / path.name).read_text(), path.name
+
+
+def test_the_command_replaces_no_other_file(tmp_path):
+    (tmp_path / "separatrix.csv").write_text("mine\n")
+    done = CliRunner().invoke(main, ["motions", "--out", str(tmp_path)])
+    assert (done.exit_code, (tmp_path / "separatrix.csv").read_text()) == (2, "mine\n")
+    assert "--force" in done.output
+    for name, mark in files.marks():
+        assert mark in (MOTIONS / name).read_text()[:4096]
+
+
+@pytest.mark.parametrize("order", programs.ORDERS)
+def test_designs_have_their_order(order):
+    """Errors of attitudes fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.05 of the order."""
+    motions = [CATALOGUE["world_tensor"], CATALOGUE["heavy"], CATALOGUE["damped_and_driven"]]
+    scale, all_of = programs.sizes(motions), designs(order)
+    assert {(each.attitude, each.variable) for each in all_of} == set(product(ATTITUDES, VARIABLES))
+    for each in all_of[:: 1 if order < 4 else 5]:
+        coarse, fine = (programs.errors(motions, scale, each.run(motions, parts)) for parts in (1, 10))
+        assert np.abs(np.log10(coarse / fine)[:, 0] - order).max() <= 0.1, each.name
+
+
+@slow
+@pytest.mark.parametrize(("order", "single"), [(2, False), (1, True), (2, True), (4, True)])
+def test_all_designs_are_right(order, single):
+    """Measured: 0.5 in double precision, which is the margin; 0.53, and 0.996 of composed splitting, in single."""
+    motions = list(CATALOGUE.values())
+    scale = programs.sizes(motions)
+    limits = np.array([
+        [row[name] + single * FILES[motion]["single"] for name in programs.QUANTITIES]
+        for motion in CATALOGUE for row in FILES[motion]["tolerance"] if (row["order"], row["angle"]) == (order, 0.01)
+    ])  # fmt: skip
+    for each in designs(order, single)[:: 1 if order < 4 else 3]:
+        assert (programs.errors(motions, scale, each.run(motions, 10)) / limits).max() <= 1, each.name
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_right_programs_of_other_code_pass(name):
+    """Plain Python, which shares no code with the designs of the tolerances. Measured: 0.5 of the tolerance at most."""
+    program = RIGHT[name]
+    for motion in FILES.values():
+        (row,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (program.order, 0.01))
+        R, w = program.solve(motion, motion["t"][0] / row["steps"], row["steps"])
+        attitude, rates = files.tolerance(CATALOGUE[motion["name"]], program.order, program.single)
+        assert angle_between(R, motion["R_WB"]).max() <= attitude, motion["name"]
+        assert np.linalg.norm(w - motion["w_WB_B"], axis=1).max() <= rates * motion["scale"]["rates"], motion["name"]
+
+
+def test_every_mistake_is_caught_by_a_factor_of_ten():
+    best = dict.fromkeys(mistake_names(), 0.0)
+    for kept in FILES.values():
+        (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (2, 0.01))
+        for each in kept["catches"]:
+            factor = max(each[name] / row[name] for name in programs.QUANTITIES)
+            best[each["mistake"]] = max(best[each["mistake"]], factor)
+    unseen = {name for name, factor in best.items() if factor < 10}
+    assert unseen == {"no reaction of the motor", "sign of the reaction of the motor"}  # no motion has a motor
+
+
+def test_order_one_allows_what_order_two_does_not():
+    """A program that declares order 1 passes with stale rates."""
+    for kept in FILES.values():
+        one, two = (
+            next(each for each in kept["tolerance"] if (each["order"], each["angle"]) == (order, 0.01)) for order in (1, 2)
+        )
+        for each in kept["catches"]:
+            if each["mistake"] in ("stale rates", "attitude by normalisation"):
+                assert all(each[name] <= one[name] for name in programs.QUANTITIES)
+                assert any(each[name] > two[name] for name in programs.QUANTITIES)
+
+
+def needs(language):
+    return pytest.param(language, marks=[pytest.mark.skipif(bool(missing(language)), reason=str(missing(language)))])
+
+
+RK2 = METHODS["explicit midpoint"][1]
+ALL = [needs(language) for language in LANGUAGES]
+EXPLAINS = re.compile(r'"(.+)" explains (\d+) of them')
+
+
+def summary(lines):
+    """Return the number of failing motions, the mistakes of the summary with their numbers of motions, and its other lines."""
+    (at,) = (i for i, line in enumerate(lines) if line.endswith("motions failed"))
+    explained = [EXPLAINS.fullmatch(line) for line in lines[at + 1 :]]
+    return (
+        int(lines[at].partition(" ")[0]),
+        {each[1]: int(each[2]) for each in explained if each},
+        [line for line, each in zip(lines[at + 1 :], explained, strict=True) if not each],
+    )
+
+
+@pytest.mark.parametrize("language", ALL)
+def test_right_program_passes(language, tmp_path):
+    assert run(language, tmp_path, "", RK2, 2) == ["0 of 48 motions failed"]
+
+
+@pytest.mark.parametrize("language", ALL)
+def test_mistake_is_named_by_the_summary(language, tmp_path):
+    """Two turns about one axis pass."""
+    lines = run(language, tmp_path, "wrong side", RK2, 2)
+    assert summary(lines) == (46, {"wrong side": 46}, [])
+    assert re.search(r"\w+: (attitude|rates|energy|momentum) error [\d.e+-]+, tolerance [\d.e+-]+$", lines[0])
+
+
+@pytest.mark.parametrize("language", [ALL[0], *(pytest.param(each.values[0], marks=[*each.marks, slow]) for each in ALL[1:])])
+def test_lower_order_than_declared_is_measured(language, tmp_path):
+    failing, explained, rest = summary(run(language, tmp_path, "", METHODS["explicit Euler"][1], 2))
+    assert failing >= 40
+    assert explained == {}
+    assert rest[0] == "this program has order 1.0, 2 was declared"
+
+
+def test_right_program_above_a_tolerance_passes_with_a_note(tmp_path, monkeypatch):
+    """With two per cent of the tolerances motions are above, and all errors fall as h^2."""
+    lines = run("C", tmp_path, "", RK2, 2, share=0.02)
+    assert summary(lines)[0] == 0
+    assert len(lines) >= 10
+    assert all(re.search(r" % above the tolerance, falls as h\^2\.\d: right$", line) for line in lines[:-1])
+
+
+def planted(language):
+    """C runs all mistakes; the other languages do with --all."""
+    return [pytest.param(language, mistake, marks=[] if language == "C" else [slow]) for mistake in PLANTED]
+
+
+PLANTED = [
+    "R I for R I R'", "attitude by normalisation", "axes of the torque", "damping 0.01", "damping 0.05",
+    "diagonal gyroscopic term", "half a step late", "inertia in world axes", "inertia of the start",
+    "no gyroscopic term + damping 0.05", "no products of inertia", "order xyzw", "rate limit 100", "reversed rates",
+    "sign of the field", "sign of the gyroscopic term", "sign of the products of inertia", "sign of the rotor",
+    "sign of the torque", "sleep", "smallest moments", "stale rates", "transposed", "turning of the field",
+    "without the damping", "without the field", "without the rotor", "without the torque", "world rates",
+]  # fmt: skip
+"""Mistakes of the engines in all languages."""
+ALSO = ["damping 0.02", "damping 0.1", "dead band 0.01", "factor one half", "inverted inertia", "rate limit 7"]
+"""Further mistakes of the engine in C."""
+AMBIGUOUS = {"attitude by normalisation": "stale rates"}
+"""Mistakes whose errors are those of another one."""
+
+
+@pytest.mark.parametrize(
+    ("language", "mistake"), [*(each for language in LANGUAGES for each in planted(language)), *(("C", each) for each in ALSO)]
+)
+def test_planted_mistakes_are_named_by_the_summary(language, mistake, tmp_path):
+    """Measured: the mistake explains 70 % of the failing motions (stale rates) or more, most of them all."""
+    if missing(language):
+        pytest.skip(missing(language))
+    failing, explained, _ = summary(run(language, tmp_path, mistake, RK2, 2))
+    first = next(iter(explained))
+    assert AMBIGUOUS.get(first, first) == AMBIGUOUS.get(mistake, mistake)
+    assert explained[first] >= 0.65 * failing > 0
+
+
+NEVER_NAMED_BEFORE = {
+    "wrong side",
+    "factor 1/2",
+    "inertia inverted",
+    "damping 0.1",
+    "damping 0.02",
+    "limit",
+    "dead band",
+    "sleep",
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(each, marks=[slow] * (each not in NEVER_NAMED_BEFORE)) for each in WRONG])
+def test_wrong_programs_are_named_by_the_summary_in_python(name, monkeypatch):
+    """Programs that share no code with the catalogue."""
+    program, test = WRONG[name], load_test()
+    monkeypatch.setattr(test, "simulate", program.simulate)
+    monkeypatch.setattr(test, "ORDER", program.order)
+    for path in sorted(MOTIONS.glob("*.json")):
+        with contextlib.suppress(pytest.fail.Exception):
+            test.test_motion(path)
+    failing, explained, rest = summary(test.summary())
+    if program.key == "explicit Euler":
+        assert rest[0] == "this program has order 1.0, 2 was declared"
+    else:
+        first = next(iter(explained))
+        assert re.sub(r" [\d.]+$", "", first) == program.key
+        assert explained[first] >= 0.65 * failing
+
+
+def load_test():
+    """Return a fresh copy of test_motions.py as a module."""
+    spec = importlib.util.spec_from_file_location("copied_test", MOTIONS / "test_motions.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def all_methods(language):
+    """C runs all methods; the other languages run two in double precision with --all, and the rest with --attack."""
+    for method, (single, precision) in product(METHODS, ((False, "double"), (True, "float"))):
+        usual = not single and method in ("RK 3/8", "Gauss 4")
+        marks = [] if language == "C" else [slow if usual else pytest.mark.attack]
+        yield pytest.param(language, method, single, marks=marks, id=f"{language}-{method}-{precision}")
+
+
+@pytest.mark.parametrize(("language", "method", "single"), [each for language in LANGUAGES for each in all_methods(language)])
+def test_right_programs_pass(language, method, single, tmp_path):
+    """Explicit and implicit methods that are not among those of the tolerances, in double and single precision."""
+    if missing(language):
+        pytest.skip(missing(language))
+    order, numbers = METHODS[method]
+    for angle in programs.ANGLES if language == "C" else (0.01,):
+        assert run(language, tmp_path, "", numbers, order, angle, single) == ["0 of 48 motions failed"], angle
+
+
+@pytest.mark.skipif(bool(missing("C#")), reason=str(missing("C#")))
+def test_c_sharp_is_built_and_run(tmp_path):
+    """As it is: the body stands still, so that every motion fails."""
+    subprocess.run(["mcs", "-out:test.exe", MOTIONS / "Test.cs"], check=True, cwd=tmp_path)
+    done = subprocess.run(["mono", "test.exe", *sorted(MOTIONS.glob("*.csv"))], cwd=tmp_path, text=True, capture_output=True)
+    assert summary(done.stdout.splitlines()) == (48, {"frozen motion": 48}, [])
+
+
+def test_every_tolerance_is_above_round_off():
+    for kept in FILES.values():
+        for each in kept["tolerance"]:
+            assert min(each[name] for name in programs.QUANTITIES) >= programs.LEAST[each["order"]]
+            assert all(math.isfinite(each[name]) for name in programs.QUANTITIES)
+
+
+def test_an_engine_that_does_nothing_fails():
+    """The files as they are: `simulate` returns the start."""
+    R0 = np.array([kept["R_WB0"] for kept in FILES.values()])
+    ends = np.array([kept["R_WB"][-1] for kept in FILES.values()])
+    assert angle_between(R0, ends).min() >= 10 * max(each["tolerance"][5]["attitude"] for each in FILES.values())
+
+
+@pytest.mark.skipif(bool(missing("C++")), reason="needs g++")
+def test_the_engine_on_the_page(tmp_path):
+    """Explicit Euler steps of a diagonal inertia: bodies in principal axes pass, the others fail with this mistake."""
+    (code,) = re.findall(r"```cpp\n(.*?)```", (MOTIONS / "README.md").read_text(), re.DOTALL)
+    text = re.sub(
+        r"^std::vector<State> simulate.*?^}\n", lambda _: code, (MOTIONS / "test.cpp").read_text(), flags=re.DOTALL | re.M
+    )
+    text = text.replace("ORDER = 2", "ORDER = 1").replace('HAS = "rotor,torque,damping,fixed point,orbit"', 'HAS = ""')
+    (tmp_path / "test.cpp").write_text(text)
+    subprocess.run(LANGUAGES["C++"][2], check=True, cwd=tmp_path)
+    files_of = sorted(str(path) for path in MOTIONS.glob("*.csv"))
+    lines = subprocess.run(["./a.out", *files_of], cwd=tmp_path, text=True, capture_output=True).stdout.splitlines()
+    told = [line for line in lines if " error " in line]
+    tilted = {name for name, kept in FILES.items() if not kept["needs"] and np.count_nonzero(kept["inertia_B"]) > 3}
+    assert {line.partition(".csv")[0].rpartition("/")[2] for line in told} == tilted
+    assert summary(lines) == (len(tilted), {"no products of inertia": len(tilted)}, [])

@@ -1,0 +1,159 @@
+"""Rows that are left out, times that go on, and columns that forbid the verdict "right"."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from conservative.benchmarks.verification.recordings.table import Options, read
+from conservative.benchmarks.verification.recordings.verdict import verify_recording
+from conservative.errors import BadInput
+
+from .made import FREE, T, exact
+
+R, W = exact(FREE)
+Q = Rotation.from_matrix(R).as_quat(scalar_first=True)
+RATES = {f"w_{axis} (rad/s)": W[:, i] for i, axis in enumerate("xyz")}
+QUATERNION = {f"q_{part}": Q[:, i] for i, part in enumerate("wxyz")}
+MOTION = {**QUATERNION, **RATES}
+
+
+def verify(folder, table, **options):
+    """The verification of a table, whose numbers are written with 17 digits, nan as an empty field."""
+    values = [np.asarray(column) for column in table.values()]
+    rows = ["" if x != x else f"{x:.17g}" for row in zip(*values, strict=True) for x in row]
+    lines = [",".join(rows[i : i + len(values)]) for i in range(0, len(rows), len(values))]
+    (folder / "run.csv").write_text("\n".join([",".join(table), *lines]) + "\n")
+    return verify_recording(FREE, read(folder / "run.csv", Options(**options)))
+
+
+def with_nan(rows):
+    return {name: np.where(rows, np.nan, x) if name in QUATERNION else x for name, x in MOTION.items()}
+
+
+def test_rows_without_numbers_are_gaps_but_not_at_the_end(tmp_path):
+    found = verify(tmp_path, {"t": T} | with_nan((T > 2) & (T < 3)))
+    assert found.verdict == "right"
+    assert (found.details.compared, found.details.in_file) == (102, 121)
+    assert verify(tmp_path, {"t": T} | with_nan(T > 5)).verdict == "undecided"  # a program that ends in nan
+
+
+def test_the_same_row_twice_is_read_once(tmp_path):
+    twice = np.repeat(np.arange(len(T)), np.where(np.arange(len(T)) % 7 == 3, 3, 1))
+    found = verify(tmp_path, {"t": T[twice]} | {name: x[twice] for name, x in MOTION.items()})
+    assert (found.verdict, found.details.in_file - found.details.compared) == ("right", len(twice) - len(T))
+    with pytest.raises(BadInput, match="row 5: a time that is not later"):
+        verify(tmp_path, {"t": T[twice]} | {name: x[twice] + 1e-3 * np.arange(len(twice)) for name, x in MOTION.items()})
+
+
+WRAPS = {"time (us)": (1e-6, 2.0**32), "time_ms": (1e-3, 2.0**16), "t": (1.0, 86_400.0), "time (s)": (1.0, 2.0**32 * 1e-6)}
+
+
+@pytest.mark.parametrize("name", WRAPS)
+def test_a_counter_that_begins_again_goes_on(name, tmp_path):
+    unit, length = WRAPS[name]
+    found = verify(tmp_path, {name: np.mod(T / unit + length - 3.02 / unit, length)} | MOTION)
+    assert found.verdict == "right", found.sentence
+    assert max(found.details.error) < 1e-7  # measured: 6e-9, by the round-off of times
+
+
+def test_a_window_leaves_out_what_is_not_the_motion(tmp_path):
+    """The hand before and after the throw: with its rows the recording is wrong, or cannot be read."""
+    held = {name: np.where((T < 2) | (T > 5), 0.3, x) for name, x in RATES.items()}
+    found = verify(tmp_path, {"time (ms)": 1e3 * T} | held, start_time=2.0, end_time=5.0)
+    assert (found.verdict, found.details.compared, found.details.in_file) == ("right", 61, 121)
+    spoiled = {name: np.where(T < 1, 1e300, x) for name, x in MOTION.items()}
+    assert verify(tmp_path, {"t": T} | spoiled, start_time=1.0).verdict == "right"
+    with pytest.raises(BadInput, match="0 rows, and 121 outside"):
+        verify(tmp_path, {"t": T} | MOTION, start_time=7.0)
+
+
+NANO = 1.7e9 + np.floor(T), np.round(1e9 * (T - np.floor(T)))
+TIMES = {
+    "a temperature": {"timestamp": T, "T": 20 + T},
+    "the arrival": {"%time": 1.7e18 + 1e9 * (T + 0.003 * np.sin(40 * T)), "header.stamp": 1.7e18 + np.round(1e9 * T)},
+    "ROS 2": {"header.stamp.sec": NANO[0], "header.stamp.nanosec": NANO[1]},
+    "ROS 1": {"field.header.stamp.secs": NANO[0], "field.header.stamp.nsecs": NANO[1]},
+    "struct timeval": {"tv_sec": NANO[0], "tv_usec": np.round(NANO[1] / 1e3)},
+}
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_the_time_is_the_column_of_the_measurement(name, tmp_path):
+    found = verify(tmp_path, TIMES[name] | MOTION)
+    assert found.verdict == "right"
+    exact_times = name not in ("the arrival",)  # 256 ns are the last bit of 1.7e18
+    assert max(found.details.error) < (1e-9 if exact_times else 1e-5)  # measured: 2e-13; 6e-7
+
+
+def test_deviations_and_biases_are_no_second_set_of_rates(tmp_path):
+    more = {f"angular_velocity_covariance{i}": 0 * T for i in range(9)} | {f"gyro_bias_{i}": 0 * T + 1 for i in "xyz"}
+    rates = {f"angular_velocity.{axis}": W[:, i] for i, axis in enumerate("xyz")}
+    found = verify(tmp_path, {"t": T} | rates | more)
+    assert (found.verdict, set(found.details.unused)) == ("right", set(more))
+
+
+YAW, PITCH, ROLL = Rotation.from_matrix(R).as_euler("ZYX", degrees=True).T
+AWAY = Rotation.from_matrix(R) * Rotation.from_rotvec(0.1 * T[:, None] * [0, 1, 0])
+SEEN = {
+    "combined is not ned": (
+        {f"combined_quat_{p}": AWAY.as_quat(scalar_first=True)[:, i] for i, p in enumerate("wxyz")},
+        "wrong",
+    ),
+    "heading": (
+        dict(zip(["heading (deg)", "pitch (deg)", "bank (deg)"], AWAY.as_euler("ZYX", degrees=True).T, strict=True)),
+        "wrong",
+    ),
+    "half of the angles": ({"heading (deg)": YAW, "pitch (deg)": PITCH}, "undecided"),
+    "an unknown sequence": ({f"euler_{axis}": T for axis in "xyz"}, "undecided"),
+    "a frame that moves": ({f"q_lvlh_{part}": Q[:, i] for i, part in enumerate("wxyz")}, "undecided"),
+    "a part of a quaternion": ({"q_x": Q[:, 1], "q_y": Q[:, 2], "q_z": Q[:, 3]}, "undecided"),
+    "no attitude": ({"altitude": T, "quality": T, "gyro_temperature": T, "roll_command": T, "torque_x": T}, "right"),
+}
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_what_looks_like_an_attitude_and_is_not_compared_forbids_right(name, tmp_path):
+    columns, expected = SEEN[name]
+    found = verify(tmp_path, {"t": T} | columns | RATES)
+    assert found.verdict == expected
+    assert expected != "undecided" or all(column in found.findings[0].detail for column in columns)
+    if expected == "undecided":
+        chosen = f"time=t,w={':'.join(RATES)}"
+        assert verify(tmp_path, {"t": T} | columns | RATES, columns=chosen).verdict == "right"
+
+
+OTHERS = {
+    "yaw, pitch, roll": {"yaw": YAW, "pitch": PITCH, "roll": ROLL},
+    "euler of any sequence": dict(
+        zip(("euler_x", "euler_y", "euler_z"), Rotation.from_matrix(R).as_euler("ZXZ").T, strict=True)
+    ),
+    "matrices": {f"R_{i + 1}{j + 1}": R[:, i, j] for i in range(3) for j in range(3)},
+    "Rodrigues": {f"sigma_{i + 1}": Rotation.from_matrix(R).as_mrp()[:, i] for i in range(3)},
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_second_attitude_is_compared_with_the_first_one(name, tmp_path):
+    assert verify(tmp_path, {"t": T} | MOTION | OTHERS[name]).verdict == "right"
+    other = {column: x + 0.01 * np.sin(T) for column, x in OTHERS[name].items()}
+    found = verify(tmp_path, {"t": T} | MOTION | other)
+    assert found.verdict == "undecided"
+    assert all(column in found.findings[0].detail for column in other)
+
+
+def test_the_order_that_fits_is_the_order_of_all_rows(tmp_path):
+    """Of more than 4,000 rows, the others were read as wxyz up to version 0.3: a right file was wrong."""
+    t = np.linspace(0, 6, 9001)
+    R_WB, w = exact(FREE, t)
+    q = Rotation.from_matrix(R_WB).as_quat()
+    columns = {"t": t} | {f"q{i}": q[:, i] for i in range(4)} | {f"w_{axis} (rad/s)": w[:, i] for i, axis in enumerate("xyz")}
+    found = verify(tmp_path, columns)
+    assert (found.verdict, found.details.compared) == ("right", 9001)
+
+
+def test_angles_of_a_top(tmp_path):
+    """Precession, nutation, spin: zxz, in this order."""
+    angles = dict(zip(("phi", "theta", "psi"), Rotation.from_matrix(R).as_euler("ZXZ").T, strict=True))
+    assert verify(tmp_path, {"t": T} | angles | RATES, euler="zxz", units="rad").verdict == "right"
+    turned = {name: angles[name] for name in ("psi", "theta", "phi")}
+    assert verify(tmp_path, {"t": T} | turned | RATES, euler="zxz", units="rad").verdict == "right"

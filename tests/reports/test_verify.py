@@ -1,0 +1,191 @@
+"""`conservative verify`: what it shows of findings, exit codes, options, and the names of earlier commands."""
+
+import csv
+import io
+import json
+import sys
+from xml.etree import ElementTree
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative.benchmarks.verification.finding import Cause, Finding, Verdict, Verification
+from conservative.reports.cli.main import main
+from conservative.reports.cli.options import OLD_NAMES
+
+from ..pages import ROOT
+
+RIGHT, WRONG, UNDECIDED, NOT_TESTED = Verdict
+GYROSCOPIC = Cause(("no gyroscopic term",), "The gyroscopic term is missing", 1e-9, 0.3, {"share": 1.0})
+WORLD = Cause(("world rates",), "Rates are in world axes", 2e-9, 0.3, remedy="answer in body axes")
+REASON = "the gyroscopic term is missing (explains 2 of 3 failing motions)"
+MADE = {
+    "a": Verification("a", "engine", [Finding("a", "motions", "fast", RIGHT, 0.01, 0.1, by="order")], "1 of 1 motions"),
+    "b": Verification(
+        "b",
+        "program",
+        [
+            Finding("b", "motions", "fast", WRONG, 0.3, 0.1, causes=(GYROSCOPIC,)),
+            Finding("b", "motions", "slow", WRONG, 0.2, 0.1, causes=(GYROSCOPIC,)),
+            Finding("b", "motions", "tiny", WRONG, 0.2, 0.1, causes=(GYROSCOPIC, WORLD)),
+            Finding("b", "motions", "spring", NOT_TESTED, detail="it has no springs"),
+            Finding("b", "times", "", UNDECIDED, detail="the clock is coarse"),
+        ],
+        REASON,
+    ),
+    "c": Verification("c", "method", [Finding("c", "order", "", UNDECIDED, detail="too few steps")], "too few steps"),
+    "d": Verification("d", "method", [Finding("d", "order", "", NOT_TESTED, detail="it has no step")]),
+}
+
+
+def invoke(*words):
+    return CliRunner(env={"COLUMNS": "200"}).invoke(main, [*map(str, words)])
+
+
+@pytest.fixture
+def verify(monkeypatch):
+    """Return the command with subjects `a` to `d`, which have the findings above."""
+    module = sys.modules[cv.verification.verify.__module__]
+    monkeypatch.setattr(module, "expand", lambda texts: [module.Subject(each, module.Kind.PROGRAM) for each in texts])
+    monkeypatch.setattr(module, "verify", lambda subjects, **_: [MADE[each] for each in subjects])
+    return lambda *words: invoke("verify", *words)
+
+
+@pytest.mark.parametrize(
+    ("subjects", "code", "first"),
+    [
+        ("a", 0, "a is right: 1 of 1 motions."),
+        ("b", 1, f"b is wrong: {REASON}."),
+        ("c", 3, "c is undecided: too few steps."),
+        ("d", 3, "d is not tested."),
+        ("aa", 0, "All 2 subjects are right."),
+        ("acb", 1, "Of 3 subjects, 1 is right, 1 is wrong and 1 is undecided."),
+        ("ad", 3, "Of 2 subjects, 1 is right and 1 is not tested."),
+    ],
+)
+def test_the_verdict_is_the_first_line_and_the_exit_code(subjects, code, first, verify):
+    done = verify(*subjects)
+    assert (done.exit_code, done.stdout.splitlines()[0]) == (code, first)
+    sentences = [f"{MADE[each].sentence}." for each in subjects]
+    assert all(each in done.stdout for each in sentences)
+    assert json.loads(verify(*subjects, "--json").stdout)["verdict"] == ("wrong" if code == 1 else MADE[subjects[-1]].verdict)
+
+
+def test_a_mistake_is_shown_once_with_the_cases_that_it_explains(verify):
+    lines = verify("b").stdout.splitlines()
+    assert "  motions: fast, slow: The gyroscopic term is missing (leaves 1.0e-9 of 0.3 rad)" in lines
+    (equally_good,) = (line for line in lines if "2 mistakes explain it equally well" in line)
+    assert equally_good.startswith("  motions: tiny: ")
+    assert "Rates are in world axes (leaves 2.0e-9 of 0.3 rad): answer in body axes" in equally_good
+    assert "  times: the clock is coarse" in lines
+    counts = [line.split() for line in lines if line.split()[:1] == ["motions"]]
+    assert counts == [["motions", "0", "3", "0", "1"]]
+
+
+def test_all_formats_have_the_same_findings(verify, tmp_path):
+    done = verify("a", "b", "--json", "--junit", tmp_path / "v.xml", "--csv", tmp_path / "v.csv", "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    subjects = json.loads(done.stdout)["subjects"]
+    expected = [(each.subject, each.check, each.case, str(each.verdict)) for name in "ab" for each in MADE[name].findings]
+    found = [finding for each in subjects for finding in each["findings"]]
+    assert [(each["subject"], each["check"], each["case"], each["verdict"]) for each in found] == expected
+    assert subjects[1]["findings"][0]["causes"][0]["numbers"] == {"share": 1.0}
+    rows = list(csv.reader(io.StringIO((tmp_path / "v.csv").read_text())))
+    assert [tuple(row[:4]) for row in rows[1:]] == expected
+    assert rows[3][8] == "no gyroscopic term"
+    suite = ElementTree.parse(tmp_path / "v.xml").getroot()[0]
+    assert {name: suite.get(name) for name in ("tests", "failures", "skipped")} == {
+        "tests": "6",
+        "failures": "3",
+        "skipped": "2",
+    }
+    reasons = [each.get("message") for each in suite.iter("skipped")]
+    assert reasons == ["not tested: it has no springs", "undecided: the clock is coarse"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["verify.csv", "verify.json", "verify.md"]
+    text = (tmp_path / "out" / "verify.md").read_text()
+    assert all(f"| {case} |" in text for _, _, case, _ in expected if case)
+
+
+UNUSED = {
+    "--picture": "picture.svg", "--body": "brick_flip", "--columns": "time=1", "--quaternion": "wxyz", "--euler": "zyx",
+    "--rates": "body", "--units": "deg", "--start": "row", "--from": "1", "--until": "1", "--error": "1e-3",
+    "--search": ".", "--engines": "mujoco",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("option", UNUSED)
+def test_an_option_that_no_subject_uses_is_an_error_with_its_name(option):
+    done = invoke("verify", "reduced", option, UNUSED[option])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert f"{option[2:]}: got {option}, which none of the subjects uses (method)" in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--pairs", "--scripts"])
+def test_an_option_of_programs_is_refused_for_a_file(option, tmp_path):
+    (tmp_path / "run.csv").write_text("t,w_x,w_y,w_z\n")
+    done = invoke("verify", tmp_path / "run.csv", "--body", "brick_flip", option, "x")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert f"{option[2:]}: got {option}, which" in done.stderr
+
+
+def test_a_subject_is_needed_or_engines_for_the_model_files_of_the_package():
+    assert "SUBJECT" in invoke("verify").stderr
+    assert invoke("verify").exit_code == 2
+
+
+WHERE = {
+    "judge": {
+        "run": "subjects", "body": "body", "columns": "columns", "quaternion": "quaternion", "euler": "euler", "rates": "rates",
+        "units": "units", "start": "start", "error": "error", "as_json": "as_json", "out": "out", "picture": "picture",
+        "force": "force",
+    },
+    "twins": {
+        "engines": "subjects", "pairs": "pairs", "as_json": "as_json", "junit": "junit", "markdown": "markdown",
+        "scripts": "scripts", "force": "force",
+    },
+    "importers": {
+        "files": "subjects", "engines": "engines", "search": "search", "as_json": "as_json", "junit": "junit",
+        "markdown": "markdown", "force": "force",
+    },
+    "engines check": {"command": "subjects", "as_json": "as_json"},
+    "study motions": {
+        "methods": "subjects", "engines": "subjects", "as_json": "as_json", "csv": "csv", "markdown": "markdown", "out": "out",
+        "force": "force", "quick": "", "skip_missing": "", "time_limit": "", "scheduler": "", "latex": "",
+    },
+}  # fmt: skip
+"""Options of the commands of 0.3, and the options of `verify` that take their place; "" if the changelog has the reason."""
+WHERE["study twins"] = WHERE["study motions"]
+
+
+def test_no_option_of_an_earlier_command_is_lost_without_a_reason():
+    options = {each.name for each in main.commands["verify"].params}
+    assert set(WHERE) == {name for name, new in OLD_NAMES.items() if new.startswith("verify")}
+    assert {place for places in WHERE.values() for place in places.values()} - {""} <= options
+    removed = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").partition("### Removed")[2].partition("\n## ")[0]
+    lost = {name for places in WHERE.values() for name, place in places.items() if not place}
+    assert [name for name in lost if f"`--{name.replace('_', '-')}`" not in removed] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "new"),
+    [
+        (["judge", "my run.csv", "--body", "b.toml"], "verify 'my run.csv' --body b.toml"),
+        (["twins", "mujoco", "--pairs", "q and -q"], "verify mujoco --pairs 'q and -q'"),
+        (["importers", "a.urdf"], "verify a.urdf"),
+        (["engines", "check", "python e.py"], "verify 'python e.py'"),
+        (["study", "motions", "--engines", "mujoco,drake"], "verify --only motions mujoco drake"),
+        (["study", "twins", "-m", "mujoco:RK4"], "verify --only pairs mujoco:RK4"),
+        (["track", "mujoco", "--twins", "--last", "2"], "track --verify pairs mujoco --last 2"),
+    ],
+)
+def test_an_old_name_answers_with_the_command_that_replaces_it(words, new):
+    done = invoke(*words)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.endswith(f"Run: conservative {new}\n")
+    command, rest = new.split()[0], new.split()[1:]
+    assert isinstance(main.commands[command], click.Command)
+    assert all(
+        each in {opt for option in main.commands[command].params for opt in option.opts} for each in rest if "--" in each[:2]
+    )
