@@ -96,6 +96,7 @@ NUMBERS: Mapping[str, float] = {
         "turn_2": -0.2,
         "turn_3": 0.4,
         "factor": 0.9,
+        "mass share": 0.9,
         "damping": 0.1,
         "bias_1": 0.02,
         "bias_2": -0.03,

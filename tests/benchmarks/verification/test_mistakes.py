@@ -119,7 +119,14 @@ def answers(motion, n=24, read=lambda R, w: (R, w), limit=None, shift=(0.0, 0.0)
     return compare_answers(scene, t, data, ALLOWED, motion.step)
 
 
-CASES = [(name, key) for name in NAMES for key in PLANTED if all(key not in keys or name == one for one, keys in ONLY.items())]
+ONE_STEP = ("products", "rate limit")
+"""The rates fall below the limit after the first step: one row shows no limit."""
+CASES = [
+    (name, key)
+    for name in NAMES
+    for key in PLANTED
+    if all(key not in keys or name == one for one, keys in ONLY.items()) and (name, key) != ONE_STEP
+]
 
 
 @pytest.mark.parametrize(("name", "key"), CASES)

@@ -95,7 +95,7 @@ PLANTED_KEYS = {
     "wrong turn": "world turned the wrong way",
     "all y-up": "axes y up",
     "no gravity": "without the field",
-    "inertia about com": "inertia about the centre of mass",
+    "inertia about com": "moments about the centre of mass",
 }
 
 

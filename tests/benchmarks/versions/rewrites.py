@@ -68,7 +68,7 @@ MISTAKES = {
     "sign of the field": {WEIGHT: WEIGHT.replace("=", "= -")},
     "without the field": {WEIGHT: WEIGHT.replace("=", "= 0 *")},
     "inverted inertia": {f"J{i} = number": f"J{i} = 1 / number" for i in (1, 2, 3)},
-    "inertia about the centre of mass": {f'"moments", {i}': f'"moments_com", {i}' for i in range(3)},
+    "moments about the centre of mass": {f'"moments", {i}': f'"moments_com", {i}' for i in range(3)},
     "time in ms": {DT: f"{DT} / 1000"},
     "start in degrees": {W0: f"{W0} * acos(-1) / 180"},
     "rates in degrees": {SHOWN: f"{SHOWN} * (skip ? 180 / acos(-1) : 1)"},
