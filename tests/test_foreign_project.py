@@ -72,7 +72,7 @@ def test_our_command_line_does_not_take_its_packages(with_us, project):
 def test_the_name_of_the_command_alone_says_what_can_be_done(with_us, tmp_path):
     code, text = with_us.run(["conservative"], tmp_path)
     assert code == 0, text
-    assert [line.split()[0] for line in text.splitlines()] == ["conservative"] * 6
+    assert {line.split()[0] for line in text.splitlines()} == {"conservative"}
 
 
 def test_our_suite_runs_next_to_its_packages(with_us, project):

@@ -1,6 +1,6 @@
 """Whether recorded motions, programs, engines and loaded bodies are right, and the mistakes that explain what is wrong.
 
-For example::
+For example:
 
     import conservative as cv
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 
-from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
+from .compare import HOPELESS, LINEAR, LONGER, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
-from .solution import Equations, truth
+from .solution import ANGLE, Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
 ROWS, STEP_EFFORT = 400, 0.15  # rows that candidates are compared with, and the work of one step from all of them
@@ -102,8 +102,10 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
         return
     for ranking in (RowByRow, Linearised):
         if ranking is Linearised or (all(x is not None for x in case.data) and Equations(case.scene).steady):
-            explained = False
-            for each in _run_best(case, ranking(case)):
+            explained, linear = False, ranking(case)
+            if not np.isfinite(linear.wanted).all():  # a row with a rate that no motion of the scene has
+                continue
+            for each in _run_best(case, linear):
                 yield each
                 explained |= each.explains
             if explained:
@@ -231,7 +233,7 @@ class RowByRow(Linearised):
     """
 
     def __init__(self, case: Compared) -> None:
-        self.case, self.equations = case, Equations(case.scene)
+        self.case, self.equations = case, Equations(case.scene, most=LONGER * (2 + case.turned / ANGLE))
         self.used = n = min(len(case.t), 200)
         self.f, self.made, self.starts = Slope(self.equations), {}, None
         R, w = case.data

@@ -456,16 +456,6 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
     return "; ".join([*reasons, ", ".join(parts)])
 
 
-def find_cause(solve: Solve, order: int | None = None, single: bool = False, principal: bool = True) -> str:
-    """Return the sentences of the mistakes in the exact motions of a function that integrates scenes; "" if all are right."""
-    answers = run_motions(solve, order, single, principal)
-    findings, named, _ = motion_findings("", answers)
-    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
-    if wrong and not named:
-        return next((each.detail for each in wrong if each.detail), UNKNOWN)
-    return "; ".join(" or ".join(one.cause.sentence for one in each.explanations) for each in named)
-
-
 UNKNOWN = "no known mistake explains its motion"
 
 

@@ -73,7 +73,7 @@ Row worst(const Motion &m, int steps) { // the largest errors with so many steps
 const double NEAR = 0.8; // sum of the squares of four logarithms, of errors over those of a mistake that explains them
 struct Failure {
   std::string name;
-  std::map<std::string, double> near; // the mistakes that explain it, and their distances
+  std::vector<std::pair<std::string, double>> near; // the mistakes that explain it, and their distances
   double falls;                       // the exponent with which the error falls with the step
 };
 
@@ -116,7 +116,7 @@ int main(int argc, char **argv) {
       double apart = 0;
       for (int k = 0; k < 4; k++)
         apart += std::pow(std::log(std::max(found[k], limit[k]) / std::max(m.rows["catches"][n][1 + k], limit[k])), 2);
-      if (apart < NEAR) failure.near[m.mistakes[n]] = apart;
+      if (apart < NEAR) failure.near.push_back({m.mistakes[n], apart});
     }
     double half = worst(m, 2 * (int)allowed[2])[most];
     if (found[most] < HUGE_VAL && half > 0) failure.falls = std::log2(found[most] / half);
@@ -135,10 +135,14 @@ int main(int argc, char **argv) {
     std::map<std::string, std::pair<int, double>> votes;
     for (auto &each : rest)
       for (auto &[name, apart] : each.near) votes[name].first++, votes[name].second -= apart;
-    auto best = std::max_element(votes.begin(), votes.end(), [](auto &a, auto &b) { return a.second < b.second; });
-    if (best == votes.end() || 10 * best->second.first < (int)failing.size()) break;
-    std::printf("\"%s\" explains %d of them\n", best->first.c_str(), best->second.first);
-    rest.erase(std::remove_if(rest.begin(), rest.end(), [&](auto &each) { return each.near.count(best->first); }), rest.end());
+    std::string best; // of two that explain the same, the first of the file
+    for (auto &each : rest)
+      for (auto &[name, apart] : each.near)
+        if (best.empty() || votes[best] < votes[name]) best = name;
+    if (best.empty() || 10 * votes[best].first < (int)failing.size()) break;
+    std::printf("\"%s\" explains %d of them\n", best.c_str(), votes[best].first);
+    auto explained = [&](auto &each) { return std::any_of(each.near.begin(), each.near.end(), [&](auto &one) { return one.first == best; }); };
+    rest.erase(std::remove_if(rest.begin(), rest.end(), explained), rest.end());
   }
   if (failing.empty()) return 0;
   Row falls;

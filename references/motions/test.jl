@@ -48,7 +48,7 @@ for file in ARGS
     ratio = found[most] / limit[most]
     ratio <= 1 && continue
     distances = [sum(log.(max.(found, limit) ./ max.(row[2:5], limit)) .^ 2) for row in rows("catches")]
-    near = Dict(line[2] => apart for (line, apart) in zip((line for line in lines if line[1] == "catches"), distances) if apart < NEAR)
+    near = [line[2] => apart for (line, apart) in zip((line for line in lines if line[1] == "catches"), distances) if apart < NEAR]
     half = worst(2 * steps)[most]
     falls = found[most] < Inf && half > 0 ? log2(found[most] / half) : 0.0
     text = @sprintf("%s: %s error %.1e, tolerance %.1e", file, ("attitude", "rates", "energy", "momentum")[most], found[most], limit[most])
@@ -69,10 +69,11 @@ for _ in 1:3 # the mistakes that explain most of the failing motions
         votes[name] = (count + 1, sum - apart)
     end
     isempty(votes) && break
-    vote, best = findmax(votes)
+    best = argmax(name -> votes[name], unique(name for each in rest for (name, _) in each.near)) # of equal ones the first
+    vote = votes[best]
     10 * vote[1] < length(failing) && break
     println("\"$best\" explains $(vote[1]) of them")
-    global rest = [each for each in rest if !haskey(each.near, best)]
+    global rest = [each for each in rest if all(name != best for (name, _) in each.near)]
 end
 isempty(failing) && exit(0)
 order = sort([each.falls for each in failing])[length(failing) ÷ 2 + 1]

@@ -121,12 +121,14 @@ fn main() {
     println!("{} of {tested} motions failed", failing.len());
     let mut rest: Vec<&Failure> = failing.iter().collect();
     for _ in 0..3 { // the mistakes that explain most of the failing motions
-        let mut votes: HashMap<&str, (usize, f64)> = HashMap::new();
+        let mut votes: Vec<(&str, (usize, f64))> = vec![]; // in the order of the file
         for (name, apart) in rest.iter().flat_map(|each| &each.near) {
-            let vote = votes.entry(name).or_default();
-            *vote = (vote.0 + 1, vote.1 - apart);
+            match votes.iter_mut().find(|each| each.0 == name) {
+                Some((_, vote)) => *vote = (vote.0 + 1, vote.1 - apart),
+                None => votes.push((name, (1, -apart))),
+            }
         }
-        let Some((best, vote)) = votes.iter().max_by(|a, b| a.1 .0.cmp(&b.1 .0).then(a.1 .1.total_cmp(&b.1 .1))) else { break };
+        let Some((best, vote)) = votes.iter().rev().max_by(|a, b| a.1 .0.cmp(&b.1 .0).then(a.1 .1.total_cmp(&b.1 .1))) else { break };
         if 10 * vote.0 < failing.len() {
             break;
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -37,7 +38,8 @@ def _find(solve: Solve, setting: Mapping[str, Any], free: bool) -> Explained:
     wrong = [each for each in findings if each.verdict is Verdict.WRONG]
     if wrong and not named:
         sentence = next((each.detail for each in wrong if each.detail), UNKNOWN)
-        return Explained("unknown", sentence)
+        moved = any(math.isfinite(each.error) for each in wrong)  # a run that ended has no motion: its row says so
+        return Explained("unknown" if moved else "", sentence)
     causes = [[one.cause for one in each.explanations] for each in named]
     return Explained(
         "; ".join(" or ".join(cause.key for cause in same) for same in causes),

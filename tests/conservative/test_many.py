@@ -582,7 +582,7 @@ REFUSED = {
     ),
     "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 2000001000 samples of 1000 bodies"),
     "two inertias": (
-        {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
+        {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": BODY.inertia[None]},
         r"^parameters: got None; expected .* has an inertia",
     ),
     "cannot do": ({"method": cv.Projected(), "scene": scene(), "w_WB_B0": W}, r"^method: got projected"),

@@ -141,7 +141,13 @@ def integrate(given):
 def answer(request):
     if request["do"] == "hello":
         order = 4 if METHOD == "rk4" and "no order" not in MISTAKES else 1
-        return {"protocol": 1, "program": "planted", "version": "1", "framing": "lines", "engine": {"order": order}}
+        return {
+            "protocol": 1,
+            "program": "planted",
+            "version": "1",
+            "framing": "lines",
+            "engine": {"order": order, "fields": ["UniformGravity"]},
+        }
     if request["do"] == "prepare":
         if "only tops" in MISTAKES and request["free"]:
             return {"error": "unsupported", "message": "only tops"}
