@@ -258,6 +258,9 @@ def adams(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
     return y + h * f(t, y) if not past else y + h * (3 * f(t, y) - f(t - h, past[0])) / 2
 
 
+KICKS = 12  # iterations, each of which multiplies the error by h D / 2, at most 0.03 here
+
+
 def splitting(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
     """Half a kick, rotations about the principal axes 1, 2, 3, 2, 1, half a kick (Dullweber, Leimkuhler & McLachlan 1997)."""
     a, R = y[: f.n], f.R(y)
@@ -271,10 +274,11 @@ def splitting(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Arr
 
 
 def _kick(f: Bodies, t: Array, R: Array, M: Array, h: Array) -> Array:
-    def torque(M: Array) -> Array:
-        return f.torque(t, R, apply(f.inverse, M - f.rotor))
-
-    return M + h * torque(M + h / 2 * torque(M))
+    """The change of the momentum by torques at a fixed attitude, by the implicit midpoint rule: a step back undoes it."""
+    new = M
+    for _ in range(KICKS):
+        new = M + h * f.torque(t, R, apply(f.inverse, (M + new) / 2 - f.rotor))
+    return new
 
 
 def composed(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], step: Next) -> Array:
