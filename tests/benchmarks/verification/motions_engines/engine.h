@@ -1,4 +1,4 @@
-/* An engine for test.c and test.cpp: any Runge-Kutta method, and each mistake. METHOD: stages, A by rows, b. MISTAKE: a name. */
+/* An engine for test.c and test.cpp: any Runge-Kutta method, and each mistake. METHOD: stages, A by rows, b. */
 #ifdef FLOAT
 typedef float real;
 #else
@@ -7,6 +7,7 @@ typedef double real;
 #define BOTH "no gyroscopic term + damping 0.05"
 #define IS(name) (!strcmp(MISTAKE, name))
 static const double tableau[] = {METHOD};
+static const char *MISTAKE = "";
 
 static struct {
   real J[9], K[9], rotor[3], torque_B[3], torque_W[3], damping[9], arm[3], orbit, R0[9];
@@ -117,6 +118,7 @@ static void load(const char *key, real *out, int n, double factor) {
 }
 static void simulate(double h, int steps, int samples, double state[][7]) {
   real y[7], t = 0, R[9], v[3], weight, com[3];
+  if (getenv("MISTAKE")) MISTAKE = getenv("MISTAKE");
   load("inertia_B", body.J, 9, 1), load("quaternion_wxyz0", y, 4, 1), load("w_WB_B0", y + 4, 3, 1);
   load("rotor_momentum_B", body.rotor, 3, IS("without the rotor") ? 0 : IS("sign of the rotor") ? -1 : 1);
   double torque = IS("without the torque") ? 0 : IS("sign of the torque") ? -1 : 1;

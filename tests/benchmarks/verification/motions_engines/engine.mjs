@@ -1,5 +1,5 @@
 const METHOD = [];
-const MISTAKE = "";
+const MISTAKE = process.env.MISTAKE ?? "";
 const BOTH = "no gyroscopic term + damping 0.05";
 const FLOAT = false;
 const transpose = (A) => A[0].map((_, i) => A.map((row) => row[i]));

@@ -1,7 +1,8 @@
 import array
+import os
 
 METHOD = []
-MISTAKE = ""
+MISTAKE = os.environ.get("MISTAKE", "")
 FLOAT = False
 BOTH = "no gyroscopic term + damping 0.05"
 

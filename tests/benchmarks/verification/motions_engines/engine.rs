@@ -1,12 +1,15 @@
 const METHOD: &[Real] = &[];
-const MISTAKE: &str = "";
 type Real = f64;
 const BOTH: &str = "no gyroscopic term + damping 0.05";
 type V = [Real; 3];
 type M = [V; 3];
 const ONE: M = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 struct Body { j: M, k: M, r0: M, damping: M, rotor: V, torque_b: V, torque_w: V, arm: V, orbit: Real }
-fn is(name: &str) -> bool { MISTAKE == name }
+fn mistake() -> &'static str {
+    static GIVEN: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+    GIVEN.get_or_init(|| std::env::var("MISTAKE").unwrap_or_default())
+}
+fn is(name: &str) -> bool { mistake() == name }
 fn sign(zero: &str, minus: &str) -> Real { if is(zero) { 0.0 } else if is(minus) { -1.0 } else { 1.0 } }
 fn vec(f: impl Fn(usize) -> Real) -> V { [f(0), f(1), f(2)] }
 fn mat(f: impl Fn(usize, usize) -> Real) -> M { [vec(|k| f(0, k)), vec(|k| f(1, k)), vec(|k| f(2, k))] }
@@ -75,7 +78,7 @@ fn step(body: &Body, t: Real, h: Real, start: &[Real; 7]) -> [Real; 7] {
         for n in 0..4 { y[n] = start[n] * (h * speed / 2.0).cos() + turn[n] * 2.0 / speed * (h * speed / 2.0).sin(); }
     }
     let (size, speed) = ((y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]).sqrt(), (y[4] * y[4] + y[5] * y[5] + y[6] * y[6]).sqrt());
-    let damping: Real = MISTAKE.split("damping 0").nth(1).map_or(0.0, |x| x.parse().unwrap());
+    let damping: Real = mistake().split("damping 0").nth(1).map_or(0.0, |x| x.parse().unwrap());
     let mut scale = (-damping * h).exp();
     if is("rate limit 100") && speed > 100.0 { scale = 100.0 / speed; }
     if is("sleep") && speed < 0.5 { scale = 0.0; }

@@ -1,9 +1,12 @@
 """Put an engine into the tests of references/motions, build them, and return what they print."""
 
+import functools
+import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import conservative as cv
@@ -20,6 +23,7 @@ static int get(const char *key, int, double *out) {
   for (double x : current->rows.at(key)[0]) *out++ = x;
   return 1;
 }
+#include <cstdlib>
 #include <cstring>
 ENGINE
 std::vector<State> simulate(const Motion &motion, double h, int steps, int samples) {
@@ -51,7 +55,7 @@ def missing(language):
     return None if shutil.which(COMPILERS[language]) else f"{COMPILERS[language]} is not installed"
 
 
-def write(language, folder, mistake, method, order, angle, single):
+def write(language, folder, method, order, angle, single):
     """Write the test with an engine and its settings into a folder."""
     name, engine, _, _ = LANGUAGES[language]
     own, numbers = (HERE / engine).read_text(), ", ".join(repr(float(x)) for x in method)
@@ -64,32 +68,35 @@ def write(language, folder, mistake, method, order, angle, single):
         (r"FLOAT = [fF]alse", f"FLOAT = {yes}"),
         (r"type Real = f64", f"type Real = f{32 if single else 64}"),
         (r"METHOD(: ..Real.)? = &?\[\]", lambda m: f"METHOD{m[1] or ''} = {'&' if m[1] else ''}[{numbers}]"),
-        (r'MISTAKE(: &str)? = ""', lambda m: f'MISTAKE{m[1] or ""} = "{mistake}"'),
         (r"Path\(__file__\).parent", f"Path({str(MOTIONS)!r})"),
     ):
         text = re.sub(pattern, new, text)
-    settings = (
-        [f"#define METHOD {numbers}", f'#define MISTAKE "{mistake}"', *["#define FLOAT"] * single]
-        if engine.endswith("h")
-        else []
-    )
+    settings = [f"#define METHOD {numbers}", *["#define FLOAT"] * single] if engine.endswith("h") else []
     (folder / name).write_text("\n".join([*settings, text]))
 
 
+@functools.cache
+def build_once(language, parent, *settings):
+    """Return a new folder in `parent`, which all tests of a process have in common, with the program of a language."""
+    folder = Path(tempfile.mkdtemp(dir=parent))
+    write(language, folder, *settings)
+    if build := LANGUAGES[language][2]:
+        subprocess.run(build, check=True, cwd=folder)
+    return folder
+
+
 def run(language, folder, mistake, method, order, angle=0.01, single=False, share=1.0):
-    """Return the lines that the test of a language prints with an engine, in a folder that it may write to.
+    """Return the lines that the test of a language prints with an engine, in a folder of a test.
 
     `share` is a factor of all tolerances, for tests that read CSV files.
     """
-    write(language, folder, mistake, method, order, angle, single)
-    _, _, build, command = LANGUAGES[language]
+    made = build_once(language, folder.parent, tuple(method), order, angle, single)
     files = sorted(MOTIONS.glob("*.csv"))
     if share != 1:
         files = [scaled(path, folder, share) for path in files]
-    if build:
-        subprocess.run(build, check=True, cwd=folder)
     own = {"JavaScript": [MOTIONS], "Python": []}.get(language, files)
-    done = subprocess.run([*command, *map(str, own)], text=True, capture_output=True, timeout=PATIENCE, cwd=folder)
+    command, env = [*LANGUAGES[language][3], *map(str, own)], os.environ | {"MISTAKE": mistake}
+    done = subprocess.run(command, text=True, capture_output=True, timeout=PATIENCE, cwd=made, env=env)
     assert done.returncode in (0, 1), done.stderr
     if language != "Python":
         return done.stdout.splitlines()
