@@ -1,7 +1,7 @@
 """`conservative verify` of files with a planted mistake, or none, whose answers are decided before it runs.
 
 No right file is called wrong, no wrong file right, and no diagnosis that is called proven is false. Of the mistakes that are
-identifiable 99 of 100 are named. `pytest` verifies 60 files, `pytest --attack` 1,000, and writes the tables of the page
+identifiable 99 of 100 are named. `pytest` verifies those of `QUICK`, `pytest --attack` 1,000, and writes the tables of the page
 `reports/documentation/planted_files.md`. An interrupted attack goes on where it was, unless the code has changed. By hand:
 
     python -m tests.attack.test_recordings results.jsonl 0 1000
@@ -37,8 +37,8 @@ KINDS = {
     "two mistakes, which the search does not know": [PAIR],
 }
 QUICK = (
-    1, 3, 6, 8, 10, 11, 13, 15, 17, 20, 22, 32, 36, 39, 42, 46, 50, 53, 56, 59, 61, 63, 500, 505, 508, 510, 513, 517, 521,
-    523, 525, 533, 536,
+    3, 6, 8, 10, 13, 15, 20, 22, 32, 36, 39, 42, 46, 50, 53, 56, 59, 61, 63, 500, 508, 510,
+    513, 517, 523, 525, 533, 536,
 )  # fmt: skip
 """Seeds of quick files of many kinds."""
 FALSE = ("right called wrong", "wrong called right", "false proof")
