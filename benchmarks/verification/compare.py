@@ -249,8 +249,12 @@ class Compared:
         """Return the equations of the scene, or of another one, whose solutions are exact beside the noise."""
         share = 0.1 / self.growth if self.growth > SENSITIVE else 1e-5
         tolerance = float(np.clip(share * self.noise.min(), 4e-16, 1e-8))
-        most = LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
-        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=most, **changes)
+        return Equations(scene or self.scene, gyroscopic, tolerance=tolerance, most=self.most, **changes)
+
+    @property
+    def most(self) -> float:
+        """The number of stretches after which a trial motion ends."""
+        return LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
 
     def deviations(self, motion: Solution, found: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from conservative.attitude import Array, to_quaternion
 
-from .compare import HOPELESS, LINEAR, LONGER, Compared, Solution, differ, linearise, weigh
+from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
-from .solution import ANGLE, Equations, truth
+from .solution import Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
 ROWS, STEP_EFFORT = 400, 0.15  # rows that candidates are compared with, and the work of one step from all of them
@@ -233,7 +233,7 @@ class RowByRow(Linearised):
     """
 
     def __init__(self, case: Compared) -> None:
-        self.case, self.equations = case, Equations(case.scene, most=LONGER * (2 + case.turned / ANGLE))
+        self.case, self.equations = case, Equations(case.scene, most=case.most)
         self.used = n = min(len(case.t), 200)
         self.f, self.made, self.starts = Slope(self.equations), {}, None
         R, w = case.data
