@@ -14,6 +14,8 @@ from . import version
 
 _load, __dir__, __all__ = attach_stub(__name__, __file__)
 __version__ = version.VERSION
+FORMER = {"Need": "Feature", "Card": "MethodInfo", "needs": "features", "card": "method_info"}
+"""Former names, which an error connects with the new ones."""
 
 
 def __getattr__(name: str) -> object:
@@ -23,12 +25,14 @@ def __getattr__(name: str) -> object:
     from .posix import unstoppable
 
     with unstoppable():
+        if name in FORMER:
+            raise AttributeError(f"{__name__}.{name} has another name now: {__name__}.{FORMER[name]}")
         if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
             return import_module(f"{__name__}.{name}")
-        if name == "verification":  # of a room above, which this one cannot import
-            from .deferred_imports import ROOMS, load_entry
+        if name == "verification":  # of a package above the core, which the core cannot import
+            from .deferred_imports import PACKAGES, load_entry
 
-            value = load_entry(ROOMS, ROOMS, name)
+            value = load_entry(PACKAGES, PACKAGES, name)
         else:
             value = _load(name)
         globals()[name] = value

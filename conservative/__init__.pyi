@@ -4,7 +4,6 @@ from . import scenes as scenes
 from . import shapes as shapes
 from .benchmarks import verification as verification
 from .body import RigidBody as RigidBody
-from .card import Card as Card
 from .errors import AccuracyNotReached as AccuracyNotReached
 from .errors import BadInput as BadInput
 from .errors import Diverged as Diverged
@@ -25,6 +24,7 @@ from .errors import SceneNotCompared as SceneNotCompared
 from .errors import TorqueFailed as TorqueFailed
 from .errors import Unsupported as Unsupported
 from .errors import WrongBranch as WrongBranch
+from .features import Feature as Feature
 from .grid import Grid as Grid
 from .integration.ensemble import Ensemble as Ensemble
 from .integration.ensemble import open_ensemble as open_ensemble
@@ -34,6 +34,7 @@ from .integration.spread import spread as spread
 from .invariants import Invariant as Invariant
 from .method import Method as Method
 from .method import Role as Role
+from .method_info import MethodInfo as MethodInfo
 from .methods.convected import Convected as Convected
 from .methods.gauss import Gauss as Gauss
 from .methods.lame import Lame as Lame
@@ -47,7 +48,6 @@ from .methods.symplectic import Rattle as Rattle
 from .methods.symplectic import Splitting as Splitting
 from .methods.taylor import Taylor as Taylor
 from .methods.textbook import Textbook as Textbook
-from .needs import Need as Need
 from .outcome import Outcome as Outcome
 from .outcome import OutcomeKind as OutcomeKind
 from .potentials.gravity_gradient import GravityGradient as GravityGradient

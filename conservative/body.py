@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .attitude import Array, triple
 from .check import PickledByFields, numbers, read_inertia, read_only, set_fields
 from .errors import ImpossibleInertia
-from .needs import Need, Needs
+from .features import Feature, Features
 from .potentials.load import Given, RotorMomentum
 
 _EQUAL = 4e-15
@@ -84,10 +84,10 @@ class RigidBody(PickledByFields):
             warnings.warn(ImpossibleInertia(self.moments.tolist()), stacklevel=2)
 
     @property
-    def needs(self) -> Needs:
-        """Members of `Need` for scenes with this body."""
-        rotor = set() if self.rotor_momentum is None and self.motor is None else {Need.ROTOR}
-        return frozenset(rotor if self.motor is None else {Need.MOTOR})
+    def features(self) -> Features:
+        """Members of `Feature` for scenes with this body."""
+        rotor = set() if self.rotor_momentum is None and self.motor is None else {Feature.ROTOR}
+        return frozenset(rotor if self.motor is None else {Feature.MOTOR})
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
 ENGINES = "conservative.engines"
 """Groups of entry points; see `conservative.registry`."""
-ROOMS = "conservative.rooms"
-"""Group of what this room uses of the rooms above it, which it cannot import."""
+PACKAGES = "conservative.packages"
+"""Group of what the core uses of the packages above it, which it cannot import."""
 DEFAULT_METHOD = "reduced"
 """Name of the method of `integrate` for a given step, `Reduced()`."""
 _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "conservative engines list"}
@@ -41,7 +41,7 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 
     entries = list(entry_points(group=group))
     if group == ENGINES and (programs := list_programs()):
-        module = find_entry(ROOMS, ROOMS, "programs").value
+        module = find_entry(PACKAGES, PACKAGES, "programs").value
         for name in programs.keys() & {*list_entries(METHODS), *(entry.name for entry in entries)}:
             raise BadInput(str(programs[name].file), f"{name!r}, the name of a method or an engine", "another name")
         entries += [EntryPoint(name, f"{module}:{name}", group) for name in programs]
@@ -53,7 +53,7 @@ def find_entry(group: str, argument: str, name: str) -> EntryPoint:
     known = list_entries(group)
     if name in known:
         return known[name]
-    if group == ROOMS:
+    if group == PACKAGES:
         raise BadInput(argument, f"no entry point {name!r}", REINSTALL)
     files = "; or give a file whose name ends with .toml" if group == SCENES else ""
     raise BadInput(argument, repr(name), nearest(name, known, _LISTS.get(group, "")) + files)

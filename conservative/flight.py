@@ -20,8 +20,8 @@ from .attitude import Array
 from .body import RigidBody
 from .check import describe, finite_array
 from .errors import BadInput
+from .features import Feature, Features
 from .invariants import MOMENTUM_UNIT, InvariantInTime
-from .needs import Need, Needs
 from .potentials.uniform_gravity import UniformGravity
 from .shapes import MassDistribution
 
@@ -48,7 +48,7 @@ class Flight:
     g: float
     p_WB0: Array
     v_WB0: Array
-    needs: ClassVar[Needs] = frozenset({Need.FLIGHT})
+    features: ClassVar[Features] = frozenset({Feature.FLIGHT})
 
     def centre(self, R_WB: Array, w_WB_B: Array, p_WB: Array, v_WB: Array) -> tuple[Array, Array]:
         """Return position (n, 3), m, and velocity (n, 3), m/s, of the centre of mass, world axes.

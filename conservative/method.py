@@ -10,26 +10,26 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
-from .card import Role as Role
 from .drifts import drifts_of
 from .errors import InvalidResult, Unsupported
+from .features import Features, lacking
 from .grid import Grid, grid_for
 from .invariants import AXIAL_MOMENTUM
-from .needs import Needs, lacking
+from .method_info import Maker, MethodInfo, Purpose, call_with_settings, maker_of, setting_texts, settings_text
+from .method_info import Role as Role
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find_mistake
 
 Run = Callable[[], Trajectory]
 
 
-def _ask_needs(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
-    """Extend `Method.unsupported` by the comparison of what the scene needs and the method takes."""
+def _ask_features(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
+    """Extend `Method.unsupported` by a comparison of the scene's features with those that the method supports."""
 
     @wraps(unsupported)
     def reason(method: Method, scene: Scene) -> str | None:
-        takes, needs = method.takes, scene.needs
-        return unsupported(method, scene) if needs <= takes else lacking(takes, needs, method.lacks)
+        supports, features = method.supports, scene.features
+        return unsupported(method, scene) if features <= supports else lacking(supports, features, method.lacks)
 
     return reason
 
@@ -53,7 +53,7 @@ def _leave_alone(prepare_many: Callable[[Any, Any, Grid], Any]) -> Callable[[Any
     @wraps(prepare_many)
     def checked(method: Method, bodies: Any, grid: Grid) -> Any:
         scene = bodies.scene
-        taken = scene.needs <= method.takes and not scene.loaded
+        taken = scene.features <= method.supports and not scene.loaded
         return prepare_many(method, bodies, grid) if taken else None
 
     return checked
@@ -68,21 +68,24 @@ class Method(ABC):
     ----------
     family, role
         Name of its entry point, and its role: ours, engine or truth.
-    card
+    method_info
         Settings for tables and benchmarks, place in the automatic choice, colour; every entry has a default.
     """
 
     family: ClassVar[str]
     role: ClassVar[Role]
-    card: ClassVar[Card] = Card()
+    method_info: ClassVar[MethodInfo] = MethodInfo()
     if TYPE_CHECKING:
         __dataclass_fields__: ClassVar[dict[str, Any]]  # subclasses are dataclasses
 
     def __init_subclass__(cls) -> None:
         for name in ("colour", "variants", "suite", "rank", "candidates"):
             if name in vars(cls):  # these were class attributes in earlier versions
-                raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
-        for name, extend in (("unsupported", _ask_needs), ("prepare", _refuse), ("prepare_many", _leave_alone)):
+                raise TypeError(f"{cls.__name__}.{name} has no effect. Write: method_info = MethodInfo({name}=...)")
+        for former, name in (("card", "method_info = MethodInfo(...)"), ("takes", "supports")):
+            if former in vars(cls):
+                raise TypeError(f"{cls.__name__}.{former} has another name now. Write: {name}")
+        for name, extend in (("unsupported", _ask_features), ("prepare", _refuse), ("prepare_many", _leave_alone)):
             if name in vars(cls):
                 setattr(cls, name, extend(vars(cls)[name]))
 
@@ -99,13 +102,13 @@ class Method(ABC):
         return f"{self.maker}/{setting or self.name}"
 
     @property
-    def takes(self) -> Needs:
-        """Parts of scenes that it takes; default: those of its card."""
-        return self.card.takes
+    def supports(self) -> Features:
+        """Features of scenes that it supports; default: `method_info.supports`."""
+        return self.method_info.supports
 
     @property
     def lacks(self) -> str:
-        """The reason why it takes no more, for messages; default: none is given."""
+        """The reason why it supports no more, for messages; default: none is given."""
         return ""
 
     @property
@@ -141,11 +144,11 @@ class Method(ABC):
         """
         return Bounds(drift=1e-3, orthonormality=0.1, energy=math.inf if self.role == Role.ENGINE else 1.0)
 
-    @_ask_needs
+    @_ask_features
     def unsupported(self, scene: Scene) -> str | None:
         """Return the reason why the scene is not supported, or None.
 
-        What the scene needs and `takes` lacks is reported before an override is asked: that is for numbers, such as a symmetry.
+        A feature that `supports` lacks is reported before an override is asked: overrides are for numbers, such as a symmetry.
         """
         return None
 
@@ -181,7 +184,7 @@ class Method(ABC):
         """Return the run of a `Batch`, which returns a `Block`; None if bodies have to run one by one.
 
         Runs of separate calls can execute in parallel threads. The numbers of a body do not depend on other bodies and runs.
-        Overrides are not asked for scenes with loads, or with parts that the method does not take.
+        Overrides are not asked for scenes with loads, or with features that the method does not support.
         """
         return None
 
@@ -193,7 +196,7 @@ class Method(ABC):
         passes, no other check is made.
         """
         mistake, conserved, bounds = find_mistake(result, scene, grid), self.conserves, self.bounds(scene, grid)
-        if mistake is None and result.failure is None and self.card.kernel and not scene.loaded:
+        if mistake is None and result.failure is None and self.method_info.kernel and not scene.loaded:
             measure = scene.derive(drifts_of, conserved)
             drifts = measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
             if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift and drifts[1] <= bounds.energy:
@@ -210,8 +213,8 @@ class Method(ABC):
 
     @classmethod
     def settings_for(cls, purpose: Purpose) -> tuple[Self, ...]:
-        """Return the methods that `card` lists for a purpose, such as "variants" or "suite"; see `Card`."""
-        return tuple(cls.configure(text) for text in cls.card.settings(purpose))
+        """Return the methods that `method_info` lists for a purpose, such as "variants" or "suite"; see `MethodInfo`."""
+        return tuple(cls.configure(text) for text in cls.method_info.settings(purpose))
 
     @classmethod
     def settings_in_tables(cls) -> tuple[Self, ...]:

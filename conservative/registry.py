@@ -26,11 +26,11 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from .card import call_with_settings
 from .check import printable_text
 from .deferred_imports import ENGINES, METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
+from .method_info import call_with_settings
 from .scene import Scene
 
 _NAME = "a name with its settings, a text"

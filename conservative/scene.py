@@ -27,10 +27,10 @@ from .check import (
     set_fields,
 )
 from .errors import BadInput
+from .features import LOADS, Feature, Features, features_of
 from .flight import Flight, read_flight
 from .identity import NOT_OF_MOTION, Identity, equal_to_nothing, identify
 from .invariants import Invariant, InvariantInTime, axial_direction, balance_of, in_time, invariants_of
-from .needs import LOADS, Need, Needs, needs_of
 from .potentials.load import Damping, OfTime, Torque
 from .potentials.pointwise import EARLIER
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
@@ -166,15 +166,15 @@ class Scene(PickledByFields):
         )
         if dt is None and self.asks_time:
             set_fields(self, dt=end / math.ceil(end / step))
-        if self.needs:
+        if self.features:
             require_size(body.inertia)
         self._call_loads()
 
     @cached_property
-    def needs(self) -> Needs:
-        """Parts that a method has to take: the union of the needs of all parts (`conservative.needs`)."""
+    def features(self) -> Features:
+        """Features that a method has to support: the union of the features of all parts (`conservative.features`)."""
         parts = self.body, self.potential, self.torque, self.damping, self.flight
-        return frozenset().union(*map(needs_of, parts))
+        return frozenset().union(*map(features_of, parts))
 
     @property
     def key(self) -> str:
@@ -199,8 +199,8 @@ class Scene(PickledByFields):
     @cached_property
     def changeable(self) -> bool:
         """True if functions or classes of a user act, which may change with what they read."""
-        fields_of_users = {Need.FIELD, Need.FUNCTION, Need.TIME}
-        return not self.needs.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
+        fields_of_users = {Feature.FIELD, Feature.FUNCTION, Feature.TIME}
+        return not self.features.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
 
     def _call_loads(self) -> None:
         """Raise `BadInput` unless the loads have values; keep the key, for `now`, unless functions change what they read."""
@@ -239,7 +239,7 @@ class Scene(PickledByFields):
     @cached_property
     def loaded(self) -> bool:
         """True if a torque, a damping or the motor of a rotor acts beside the potential."""
-        return bool(self.needs & LOADS)
+        return bool(self.features & LOADS)
 
     @cached_property
     def loads(self) -> tuple[OfTime, ...]:
@@ -250,12 +250,12 @@ class Scene(PickledByFields):
     @property
     def calls_python(self) -> bool:
         """True if steps call Python functions, so that one takes as long as the functions need."""
-        return bool(self.loads) or not self.needs.isdisjoint((Need.FUNCTION, Need.TIME))
+        return bool(self.loads) or not self.features.isdisjoint((Feature.FUNCTION, Feature.TIME))
 
     @property
     def asks_time(self) -> bool:
         """True if functions of a user depend on time. They may have no value before the start and after the end."""
-        return Need.TIME in self.needs or any(callable(load.value) for load in self.loads)
+        return Feature.TIME in self.features or any(callable(load.value) for load in self.loads)
 
     @property
     def breaks(self) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe, has_masked
-from .deferred_imports import ROOMS, load_entry
+from .deferred_imports import PACKAGES, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
 from .grid import Grid
 from .invariants import Invariant, sizes
@@ -227,7 +227,7 @@ class Trajectory:
         if truth is not None and not any(each is truth for each in shown):
             shown.append(truth)
         index = next((number for number, each in enumerate(shown) if each is truth), None)
-        animation = load_entry(ROOMS, ROOMS, "animation")
+        animation = load_entry(PACKAGES, PACKAGES, "animation")
         return animation(shown, labels or [each.label for each in shown], index)
 
     def _repr_html_(self) -> str:

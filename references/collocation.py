@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from conservative.arithmetic import in_body
 from conservative.attitude import from_quaternion, to_quaternion
+from conservative.features import Feature
 from conservative.grid import Grid
-from conservative.needs import Need
 from conservative.potentials.turning import Turning
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -87,7 +87,7 @@ def _slope(scene: Scene) -> Slope:
     h1, h2, h3 = (0.0, 0.0, 0.0) if scene.body.motor else scene.body.rotor_along(np.eye(3)) or (0.0, 0.0, 0.0)
     # In double precision a field's products would be rounded, which some bodies amplify by 1,000.
     fixed: Any = None if potential is None else potential.kernel_field(np.eye(3, dtype=np.longdouble))
-    turns_with_body = Need.ATTITUDE in scene.needs
+    turns_with_body = Feature.ATTITUDE in scene.features
 
     def loads(t: list[float], R: Any) -> tuple[Any, Any]:
         """Return damping (n, 3, 3) and torque (3, n), or None."""

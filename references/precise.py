@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import to_quaternion
-from conservative.card import Card, Maker
 from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
+from conservative.features import Feature, features_of
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.needs import Need, needs_of
+from conservative.method_info import Maker, MethodInfo
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
@@ -148,10 +148,10 @@ class Precise(Method):
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
     order = None
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         report=(),
         colour="grey",
-        takes=frozenset({Need.TURNING, Need.ROTOR, Need.FLIGHT}).union(*map(needs_of, FIELDS)),
+        supports=frozenset({Feature.TURNING, Feature.ROTOR, Feature.FLIGHT}).union(*map(features_of, FIELDS)),
     )
 
     def __post_init__(self) -> None:

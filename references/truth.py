@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from conservative.attitude import angle_between
+from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.needs import Need
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -116,7 +116,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     if isinstance(first, Exact):
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end
         agreement = scene.derive(_agreement, first, second, until)  # cached: many grids use one scene
-    elif Need.ATTITUDE in scene.needs and Need.FUNCTION not in scene.needs:
+    elif Feature.ATTITUDE in scene.features and Feature.FUNCTION not in scene.features:
         knots = _knots(grid)
         other, _ = _collocate_loads(scene, knots)
         names, until, agreement = (first.label, other.label), end, difference(first.solve(scene, knots), other)
@@ -167,7 +167,7 @@ def _is_collocated(scene: Scene) -> bool:
 
     Functions of the attitude are called at each stage of each iteration, which takes a hundred times as long as in SciPy.
     """
-    return scene.loaded and not {Need.FUNCTION, Need.ATTITUDE} & scene.needs
+    return scene.loaded and not {Feature.FUNCTION, Feature.ATTITUDE} & scene.features
 
 
 def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:

@@ -1,4 +1,4 @@
-"""A scene for each member of `Need`, without it, and with another value of it; and scene files of those that a file can have.
+"""A scene for each member of `Feature`, without it, and with another value of it; and scene files of most.
 
 All have a body in turned axes, an attitude and rates of no symmetry. Without the part, the motion is at least `APART` rad from
 the right one.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import conservative as cv
-from conservative.needs import Need
+from conservative.features import Feature
 from conservative.potentials.field import FieldPotential
 from conservative.potentials.uniform_gravity import UniformField
 
@@ -114,33 +114,33 @@ HEAVY, PULLED = ("gravity", 6.0, POINT), ("spring", 5.0, POINT, ANCHOR, 0.3)
 POTENTIAL = ("potential", "field")
 PIVOTED = replace(FREE, J=J + MASS * (COM @ COM * np.eye(3) - np.outer(COM, COM)), field=("gravity", MASS * 9.81, COM))
 ROWS = {
-    Need.GRAVITY: row("field", HEAVY, ("gravity", 9.0, POINT), ("gravity", *POTENTIAL)),
-    Need.SPRING: row("field", PULLED, ("spring", 9.0, *PULLED[2:]), ("spring", *POTENTIAL)),
-    Need.ATTRACTION: row(
+    Feature.GRAVITY: row("field", HEAVY, ("gravity", 9.0, POINT), ("gravity", *POTENTIAL)),
+    Feature.SPRING: row("field", PULLED, ("spring", 9.0, *PULLED[2:]), ("spring", *POTENTIAL)),
+    Feature.ATTRACTION: row(
         "field", ("attraction", 4.0, POINT, ANCHOR), ("attraction", 6.0, POINT, ANCHOR), ("attraction", *POTENTIAL)
     ),
-    Need.GRADIENT: row("field", ("gradient", 1.3, J, DIRECTION), ("gradient", 1.7, J, DIRECTION), ("gradient", *POTENTIAL)),
-    Need.FIELD: row(
+    Feature.GRADIENT: row("field", ("gradient", 1.3, J, DIRECTION), ("gradient", 1.7, J, DIRECTION), ("gradient", *POTENTIAL)),
+    Feature.FIELD: row(
         "field", HEAVY, ("gravity", 9.0, POINT), ("of a user", *POTENTIAL), in_file=False, options={"potential": OwnField}
     ),
-    Need.FUNCTION: row(
+    Feature.FUNCTION: row(
         *("field", ("quartic", 60.0, POINT, DIRECTION, 0.0, 0.0), ("quartic", 90.0, POINT, DIRECTION, 0.0, 0.0)),
         ("function", *POTENTIAL),
         in_file=False,
     ),
-    Need.TURNING: row("turning", (1.5, DIRECTION), (2.5, DIRECTION), ("turn", "time"), replace(FREE, field=PULLED)),
-    Need.TIME: row(
+    Feature.TURNING: row("turning", (1.5, DIRECTION), (2.5, DIRECTION), ("turn", "time"), replace(FREE, field=PULLED)),
+    Feature.TIME: row(
         *("field", ("quartic", 60.0, POINT, DIRECTION, 0.9, 3.0), ("quartic", 60.0, POINT, DIRECTION, -0.9, 3.0)),
         ("time",),
         replace(FREE, field=("quartic", 60.0, POINT, DIRECTION, 0.0, 0.0)),
         in_file=False,
     ),
-    Need.ROTOR: row("rotor", np.array((0.6, -0.5, 0.9)), np.array((0.6, -0.5, 1.3)), ("rotor",)),
-    Need.MOTOR: row("rotor", (RAMP, MOMENTA), (RAMP, 1.5 * MOMENTA), ("motor", "rotor"), replace(FREE, rotor=MOMENTA[0])),
-    Need.TORQUE: row("torque", (TIMES, VALUES), (TIMES, 1.5 * VALUES), ("torque",), replace(FREE, frame="world")),
-    Need.DAMPING: row("damping", 0.6 * J + 0.2 * np.cross(np.eye(3), DIRECTION), 0.9 * J, ("damping",)),
-    Need.ATTITUDE: row("torque", magnetic, more_magnetic, ("attitude", "torque"), in_file=False),
-    Need.FLIGHT: Row(
+    Feature.ROTOR: row("rotor", np.array((0.6, -0.5, 0.9)), np.array((0.6, -0.5, 1.3)), ("rotor",)),
+    Feature.MOTOR: row("rotor", (RAMP, MOMENTA), (RAMP, 1.5 * MOMENTA), ("motor", "rotor"), replace(FREE, rotor=MOMENTA[0])),
+    Feature.TORQUE: row("torque", (TIMES, VALUES), (TIMES, 1.5 * VALUES), ("torque",), replace(FREE, frame="world")),
+    Feature.DAMPING: row("damping", 0.6 * J + 0.2 * np.cross(np.eye(3), DIRECTION), 0.9 * J, ("damping",)),
+    Feature.ATTITUDE: row("torque", magnetic, more_magnetic, ("attitude", "torque"), in_file=False),
+    Feature.FLIGHT: Row(
         replace(FREE, flight=(MASS, COM, 9.81, (0.1, 0.2, 0.3), (1.0, -2.0, 3.0))),
         PIVOTED,
         replace(FREE, w0=1.1 * FREE.w0, flight=(MASS, COM, 9.81, (0.1, 0.2, 0.3), (1.0, -2.0, 4.0))),

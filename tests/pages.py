@@ -14,7 +14,7 @@ COMMENT = re.compile(r"\s+#.*$")
 
 
 def pages():
-    """Return all pages: those at the top, and those in the rooms; the links below `conservative` are not followed."""
+    """Return all pages: those at the top, and those in the packages; the links below `conservative` are not followed."""
     return sorted(ROOT.glob("*.md")) + sorted(page for place in PLACES for page in (ROOT / place).rglob("*.md"))
 
 

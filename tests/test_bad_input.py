@@ -46,7 +46,7 @@ def field(**changed):
 
 
 class Texts(cv.UniformGravity):
-    needs = frozenset({"gravity"})
+    features = frozenset({"gravity"})
 
 
 API = [
@@ -107,7 +107,7 @@ API = [
     (lambda: cv.Reduced(tol=-1e-9), "tol", "-1e-09", "above 0"),
     (lambda: cv.Reduced(order=3), "order", "3", "2, 4, 6, 8, 10"),
     (lambda: cv.Gauss(stages=0), "stages", "0", "1 to 10"),
-    (lambda: cv.integrate(TOP, 0.01, cv.MoserVeselov()), "method", "lagrange_top", "does not take uniform gravity"),
+    (lambda: cv.integrate(TOP, 0.01, cv.MoserVeselov()), "method", "lagrange_top", "does not support uniform gravity"),
     (lambda: cv.integrate(BRICK, 0.7, cv.MoserVeselov()), "dt", "0.7", "|w| dt < 6"),
     (lambda: cv.integrate(BRICK, 0.01, cv.Gauss(frame="non_spinning")), "method", "brick_flip", "symmetric"),
     (lambda: MuJoCo("RK5"), "integrator", "'RK5'", "'RK4'"),
@@ -142,11 +142,16 @@ API = [
     (lambda: scene(extra_invariants=[1.0]), "extra_invariants", "[1.0]", "Invariants"),
     (lambda: scene(potential=cv.UniformGravity), "potential", "UniformGravity", "a Potential"),
     (lambda: scene(name="a\0b"), "name", "x00", "a text"),
-    (lambda: cv.Card(takes={"gravity"}), "takes", "'gravity'", "Need.GRAVITY"),
-    (lambda: cv.Card(takes="rotors"), "takes", "'rotors'", "Need.ROTOR"),
-    (lambda: cv.Card(takes=frozenset({"uniform gravity", cv.Need.ROTOR})), "takes", "'uniform gravity'", "Need.GRAVITY"),
-    (lambda: cv.Card(takes=[cv.Need.GRAVITY]), "takes", "Need.GRAVITY", "a set of members"),
-    (lambda: scene(potential=Texts(1.0, (0, 0, 1))), "needs", "'gravity'", "Need.GRAVITY"),
+    (lambda: cv.MethodInfo(supports={"gravity"}), "supports", "'gravity'", "Feature.GRAVITY"),
+    (lambda: cv.MethodInfo(supports="rotors"), "supports", "'rotors'", "Feature.ROTOR"),
+    (
+        lambda: cv.MethodInfo(supports=frozenset({"uniform gravity", cv.Feature.ROTOR})),
+        "supports",
+        "'uniform gravity'",
+        "Feature.GRAVITY",
+    ),
+    (lambda: cv.MethodInfo(supports=[cv.Feature.GRAVITY]), "supports", "Feature.GRAVITY", "a set of members"),
+    (lambda: scene(potential=Texts(1.0, (0, 0, 1))), "features", "'gravity'", "Feature.GRAVITY"),
     (lambda: cv.Invariant("i" * 1001, "J", 1.0, len), "name", "'iii", "1,000"),
     (lambda: cv.Invariant("i", "J", 0.0, len), "scale", "0.0", "above 0"),
     (lambda: cv.Invariant("i", "J", 1.0, None), "evaluate", "None", "a function"),
@@ -194,7 +199,7 @@ COMMANDS = [
     ("run brick_flip --dt 0 --csv out.csv", "dt", "0.0", "above 0"),
     ("run brick_flip --dt fast", "--dt", "'fast'", "float"),
     ("run brick_flip -m convected:tol=-1", "tol", "-1", "above 0"),
-    ("run lagrange_top -m moser_veselov", "method", "lagrange_top", "does not take uniform gravity"),
+    ("run lagrange_top -m moser_veselov", "method", "lagrange_top", "does not support uniform gravity"),
     ("run brick_flip --csv no/such/folder/out.csv", "csv", "no/such/folder", "folder"),
     ("run no_such_file.toml", "no_such_file.toml", "no_such_file.toml", "file"),
     ("report --methods reduced,nope", "method", "'nope'", "one of"),

@@ -1,7 +1,7 @@
 """Every part of a scene crossed with every command and entry point that takes a scene.
 
 In each cell the right motion is right, the motion without the part is not called right, or the part is refused by a message
-that names it. Right motions are those of `independent`. A member of `Need` without a row and a command without a column fail.
+that names it. `independent` has the right motions. A member of `Feature` without a row and a command without a column fail.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.versions.project import define_scene
-from conservative.needs import Need
+from conservative.features import Feature
 from conservative.programs import Program
 from conservative.references.engine import mass_model, principal_axes
 from conservative.references.environments.plain_numbers import describe
@@ -84,13 +84,13 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = (Path(__file__).parent / "references" / "programs" / "engine.py").read_text()
     assert '{"order": 4}' in text
     path = tmp_path_factory.mktemp("program") / "engine.py"
-    path.write_text(text.replace('{"order": 4}', '{"order": 4, "card": {"rotors": True, "flight": True}}'))
+    path.write_text(text.replace('{"order": 4}', '{"order": 4, "method_info": {"rotors": True, "flight": True}}'))
     return path
 
 
 @pytest.fixture
 def cell(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: Path) -> Cell:
-    """Return the cell of a member of `Need`; scenes that no file can have are registered for the time of the test."""
+    """Return the cell of a member of `Feature`; scenes that no file can have are registered for the time of the test."""
     row, names = ROWS[request.param], []
     monkeypatch.chdir(tmp_path)
     cases = {"crossed": row.case, "another": row.other, "copy": row.case, "without": row.without}
@@ -411,7 +411,7 @@ def check(cell: Cell, column: Any, may_refuse: bool = True) -> None:
     assert not refusal or re.search(words, refusal), f"a refusal that does not name the part: {refusal}"
 
 
-@pytest.mark.parametrize("cell", Need, indirect=True, ids=lambda need: need.name)
+@pytest.mark.parametrize("cell", Feature, indirect=True, ids=lambda feature: feature.name)
 @pytest.mark.parametrize(
     "column",
     [pytest.param(each, id=each.__name__, marks=[pytest.mark.slow] * (each in SLOW)) for each in columns],
@@ -420,7 +420,7 @@ def test_a_part_is_right_or_refused(cell: Cell, column: Any) -> None:
     check(cell, column, column not in NEVER)
 
 
-@pytest.mark.parametrize("cell", Need, indirect=True, ids=lambda need: need.name)
+@pytest.mark.parametrize("cell", Feature, indirect=True, ids=lambda feature: feature.name)
 @pytest.mark.parametrize("method", METHODS)
 def test_prepare_and_check_are_right_or_refuse(cell: Cell, method: str) -> None:
     scene, grid = cell.row.scene(), cv.Grid(0.005, 400, 50)
@@ -433,8 +433,8 @@ def test_prepare_and_check_are_right_or_refuse(cell: Cell, method: str) -> None:
         return
     with pytest.raises(cv.Unsupported) as refusal:
         chosen.prepare(scene, grid)
-    for need in scene.needs - chosen.takes:
-        assert need.value in str(refusal.value)
+    for feature in scene.features - chosen.supports:
+        assert feature.value in str(refusal.value)
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -443,29 +443,29 @@ def test_a_body_of_the_random_study_is_the_scene_of_its_name(field: str) -> None
 
 
 def test_every_part_has_a_row() -> None:
-    assert set(ROWS) == set(Need)
-    for need, row in ROWS.items():
-        assert need in row.scene().needs
-        assert need not in row.scene(row.without).needs
+    assert set(ROWS) == set(Feature)
+    for feature, row in ROWS.items():
+        assert feature in row.scene().features
+        assert feature not in row.scene(row.without).features
         assert row.distance(row.t, row.wrong_motion[0]) > APART  # measured: from 0.39
         assert row.distance(row.t, motion(row.other, row.t)[0]) > 10 * RIGHT  # measured: from 0.21
 
 
 def test_a_jump_of_all_components_is_a_break() -> None:
-    assert ROWS[Need.TORQUE].scene().breaks.tolist() == [0.5, 0.8, 1.3, 2.0]
+    assert ROWS[Feature.TORQUE].scene().breaks.tolist() == [0.5, 0.8, 1.3, 2.0]
 
 
 def test_every_command_that_takes_a_scene_has_a_column() -> None:
-    def takes(command: Any) -> bool:
+    def supports(command: Any) -> bool:
         inner = getattr(command, "commands", {}).values()
-        return any(each.name in OF_SCENES for each in command.params) or any(map(takes, inner))
+        return any(each.name in OF_SCENES for each in command.params) or any(map(supports, inner))
 
-    assert {name for name, command in main.commands.items() if takes(command)} == set(COMMANDS)
+    assert {name for name, command in main.commands.items() if supports(command)} == set(COMMANDS)
 
 
 def test_a_wrong_motion_is_not_called_right(tmp_path: Path) -> None:
     """The check of the cells sees a motion without the part."""
-    row = ROWS[Need.ROTOR]
+    row = ROWS[Feature.ROTOR]
     cell = Cell(row, tmp_path, "", "")
     cell.check(row.t, row.motion[0])
     with pytest.raises(AssertionError):

@@ -18,7 +18,7 @@ from conservative.version import VERSION
 
 from .environments import LEAN, PATIENCE, ROOT, run_python, variables
 
-ROOMS = ("references", "benchmarks", "reports")
+PACKAGES = ("references", "benchmarks", "reports")
 IMPORTED_AS = {
     "pin": "pinocchio",
     "vl-convert-python": "vl_convert",
@@ -32,7 +32,7 @@ IMPORTED_AS = {
 
 def modules():
     """Return the files of the package in this checkout, by their paths below its root."""
-    links = [ROOT / "conservative", *(ROOT / "conservative" / room for room in ROOMS)]
+    links = [ROOT / "conservative", *(ROOT / "conservative" / room for room in PACKAGES)]
     return sorted({str(file.relative_to(ROOT)) for link in links for file in link.rglob("*.py")})
 
 
@@ -55,7 +55,7 @@ def test_the_sdist_has_no_doubles(sdist):
     names = [str(PurePosixPath(member.name).relative_to(PurePosixPath(member.name).parts[0])) for member in members]
     assert len(names) == len(set(names))
     assert sorted(name for name in names if name.startswith("conservative/") and name.endswith(".py")) == modules()
-    assert not [name for name in names if PurePosixPath(name).parts[0] in ROOMS]
+    assert not [name for name in names if PurePosixPath(name).parts[0] in PACKAGES]
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_the_commands_in_the_readme_name_extras_that_exist():
     assert named <= set(extras)
 
 
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", PACKAGES)
 def test_a_room_has_one_name(room):
     code, _, error = run_python(f"import {room}")
     assert code == 1

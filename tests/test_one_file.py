@@ -17,7 +17,7 @@ SOURCE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.card import Card, Cost
+from conservative.method_info import MethodInfo, Cost
 from conservative.method import Method, Role
 from conservative.methods.reduced import Reduced
 
@@ -30,7 +30,7 @@ class Borrowed(Method):
 
     family: ClassVar[str] = "borrowed"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("parts=1", "parts=2", "parts=3"),
         suite=("parts=2",),
         pictures=("parts=3",),
@@ -52,7 +52,7 @@ class Borrowed(Method):
         return Reduced().prepare(scene, grid)
 '''
 SILENT = (
-    SOURCE.partition("    card:")[0]
+    SOURCE.partition("    method_info:")[0]
     + """
     order = None
 

@@ -14,7 +14,7 @@ import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import measurement
-from conservative.needs import Need
+from conservative.features import Feature
 
 from .pages import ROOT, pages
 from .reports.rows import row
@@ -99,7 +99,9 @@ def test_a_page_that_differs_from_the_code_is_found(page, word, copied, check):
 
 
 def test_a_method_that_takes_more_makes_the_pages_stale(copied, check, monkeypatch):
-    monkeypatch.setattr(cv.Gauss, "card", replace(cv.Gauss.card, takes=cv.Gauss.card.takes | {Need.SPRING}))
+    monkeypatch.setattr(
+        cv.Gauss, "method_info", replace(cv.Gauss.method_info, supports=cv.Gauss.method_info.supports | {Feature.SPRING})
+    )
     assert check(copied).startswith("conservative/reference.md is not current")
 
 

@@ -11,7 +11,7 @@ from packaging.specifiers import SpecifierSet
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks import contest
+from conservative.benchmarks import speed_ratio
 from conservative.benchmarks.studies import random
 from conservative.benchmarks.studies.engines_at_one_step import count_turns_over
 
@@ -115,7 +115,7 @@ def moving(rows, *names):
 
 def steps(rows):
     """Return the steps of the picture, ms: those of users."""
-    assert registry.method("mujoco:Euler").card.usual_dt == rows.value["picture", "MuJoCo, default", "step"]
+    assert registry.method("mujoco:Euler").method_info.usual_dt == rows.value["picture", "MuJoCo, default", "step"]
     return [Near(1e3 * rows.value["picture", name, "step"]) for name in ("MuJoCo, default", "PyBullet")]
 
 
@@ -155,7 +155,7 @@ def of_bodies(rows):
     fields = {place.split()[0] for place in rows.of(rows.program.BODIES)}
     assert (len(errors), len(fields)) == (11, 5)
     assert "12 rad" in random.__doc__
-    return [12, rows.bodies("bodies in each field"), errors[0], errors[-1], 100 * contest.CONFIDENCE]
+    return [12, rows.bodies("bodies in each field"), errors[0], errors[-1], 100 * speed_ratio.CONFIDENCE]
 
 
 def cases(rows):
@@ -257,7 +257,7 @@ CLAIMS = {
         cv.Reduced().order,
     ],
     "Measured on": lambda rows: [float(rows.date[:4])],
-    "Parentheses contain intervals": lambda rows: [100 * contest.CONFIDENCE],
+    "Parentheses contain intervals": lambda rows: [100 * speed_ratio.CONFIDENCE],
     r"\* heyoka is more accurate than `x` on the brick": accurate("brick_flip"),
     r"\* heyoka is more accurate than `x` on the top": accurate("lagrange_top"),
     r"\* heyoka is [\d.]+ \(.*\) times as fast as `x` on the top": lambda rows: [

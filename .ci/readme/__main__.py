@@ -21,15 +21,15 @@ import declared
 import marks
 import measured
 import published
-from code_map import ROOMS, ROOT
+from code_map import PACKAGES, ROOT
 
 PICTURE = Path("reports", "pictures", "time_against_error.svg")
 PARTS = {**measured.TABLES, **declared.TABLES, **published.TABLES, **bibliography.TABLES}
 
 
 def read_pages(root: Path) -> dict[Path, str]:
-    """Return the texts of README.md and of the pages of the rooms below a folder."""
-    pages = [root / "README.md", *(page for room in (*ROOMS, ".github") for page in (root / room).rglob("*.md"))]
+    """Return the texts of README.md and of the pages of the packages below a folder."""
+    pages = [root / "README.md", *(page for room in (*PACKAGES, ".github") for page in (root / room).rglob("*.md"))]
     return {page: page.read_text(encoding="utf-8") for page in pages}
 
 

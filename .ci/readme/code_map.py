@@ -1,4 +1,4 @@
-"""Where the code is: a line for each file and folder of a room, from its docstring."""
+"""Where the code is: a line for each file and folder of a package, from its docstring."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from marks import table
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("conservative", "references", "benchmarks", "reports")
+PACKAGES = ("conservative", "references", "benchmarks", "reports")
 
 
 def summary(text: str | None) -> str:
@@ -20,7 +20,7 @@ def summary(text: str | None) -> str:
 
 
 def map_of(room: Path) -> str:
-    """Return a row for each folder of a room that has a docstring, then for each of its files."""
+    """Return a row for each folder of a package that has a docstring, then for each of its files."""
     files = {f"{path.parent.name}/": path for path in room.glob("*/__init__.py") if not path.parent.is_symlink()}
     files |= {path.name: path for path in room.glob("*.py") if path.name != "__init__.py"}
     words = {name: ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) for name, path in files.items()}

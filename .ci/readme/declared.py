@@ -1,4 +1,4 @@
-"""Tables of what the code declares: methods, the parts of scenes that each takes, cards, engines, studies and commands."""
+"""Tables of what the code declares: methods, the features that each supports, engines, studies and commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from code_map import ROOMS, ROOT, map_of, summary
+from code_map import PACKAGES, ROOT, map_of, summary
 from marks import table
 
 from conservative.version import VERSION
@@ -50,12 +50,12 @@ def methods() -> str:
 
 
 def _method_row(kind: Any) -> list[str]:
-    default, variants = kind(), dict(zip(kind.card.variants, kind.settings_for("variants"), strict=True))
+    default, variants = kind(), dict(zip(kind.method_info.variants, kind.settings_for("variants"), strict=True))
     orders = sorted({each.order for each in variants.values() if each.order})
     order = [" to ".join(str(each) for each in dict.fromkeys([*orders[:1], *orders[-1:]]))] if orders else []
     if None in {each.order for each in variants.values()}:
-        order += ["exact"] if kind.card.exact else ["adaptive"] if orders else ["–"]
-    structures = {text: kind.card.structure(each) for text, each in variants.items()}
+        order += ["exact"] if kind.method_info.exact else ["adaptive"] if orders else ["–"]
+    structures = {text: kind.method_info.structure(each) for text, each in variants.items()}
     found = [each for each in structures.values() if each]
     kept = [word for word in ("energy", "momentum", "axial momentum") if any(map(_is(word), default.conserves))]
     how = "imposed" if any(each.imposed for each in found) else "inherited"
@@ -80,31 +80,31 @@ def _which(answers: dict[str, bool]) -> str:
 
 def support() -> str:
     """Return a row for the methods and engines that take the same parts of scenes, and a column for parts taken by the same."""
-    from conservative.needs import Need
+    from conservative.features import Feature
 
-    rows: dict[frozenset[Need], list[str]] = {}
+    rows: dict[frozenset[Feature], list[str]] = {}
     for group in GROUPS:
         for name, kind in entries(group):
-            rows.setdefault(kind.card.takes, []).append(f"`{name}`")
-    columns: dict[tuple[bool, ...], list[Need]] = {}
-    for need in Need:
-        columns.setdefault(tuple(need in takes for takes in rows), []).append(need)
-    header = ["", *(", ".join(need.name.lower() for need in needs) for needs in columns.values())]
+            rows.setdefault(kind.method_info.supports, []).append(f"`{name}`")
+    columns: dict[tuple[bool, ...], list[Feature]] = {}
+    for feature in Feature:
+        columns.setdefault(tuple(feature in supports for supports in rows), []).append(feature)
+    header = ["", *(", ".join(feature.name.lower() for feature in features) for features in columns.values())]
     lines = [
-        [", ".join(dict.fromkeys(names)), *("✓" if needs[0] in takes else "" for needs in columns.values())]
-        for takes, names in sorted(rows.items(), key=lambda row: -len(row[0]))
+        [", ".join(dict.fromkeys(names)), *("✓" if features[0] in supports else "" for features in columns.values())]
+        for supports, names in sorted(rows.items(), key=lambda row: -len(row[0]))
     ]
-    words = [f"*{need.name.lower()}*: {need.value}" for need in Need]
+    words = [f"*{feature.name.lower()}*: {feature.value}" for feature in Feature]
     return table(header, lines) + f"\n{'; '.join(words)}.\n"
 
 
-def card() -> str:
-    """Return the entries of `Card` with their defaults, from its docstring."""
-    from conservative.card import Card
+def method_info() -> str:
+    """Return the entries of `MethodInfo` with their defaults, from its docstring."""
+    from conservative.method_info import MethodInfo
 
-    attributes = inspect.cleandoc(Card.__doc__ or "").partition("Attributes\n----------\n")[2]
+    attributes = inspect.cleandoc(MethodInfo.__doc__ or "").partition("Attributes\n----------\n")[2]
     meanings = re.findall(r"^(\w+)\n((?:    .*\n?)+)", attributes, re.MULTILINE)
-    defaults = {each.name: each.default for each in dataclasses.fields(Card)}
+    defaults = {each.name: each.default for each in dataclasses.fields(MethodInfo)}
     return table(
         ["entry", "default", "meaning"],
         [[f"`{name}`", _default(defaults.pop(name)), " ".join(text.split())] for name, text in meanings],
@@ -197,10 +197,10 @@ def kept_motions() -> list[dict[str, Any]]:
 def motions() -> str:
     """Return a row for each motion."""
     rows = [
-        [f"`{each['name']}`", each["about"], ", ".join(each["needs"]), f"{each['tolerance'][0]['steps'] * len(each['t'])}"]
+        [f"`{each['name']}`", each["about"], ", ".join(each["features"]), f"{each['tolerance'][0]['steps'] * len(each['t'])}"]
         for each in kept_motions()
     ]
-    return table(["motion", "what it is", "needs", "steps of 0.1 rad"], rows)
+    return table(["motion", "what it is", "features", "steps of 0.1 rad"], rows)
 
 
 def _factor(x: float) -> str:
@@ -229,13 +229,13 @@ def mistakes() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,
-    "card": card,
+    "method info": method_info,
     "engines": partial(engines, GROUPS[0], ROOT / "references" / "README.md"),
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
     "studies": studies,
     "commands": commands,
     "motions": motions,
     "mistakes of motions": mistakes,
-    **{f"code of {room}": partial(map_of, ROOT / room) for room in ROOMS},
+    **{f"code of {room}": partial(map_of, ROOT / room) for room in PACKAGES},
 }
 """Tables by the name of their mark."""

@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 
 from conservative import registry
-from conservative.benchmarks.contest import Contest, Ratios, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import Ratios, SpeedRatio, cheapest, costs
 from conservative.errors import AccuracyNotReached
 from conservative.integration.one import integrate
 from conservative.invariants import sizes
@@ -22,7 +22,7 @@ from conservative.reports.rows.names import MethodClass, of_classes, with_names
 from conservative.reports.rows.points import points
 from conservative.reports.sections import many_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
-from conservative.reports.sections.scene_contests import each_step
+from conservative.reports.sections.scene_ratios import each_step
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
 CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
@@ -158,17 +158,17 @@ def _side_rows(place: str, error: float, reached: pd.DataFrame, shown: Any = Non
         yield common | {"quantity": "time", "unit": "us per s", "value": time}
     general, *_ = OURS
     common = {"scene": place, "name": general, "version": ""}
-    yield from _ratio_rows(common, Contest(place, error, fastest[general], fastest["heyoka"]))
+    yield from _ratio_rows(common, SpeedRatio(place, error, fastest[general], fastest["heyoka"]))
 
 
 def many_rows(throughput: Path) -> Iterator[dict[str, Any]]:
     """Yield heyoka's time over ours for many bodies at once."""
     rows = many_bodies.lines(with_names(_read(throughput / "study.csv")))
-    for group, engine, statistic, _, contest in many_bodies.contests(rows, many_bodies.body_costs(rows)):
+    for group, engine, statistic, _, speed_ratio in many_bodies.speed_ratios(rows, many_bodies.body_costs(rows)):
         if group == MethodClass.GENERAL and engine == "heyoka":
-            place = f"{contest.scene.replace('_', ' ')}, {statistic}, {tolerance(contest.error)} rad"
+            place = f"{speed_ratio.scene.replace('_', ' ')}, {statistic}, {tolerance(speed_ratio.error)} rad"
             common = {"scene": place, "name": "many bodies", "version": "", "command": MANY}
-            yield from (common | {"date": _date(throughput / "study.csv")} | row for row in _ratio_rows({}, contest))
+            yield from (common | {"date": _date(throughput / "study.csv")} | row for row in _ratio_rows({}, speed_ratio))
 
 
 def _run_rows(run: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -197,11 +197,11 @@ def _time_rows(timed: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
         yield common | {"name": name, "quantity": "time", "unit": "us per s", "value": time, "method": method}
     durations = [each for each in reached["scene"].unique() if each.partition(":")[0] == scene]
     for name in ("ours", "closed form"):
-        contests = [Contest(each, ERROR, fastest(each, families[name]), fastest(each, "heyoka")) for each in durations]
-        yield from _ratio_rows(common | {"name": name}, Ratios(tuple(contests)))
+        speed_ratios = [SpeedRatio(each, ERROR, fastest(each, families[name]), fastest(each, "heyoka")) for each in durations]
+        yield from _ratio_rows(common | {"name": name}, Ratios(tuple(speed_ratios)))
 
 
-def _ratio_rows(place: dict[str, Any], each: Contest | Ratios) -> Iterator[dict[str, Any]]:
+def _ratio_rows(place: dict[str, Any], each: SpeedRatio | Ratios) -> Iterator[dict[str, Any]]:
     """Yield heyoka's time over ours and the ends of its interval."""
     for quantity, value in zip(("", ", low", ", high"), (each.ratio, *each.interval), strict=True):
         yield place | {"quantity": f"heyoka's time over ours{quantity}", "value": value, "unit": "1", "method": ""}
@@ -216,9 +216,9 @@ def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
     found = [each for each in ratios(with_names(table)) if each.engine == ANY]
     for each in found:
         yield from _ratio_rows(common | {"scene": f"{each.field} {each.error:g} rad"}, each)
-    every = Ratios(tuple(contest for each in found for contest in each.contests))
-    counts = {"cases": len(every.contests), "cases won": every.won, "cases open": every.open, "cases lost": every.lost}
-    counts |= {"bodies in each field": len(found[0].contests)}
+    every = Ratios(tuple(speed_ratio for each in found for speed_ratio in each.speed_ratios))
+    counts = {"cases": len(every.speed_ratios), "cases won": every.won, "cases open": every.open, "cases lost": every.lost}
+    counts |= {"bodies in each field": len(found[0].speed_ratios)}
     extremes = {"smallest ratio": min(each.worst for each in found), "largest ratio": max(each.best for each in found)}
     for quantity, count in (counts | extremes).items():
         yield common | {"scene": "all fields", "quantity": quantity, "value": count}

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from conservative.attitude import angle_between
-from conservative.benchmarks.contest import Cheapest, Contest, Ratios
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.processes import PROCESSES, Processes
+from conservative.benchmarks.speed_ratio import Cheapest, Ratios, SpeedRatio
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.random import SAMPLES, random_study
 from conservative.benchmarks.studies.speed import keep_end, time_runs
@@ -38,7 +38,7 @@ def settings(tolerance: float) -> dict[str, Method]:
 def typed_rows(seed: int) -> Iterator[dict[str, Any]]:
     """Yield heyoka's time over ours per field and tolerance, over all fields, and the errors, as rows of measured.csv."""
     study = random_study((Taylor(), Heyoka()), BODIES, seed, processes=PROCESSES)
-    contests: dict[tuple[str, float], list[Contest]] = defaultdict(list)
+    speed_ratios: dict[tuple[str, float], list[SpeedRatio]] = defaultdict(list)
     errors: dict[tuple[str, float], list[float]] = defaultdict(list)
     with Processes(study.processes) as processes:
         for scene, drawn in zip(study.scenes, study.drawn, strict=True):
@@ -58,11 +58,13 @@ def typed_rows(seed: int) -> Iterator[dict[str, Any]]:
                 times[sides[row.method]].append(row.value)
             for tolerance in TOLERANCES:
                 both = [Cheapest(min(each), side, tuple(each)) for side in (OURS, HEYOKA) for each in [times[side, tolerance]]]
-                contests[drawn.field, tolerance].append(Contest(scene.name, tolerance, *both))
+                speed_ratios[drawn.field, tolerance].append(SpeedRatio(scene.name, tolerance, *both))
     common = {"name": "typed tolerance", "unit": "1", "method": "", "version": "", "command": COMMAND}
     common |= {"date": datetime.date.today().isoformat()}
-    every = {("all fields", t): [each for (_, at), found in contests.items() if at == t for each in found] for t in TOLERANCES}
-    for (field, tolerance), found in {**contests, **every}.items():
+    every = {
+        ("all fields", t): [each for (_, at), found in speed_ratios.items() if at == t for each in found] for t in TOLERANCES
+    }
+    for (field, tolerance), found in {**speed_ratios, **every}.items():
         ratios, place = Ratios(tuple(found)), common | {"scene": f"{field} {tolerance:g}"}
         values = dict(zip(("", ", low", ", high"), (ratios.ratio, *ratios.interval), strict=True))
         for end, value in {**values, ", smallest": ratios.worst, ", largest": ratios.best}.items():

@@ -3,7 +3,7 @@
 The place of code and data in memory makes a loop several percent slower or faster for the life of a process: two identical
 programs of heyoka differed by 3.5 % in the median case, and by 52 % in one, within a process. More rounds do not help. The runs
 of a scene are therefore timed in several processes, each with all runs in interleaved rounds, so that a ratio has one value per
-process, and `contest` an interval for it. Only one process works at a time. Each lives over all scenes of a study, so that
+process, and `speed_ratio` an interval for it. Only one process works at a time. Each lives over all scenes of a study, so that
 imports and compilation are paid once per process.
 
 with Processes(study.processes) as processes:

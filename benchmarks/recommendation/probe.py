@@ -17,13 +17,13 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
+from conservative.features import Feature
 from conservative.grid import Grid, count_steps
 from conservative.integration.one import integrate
 from conservative.method import Method
 from conservative.methods.search import SAFETY, find_cheapest
 from conservative.methods.trials import ASYMPTOTIC, trials_of
 from conservative.methods.units import bound_rate
-from conservative.needs import Need
 from conservative.outcome import Outcome
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
@@ -296,7 +296,7 @@ def prepare_conditions(asked: Question) -> Conditions:
     rate = max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)  # at least one radian in the whole duration
     closed = Exact().unsupported(scene) is None
     length = min(duration, (CLOSED_RADIANS if closed else RADIANS) / rate)
-    if scene.loaded or Need.TIME in scene.needs:  # a part of the motion says nothing about the rest
+    if scene.loaded or Feature.TIME in scene.features:  # a part of the motion says nothing about the rest
         length = duration
     widest = min(length / SAMPLES, step_ladder.RADIANS / rate)
     power = math.floor(math.log10(widest))

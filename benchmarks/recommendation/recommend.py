@@ -140,7 +140,7 @@ class Advice:
     @property
     def general(self) -> bool:
         """True for a general integrator, False for a closed form of some motions."""
-        return self.best is None or not self.best.method.card.exact
+        return self.best is None or not self.best.method.method_info.exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     progress(0.0, "reference solution")
     conditions = prepare_conditions(asked)
     starts = [conditions.choose_ours()]
-    if starts[0][0].card.exact and (general := candidates(asked.scene, exact=False)):
+    if starts[0][0].method_info.exact and (general := candidates(asked.scene, exact=False)):
         starts.append(conditions.choose_ours(general))
     starts += [(method, math.nan) for method in asked.methods]
     roles: dict[str, Role] = {}

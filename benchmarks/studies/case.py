@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import conservative
 from conservative.attitude import Array
-from conservative.card import Maker
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine, PotentialFailed, TorqueFailed
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
+from conservative.method_info import Maker
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

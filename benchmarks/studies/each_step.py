@@ -4,8 +4,8 @@
 intervals cost more: a method with a step size takes one or more steps per interval, and a method with a tolerance interpolates
 within its longer steps.
 
-* The setting of a method is the coarsest that is credited (see `contest`) with an attitude error over all samples of at most
-  `ERROR`: a finer setting with a larger error disqualifies it. A method without such a setting has errors and no time.
+* The setting of a method is the coarsest that is credited (see `speed_ratio`) with an attitude error over all samples of at
+  most `ERROR`: a finer setting with a larger error disqualifies it. A method without such a setting has errors and no time.
 * It is timed twice, interleaved with all others: with all samples stored as attitude matrices and rates, and with the final
   state only, as in all other studies. For an engine the first includes the conversion of its states, which one compiled loop
   does for all engines in 10 to 40 ns per sample; the engine's own loop is timed as well, without it.
@@ -23,10 +23,10 @@ from conservative.outcome import Outcome
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..contest import credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
+from ..speed_ratio import credit, first_within
 from .case import Case, Success
 from .declaration import Declaration, Extent
 from .line import LinePoint, list_settings, measure_line

@@ -47,7 +47,7 @@ class Way:
 
 def list_ways(method: Method) -> tuple[Way, ...]:
     """Return the compared ways of a method; for our methods also one body at a time, and two threads."""
-    if not method.card.many:  # it runs one body at a time
+    if not method.method_info.many:  # it runs one body at a time
         return (Way(method, together=False),)
     return (Way(method), Way(method, together=False), Way(method, threads=2)) if method.role == Role.OURS else (Way(method),)
 

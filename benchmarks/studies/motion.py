@@ -87,7 +87,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
 
 def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[Case]:
     """Return the runs of a method of which the first that succeeds is shown: ten durations if it is drawn, and one."""
-    step = min(scene.t_end, (method.order and method.card.usual_dt) or scene.dt)
+    step = min(scene.t_end, (method.order and method.method_info.usual_dt) or scene.dt)
     every = math.ceil(scene.t_end / step / MOST_SAMPLES)
     if every > 1:  # the samples of ten durations would not be those of one; and the run is long enough
         drawn = False
@@ -96,7 +96,7 @@ def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[C
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods in the charts: of each family those of `Card.pictures`, or else the first."""
+    """Return the methods in the charts: of each family those of `MethodInfo.pictures`, or else the first."""
     competitors = [method for method in methods if method.role != Role.TRUTH]
     preferred = [method for method in competitors if method in method.settings_for("pictures")]
     firsts = {method.family: method for method in reversed(competitors)}

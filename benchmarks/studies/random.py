@@ -33,11 +33,11 @@ from conservative.references.worker.client import time_limit
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 from conservative.trajectory import Trajectory
 
-from ..contest import cost, list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..measures.timing import wall_time
+from ..speed_ratio import cost, list_deciding
 from .case import NOT_DRAWN, Case, Drawn, outcome_of_error
 from .declaration import Declaration
 from .line import list_settings
@@ -94,7 +94,7 @@ def settings(method: Method) -> tuple[Method, ...]:
     """
     variants = method.settings_for("variants")
     if method.role in (Role.OURS, Role.BASELINE):
-        approximate = method.card.rank is not None and not method.card.exact
+        approximate = method.method_info.rank is not None and not method.method_info.exact
         variants = (*method.settings_for("candidates"), *filter(tolerance_setting, variants)) if approximate else ()
     return tuple(each for each in variants if (each.order or ORDER) >= ORDER)
 
@@ -177,7 +177,7 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
 
     They belong to lines with an estimated time of at most `MARGIN` times the fastest of the side. Each line contributes the
-    coarsest point that is credited with the decade (see `contest`), and the one before it.
+    coarsest point that is credited with the decade (see `speed_ratio`), and the one before it.
     """
     sides: dict[str, list[Line]] = {}
     for line in filter(None, lines):

@@ -100,11 +100,11 @@ def methods(
 
 
 def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
-    """Return the methods that a report includes by default: those of `Card.report` in all families. Raises as `methods`."""
+    """Return the methods that a report includes by default: `MethodInfo.report` of all families. Raises as `methods`."""
     families = registry.list_families()
     names = []
     for name in registry.list_methods():
-        settings = families[name].card.settings("report") if name in families else ("",)
+        settings = families[name].method_info.settings("report") if name in families else ("",)
         names += [f"{name}:{setting}" if setting else name for setting in settings]
     return methods(names, skip_missing, lambda method: (method,))
 

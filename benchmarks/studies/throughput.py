@@ -35,10 +35,10 @@ from conservative.references.exact.method import Exact
 from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene
 
-from ..contest import list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
+from ..speed_ratio import list_deciding
 from .case import Case, Drawn, outcome_of_error
 from .declaration import Declaration, Extent, Named
 from .ensembles import DURATION, KINDS, draw

@@ -124,7 +124,7 @@ def is_known_to_end(method: Method) -> bool:
 
 def is_bounded(method: Method) -> bool:
     """Return whether a run ends for certain: our kernels take a fixed number of steps, and reference solutions have limits."""
-    return bool(method.card.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
+    return bool(method.method_info.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
 
 
 def _is_ours(method: Method) -> bool:

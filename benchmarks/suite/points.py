@@ -112,7 +112,7 @@ def _hash(content: object) -> str:
 
 
 def points() -> Iterator[Point]:
-    """Yield the points: the settings of `Card.suite` of every registered method on every scene of the suite."""
+    """Yield the points: the settings of `MethodInfo.suite` of every registered method on every scene of the suite."""
     every = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
     methods = [method for method in every if method.role != Role.TRUTH]
     truths = remember_truths()

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, angle_between, to_quaternion
-from conservative.needs import IN_TIME
+from conservative.features import IN_TIME
 from conservative.scene import Scene
 
 from .solution import ANGLE, Equations, States, closed, truth
@@ -79,7 +79,7 @@ def take_rows(data: States, rows: Any) -> States:
 
 def weigh(scene: Scene) -> float:
     """Return the work of a solution in a scene, relative to the work for a free body."""
-    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.needs & IN_TIME)
+    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.features & IN_TIME)
     varying = None if scene.damping is None else scene.damping.of_time
     slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
     return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state

@@ -205,7 +205,7 @@ def measure_order(answers: Answers) -> float:
     """
     slopes, floor = [], RESOLVED["f32" if answers.single else "f64"]
     free = [
-        each for each in answers.ran if not each.motion.needs and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
+        each for each in answers.ran if not each.motion.features and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
     ]
     for each in free[:GENERIC]:
         errors = [float(run_motion(answers.solve, each.motion, each.allowed, n).error[0]) for n in LADDER]
@@ -260,7 +260,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
 
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
     """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
-    return bool(ran.motion.needs), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+    return bool(ran.motion.features), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
 
 
 @dataclass(frozen=True)
@@ -382,7 +382,7 @@ def repeatability(subject: str, method: Method, answers: Answers) -> Iterator[Fi
     """Yield whether a second run of a model has the same bits, for the first free motion and the first other one."""
     done = set[bool]()
     for each in answers.ran:
-        if (free := not each.motion.needs) in done or each.ended:
+        if (free := not each.motion.features) in done or each.ended:
             continue
         done.add(free)
         run = method.prepare(each.motion.scene, Grid(each.step, 100, 10))

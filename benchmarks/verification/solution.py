@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.errors import PotentialFailed, TorqueFailed
-from conservative.needs import IN_TIME
+from conservative.features import IN_TIME
 from conservative.potentials.field import FieldPotential
 from conservative.potentials.load import Window
 from conservative.potentials.potential import torque_W
@@ -136,7 +136,7 @@ class Equations:
     @property
     def steady(self) -> bool:
         """Whether the equations do not depend on time."""
-        return not self.scene.loads and not self.scene.needs & IN_TIME
+        return not self.scene.loads and not self.scene.features & IN_TIME
 
     def wheel(self, t: Array) -> Array:
         """Return J^-1 h (3, n), rad/s, of a rotor with a motor; 0 without one."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
-from conservative.needs import Need
+from conservative.features import Feature
 from conservative.scene import Scene
 
 from .compare import Compared, Solution, exact
@@ -236,4 +236,4 @@ def _with_habit(
 
 def remark_on_damping(scene: Scene) -> str:
     """Return the end of a sentence on damping."""
-    return ", in addition to the damping of the scene" * (Need.DAMPING in scene.needs)
+    return ", in addition to the damping of the scene" * (Feature.DAMPING in scene.features)

@@ -11,11 +11,11 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import angle_between
-from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
 from conservative.invariants import Invariant, sizes
 from conservative.method import Method
+from conservative.method_info import settings_text
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene

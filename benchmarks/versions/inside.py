@@ -53,7 +53,7 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         family = families.get(name)
         if family and hasattr(family, "settings_for"):
             methods += family.settings_for("suite")
-        elif family:  # of a version before cards
+        elif family:  # of a version without `card` and `method_info`
             methods += getattr(family, "suite_settings", family.variants)()
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             methods.append(registry.method(name))

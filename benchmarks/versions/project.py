@@ -21,9 +21,9 @@ import numpy as np
 
 from conservative import registry
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
+from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Role
-from conservative.needs import Need
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import Answer
@@ -195,7 +195,7 @@ class Remote(StandIn):
 
         Raise `Unsupported` for other scenes, which not every version has, and for those that the method does not support.
         """
-        if lacking := scene.needs - {Need.GRAVITY}:
+        if lacking := scene.features - {Feature.GRAVITY}:
             raise Unsupported("scene", ", ".join(sorted(lacking)), "a free body, or one with a weight")
         field: Any = scene.potential
         weight, com = (0.0, np.zeros(3)) if field is None else (field.weight, field.com_B)

@@ -54,7 +54,7 @@ def read_bodies(
     if "w_WB_B0" in given:
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
-    if J is not None and scene.needs:
+    if J is not None and scene.features:
         _refuse_first("inertia", J, ~_are_in_range(J), require_size)
     if J is not None and hasattr(static_part(scene.potential), "inertia") and "inertia" not in values:
         allowed = "{'inertia': ...} too, because the field has an inertia, which should equal the body's"

@@ -105,7 +105,7 @@ def require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
     Other bodies for which it is too long become `NotRun` when they are integrated. Methods with a kernel refuse a step only if
     they have a longest one. For others of them nothing is prepared, which would take as long as runs of hundreds of bodies.
     """
-    if method.card.kernel and method.longest_step(bodies.first) == math.inf:
+    if method.method_info.kernel and method.longest_step(bodies.first) == math.inf:
         return
     for i in pick_hardest(bodies):
         scene = bodies.take(i)

@@ -160,8 +160,8 @@ def walk(  # noqa: PLR0915  # one loop
 
 
 def work_of_try(method: Method) -> float:
-    """Return the work of a step that is tried, ns by `Card.cost`: three steps."""
-    return 3 * method.card.cost(method).step
+    """Return the work of a step that is tried, ns by `MethodInfo.cost`: three steps."""
+    return 3 * method.method_info.cost(method).step
 
 
 def run_adaptively(

@@ -10,13 +10,13 @@ from typing import ClassVar
 import numpy as np
 
 from ..attitude import Array
-from ..card import Card, Structure
 from ..check import positive_number
 from ..deferred_imports import kernels
 from ..errors import NotConverged
+from ..features import ROTATION
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import ROTATION
+from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
 from .bounds import bounds_of
@@ -49,11 +49,11 @@ class Convected(Method):
     role: ClassVar[Role] = Role.OURS
     order = 2
     conserves = frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         pictures=("",),
         colour="sky",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
-        takes=ROTATION,
+        supports=ROTATION,
     )
 
     def __post_init__(self) -> None:

@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import axes_about, from_quaternion, triple
-from ..card import Card, Cost, Structure
 from ..check import choice, describe, positive_integer
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import Feature
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import Need
+from ..method_info import Cost, MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
@@ -63,7 +63,7 @@ class Gauss(Method):
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
     conserves = frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("stages=2", "stages=4", "stages=6", "stages=8"),
         report=("",),
         suite=("stages=2", "stages=6"),
@@ -74,7 +74,7 @@ class Gauss(Method):
         colour="indigo",
         kernel="gauss",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
-        takes=frozenset({Need.GRAVITY, Need.ROTOR, Need.FLIGHT}),
+        supports=frozenset({Feature.GRAVITY, Feature.ROTOR, Feature.FLIGHT}),
     )
 
     def __post_init__(self) -> None:

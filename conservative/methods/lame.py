@@ -39,12 +39,12 @@ import numpy as np
 
 from ..attitude import to_quaternion
 from ..batch import Batch
-from ..card import Card, Structure
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import Feature
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import Need
+from ..method_info import MethodInfo, Structure
 from ..potentials.field import into_axes
 from ..scene import Scene
 from .bounds import within_round_off
@@ -78,14 +78,14 @@ class Lame(Method):
     role: ClassVar[Role] = Role.OURS
     order = None
     conserves = frozenset({"energy", "vertical momentum", "axial momentum"})
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         many=("",),
         rank=1,
         exact=True,
         colour="olive",
         kernel="lame",
         structure=lambda method: Structure(symmetric=True, symplectic=True, imposed=True),  # up to a correction of round-off
-        takes=frozenset({Need.GRAVITY, Need.FLIGHT}),
+        supports=frozenset({Feature.GRAVITY, Feature.FLIGHT}),
     )
 
     bounds = within_round_off

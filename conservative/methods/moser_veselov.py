@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..batch import Batch
-from ..card import Card, Structure
 from ..check import choice, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import Feature
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import Need
+from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, take_pieces
@@ -68,7 +68,7 @@ class MoserVeselov(Method):
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
     conserves = frozenset({"energy", "momentum", "axial momentum"})
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=tuple(f"order={order}" for order in ORDERS),
         report=("",),
         suite=("order=2", "order=exact"),
@@ -79,7 +79,7 @@ class MoserVeselov(Method):
         colour="wine",
         kernel="moser_veselov",
         structure=lambda method: Structure(symmetric=True, symplectic=method.order in (None, 2)),  # see DERIVATION.md, 8
-        takes=frozenset({Need.FLIGHT}),
+        supports=frozenset({Feature.FLIGHT}),
     )
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:

@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, triple
-from ..card import Card, Cost, Structure
 from ..check import positive_number
 from ..deferred_imports import kernels
+from ..features import Feature
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, with_balances
 from ..method import Method, Role, Run
-from ..needs import Need
+from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.turning import Turning
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory, cut_at_failure
@@ -63,14 +63,14 @@ class Projected(Method):
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
     conserves = with_balances("energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis")
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         rank=2,
         group="explicit",
         cost=lambda method: Cost(step=340.0, correction=80.0),
         colour="teal",
         kernel="projected",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
-        takes=frozenset(Need) - {Need.FLIGHT},  # free flight is a free body
+        supports=frozenset(Feature) - {Feature.FLIGHT},  # free flight is a free body
     )
 
     def __post_init__(self) -> None:

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..attitude import to_quaternion
 from ..batch import Batch
-from ..card import Card, Cost, Structure
 from ..check import choice, positive_number
 from ..deferred_imports import kernels
+from ..features import LOADS, ROTATION, Feature
 from ..grid import Grid
 from ..invariants import with_balances
 from ..method import Method, Role, Run
-from ..needs import LOADS, ROTATION, Need
+from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.field import into_axes
 from ..scene import Scene
 from ..trajectory import Bounds
@@ -88,7 +88,7 @@ class Reduced(Method):
 
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=tuple(f"order={order}" for order in BEST),
         report=("", "order=8"),
         suite=("order=2", "order=4", "order=6"),
@@ -101,7 +101,7 @@ class Reduced(Method):
         colour="blue",
         kernel="reduced",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
-        takes=ROTATION | LOADS | {Need.ROTOR},
+        supports=ROTATION | LOADS | {Feature.ROTOR},
     )
 
     def __post_init__(self) -> None:

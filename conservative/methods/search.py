@@ -149,7 +149,9 @@ class Candidate:
     @cached_property
     def prior_work(self) -> float:
         """Estimate of the work, ns, from order and rate alone."""
-        return self.method.card.cost(self.method).least * self.duration / predict_step(self.method, self.error, self.rate)
+        return (
+            self.method.method_info.cost(self.method).least * self.duration / predict_step(self.method, self.error, self.rate)
+        )
 
     def expected_work(self, scale: float) -> float:
         """Return the smallest work, ns, that may reach the error; before the first attempt from `scale` times the prior."""
@@ -220,8 +222,8 @@ def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: floa
     rate = scene.derive(bound_rate)
     duration = min(t_end, PROBE_RADIANS / rate)
     error *= min(1.0, 4 * duration / t_end)
-    likely = max(FIRST * predict_step(method, error, rate), method.card.cost(method).least * bodies * t_end / TRIAL)
-    dt = min(duration / 2, method.card.longest / rate, math.inf if scene.calls_python else likely)
+    likely = max(FIRST * predict_step(method, error, rate), method.method_info.cost(method).least * bodies * t_end / TRIAL)
+    dt = min(duration / 2, method.method_info.longest / rate, math.inf if scene.calls_python else likely)
     if scene.loads:  # runs at two to eight times the step have to differ everywhere (`conservative.methods.pieces`)
         breaks, step, *_ = scene.smoothness(t_end)
         dt = min(dt, step, t_end / parts_for(scene) / (1 + np.count_nonzero(breaks < t_end)))
@@ -251,29 +253,31 @@ def most_promising(running: Sequence[Candidate]) -> int:
 
 
 def candidates(scene: Scene, exact: bool = True) -> tuple[Method, ...]:
-    """Return the methods that are worth trying on a scene, in the order of their ranks (`Card`).
+    """Return the methods that are worth trying on a scene, in the order of their ranks (`MethodInfo`).
 
     These are the settings of a family without truncation error, if one supports the scene; otherwise, and if `exact` is False,
     the settings of the first family of each group.
     """
-    families = [each for each in registry.list_families().values() if each.role == Role.OURS and each.card.rank is not None]
+    families = [
+        each for each in registry.list_families().values() if each.role == Role.OURS and each.method_info.rank is not None
+    ]
     chosen: dict[str, tuple[Method, ...]] = {}
-    for family in sorted(families, key=lambda family: family.card.rank or 0):
+    for family in sorted(families, key=lambda family: family.method_info.rank or 0):
         try:
             settings = _settings_of(family)
         except MissingEngine:
             continue
-        if not settings or (family.card.exact and not exact) or settings[0].unsupported(scene) is not None:
+        if not settings or (family.method_info.exact and not exact) or settings[0].unsupported(scene) is not None:
             continue
-        if family.card.exact:
+        if family.method_info.exact:
             return settings
-        chosen.setdefault(family.card.group or family.family, settings)
+        chosen.setdefault(family.method_info.group or family.family, settings)
     return tuple(chain.from_iterable(chosen.values()))
 
 
 @lru_cache(maxsize=64)
 def _settings_of(family: type[Method]) -> tuple[Method, ...]:
-    """Return the settings that are tried; reading them from the card each time would double the time of `candidates`."""
+    """Return the settings that are tried; reading them from `method_info` each time would double the time of `candidates`."""
     return family.settings_for("candidates")
 
 

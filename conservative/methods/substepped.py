@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .. import registry
-from ..card import Card
 from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
+from ..features import Features
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import Needs
+from ..method_info import MethodInfo
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .reduced import Reduced
@@ -43,10 +43,10 @@ class Substepped(Method):
 
     family: ClassVar[str] = "substepped"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         report=(),
-        structure=lambda method: method.inner.card.structure(method.inner),
-        takes=Reduced.card.takes,  # by default
+        structure=lambda method: method.inner.method_info.structure(method.inner),
+        supports=Reduced.method_info.supports,  # by default
     )
 
     def __post_init__(self) -> None:
@@ -63,8 +63,8 @@ class Substepped(Method):
         return registry.method(self.method.replace("/", ","))
 
     @property
-    def takes(self) -> Needs:
-        return self.inner.takes
+    def supports(self) -> Features:
+        return self.inner.supports
 
     @property
     def order(self) -> int | None:

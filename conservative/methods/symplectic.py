@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..card import Card, Structure
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import FIELDS, IN_TIME, ROTATION, Feature
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import FIELDS, IN_TIME, ROTATION, Need
+from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.compositions import OUTSIDE, leaves_step
@@ -57,13 +57,13 @@ class Splitting(Method):
 
     family: ClassVar[str] = "splitting"
     role: ClassVar[Role] = Role.OURS
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=tuple(f"order={order}" for order in (2, 4, 6, 8, 10)),
         report=("",),
         suite=(),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
-        takes=FIELDS | IN_TIME | {Need.ROTOR},
+        supports=FIELDS | IN_TIME | {Feature.ROTOR},
     )
     kind: ClassVar[str] = "EXACT"
 
@@ -83,7 +83,7 @@ class Splitting(Method):
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        if Need.TIME in scene.needs and leaves_step(self.lengths[0]):
+        if Feature.TIME in scene.features and leaves_step(self.lengths[0]):
             return OUTSIDE
         if scene.body.rotor_momentum is None:
             return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
@@ -111,7 +111,9 @@ class NoSquish(Splitting):
     order: int = 2
 
     family: ClassVar[str] = "no_squish"
-    card: ClassVar[Card] = replace(Splitting.card, takes=Splitting.card.takes | {Need.FLIGHT})
+    method_info: ClassVar[MethodInfo] = replace(
+        Splitting.method_info, supports=Splitting.method_info.supports | {Feature.FLIGHT}
+    )
     kind: ClassVar[str] = "AXES"
 
     def follows_fastest(self, scene: Scene) -> bool:
@@ -135,7 +137,7 @@ class Rattle(Splitting):
 
     order: int = 2
 
-    card: ClassVar[Card] = replace(Splitting.card, takes=ROTATION | IN_TIME)
+    method_info: ClassVar[MethodInfo] = replace(Splitting.method_info, supports=ROTATION | IN_TIME)
     family: ClassVar[str] = "rattle"
     kind: ClassVar[str] = "ENDS"
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from ..batch import Batch
-from ..card import Card, Cost, Structure
 from ..check import describe, positive_number, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import ROTATION, Feature
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL
 from ..method import Method, Role, Run
-from ..needs import ROTATION, Need
+from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
@@ -91,7 +91,7 @@ class Taylor(Method):
     conserves = frozenset(
         {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
     )
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("order=8", "order=12", "order=16", "tolerance=1e-9"),
         report=("order=12",),
         suite=("order=14",),
@@ -103,7 +103,7 @@ class Taylor(Method):
         colour="#7B61FF",
         kernel="taylor",
         structure=lambda method: Structure(symmetric=False, symplectic=False, imposed=True),
-        takes=ROTATION - {Need.FUNCTION} | {Need.TURNING, Need.ROTOR},
+        supports=ROTATION - {Feature.FUNCTION} | {Feature.TURNING, Feature.ROTOR},
     )
 
     def __init__(self, order: int | None = None, tolerance: float | None = None) -> None:

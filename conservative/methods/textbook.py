@@ -7,13 +7,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..card import Card, Structure
 from ..check import choice, describe, finite_number
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..features import IN_TIME, ROTATION
 from ..grid import Grid
 from ..method import Method, Role, Run
-from ..needs import IN_TIME, ROTATION
+from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
 from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4
@@ -37,7 +37,7 @@ SCHEMES = {
 
 @dataclass(frozen=True)
 class Textbook(Method):
-    """A textbook method, compiled like ours, as a baseline: shown in tables, in no contest, never chosen automatically.
+    """A textbook method, compiled like ours, as a baseline: shown in tables, without speed ratios, never chosen automatically.
 
     All of them support every field, also time-dependent ones. None conserves energy, except "spiers" for a free symmetric body,
     whose motion it solves. "buss" and "spiers" conserve the momentum in the world, or its component along the field's axis. All
@@ -68,13 +68,13 @@ class Textbook(Method):
 
     family: ClassVar[str] = "textbook"
     role: ClassVar[Role] = Role.BASELINE
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=tuple(f"scheme={scheme}" for scheme in SCHEMES),
         report=(),
         suite=(),
         kernel="textbook",
         structure=lambda method: Structure(method.scheme == "generalized_alpha" and method.rho == 1, symplectic=False),
-        takes=ROTATION | IN_TIME,
+        supports=ROTATION | IN_TIME,
     )
 
     def __post_init__(self) -> None:

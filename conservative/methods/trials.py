@@ -30,9 +30,9 @@ import numpy as np
 from ..attitude import Array, angle_between
 from ..check import replace_unchecked
 from ..errors import IntegrationFailed, MissingEngine, Unsupported
+from ..features import Feature
 from ..grid import Grid
 from ..method import Method
-from ..needs import Need
 from ..outcome import Progress
 from ..potentials.point_to_point import LinearSpring
 from ..potentials.turning import static_part
@@ -85,7 +85,7 @@ class Estimate:
     error
         Attitude error from runs at longer steps, rad; inf if a run failed or they differ completely.
     work
-        Work of the run, ns by `Card.cost`.
+        Work of the run, ns by `MethodInfo.cost`.
     sensitivity
         Attitude error caused by rounding inertia and initial state, rad; None if not measured.
     rough
@@ -145,7 +145,7 @@ class Trials:
             self.observe(method, grid)
             self.last[method, grid] = run_twice(method, self.scene, grid)
         error, fine, coarse, rough, ordered = self.last[method, grid]
-        cost, counters = method.card.cost(method), fine.counters
+        cost, counters = method.method_info.cost(method), fine.counters
         work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
         moved = 0.0 if sensitivity else None
         if sensitivity and coarse is not None:  # otherwise the step is too long to measure the sensitivity
@@ -202,7 +202,7 @@ def presumed_smooth(scene: Scene) -> bool:
 
     It is False with loads, with functions and compiled fields of a user, and if the points of a spring with a length can meet.
     """
-    if scene.loaded or not scene.needs.isdisjoint((Need.FUNCTION, Need.FIELD)):
+    if scene.loaded or not scene.features.isdisjoint((Feature.FUNCTION, Feature.FIELD)):
         return False
     field: Any = static_part(scene.potential)
     if not isinstance(field, LinearSpring) or field.rest_length == 0:

@@ -31,7 +31,7 @@ import numpy as np
 
 from ..arithmetic import times
 from ..attitude import Array
-from ..needs import Need, Needs
+from ..features import Feature, Features
 from .varied import Varied
 
 
@@ -40,8 +40,8 @@ class FieldPotential(ABC):
 
     NUMBERS: ClassVar[tuple[str, ...]]
     """Names of the attributes that `build_field` takes."""
-    needs: ClassVar[Needs] = frozenset({Need.FIELD})
-    """Members of `Need` for scenes with it."""
+    features: ClassVar[Features] = frozenset({Feature.FIELD})
+    """Members of `Feature` for scenes with it."""
 
     @staticmethod
     @abstractmethod

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arithmetic import add, apply, cross, dot, fuse, halfway, in_body, scale, times
 from ..attitude import Array
 from ..check import positive_number, read_inertia, replace_unchecked, set_fields, unit_vector
-from ..needs import Need, Needs
+from ..features import Feature, Features
 from .field import FieldPotential
 
 
@@ -135,7 +135,7 @@ class GravityGradient(FieldPotential):
         """Return 3 rate^2, 1/s^2: the factor of u x J u."""
         return 3 * self.rate**2
 
-    needs: ClassVar[Needs] = frozenset({Need.GRADIENT})
+    features: ClassVar[Features] = frozenset({Feature.GRADIENT})
     NUMBERS: ClassVar[tuple[str, ...]] = ("rate", "inertia", "direction_W")
 
     @staticmethod

@@ -23,7 +23,7 @@ from ..attitude import Array, triple
 from ..check import PickledByFields, choice, describe, finite_array, read_only, real_array, replace_unchecked, set_fields
 from ..deferred_imports import kernels
 from ..errors import BadInput, TorqueFailed
-from ..needs import Need, Needs
+from ..features import Feature, Features
 from .callback import find_address
 from .pointwise import EARLIER
 
@@ -318,9 +318,9 @@ class Torque(OfTime):
         set_fields(self, frame=frame)
 
     @property
-    def needs(self) -> Needs:
-        """Members of `Need` for scenes with it."""
-        return frozenset({Need.TORQUE, Need.ATTITUDE} if self.of_attitude else {Need.TORQUE})
+    def features(self) -> Features:
+        """Members of `Feature` for scenes with it."""
+        return frozenset({Feature.TORQUE, Feature.ATTITUDE} if self.of_attitude else {Feature.TORQUE})
 
 
 class Factor(OfTime):
@@ -406,10 +406,10 @@ class Damping(PickledByFields):
         return self.matrix if isinstance(self.matrix, Resistance) else self.factor
 
     @property
-    def needs(self) -> Needs:
-        """Members of `Need` for scenes with it."""
+    def features(self) -> Features:
+        """Members of `Feature` for scenes with it."""
         varying = self.of_time
-        return frozenset({Need.DAMPING, Need.ATTITUDE} if varying and varying.of_attitude else {Need.DAMPING})
+        return frozenset({Feature.DAMPING, Feature.ATTITUDE} if varying and varying.of_attitude else {Feature.DAMPING})
 
     def at(self, t: float, R_WB: Array | None = None, window: Window = (-math.inf, math.inf)) -> Array:
         """Return f D (3, 3), N m s, body axes, at a time, s, and an attitude, as `OfTime.at`."""

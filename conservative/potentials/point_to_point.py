@@ -23,7 +23,7 @@ from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, in_
 from ..attitude import Array
 from ..check import finite_array, finite_number, positive_number, replace_unchecked, set_fields
 from ..errors import BadInput
-from ..needs import Need, Needs
+from ..features import Feature, Features
 from .field import FieldPotential, into_axes, lengths, turned_moment
 
 _POINT = "three finite numbers (3,), m"
@@ -270,7 +270,7 @@ class LinearSpring(PointPotential):
         if self.rest_length < 0:
             raise BadInput("rest_length", rest_length, _LENGTH)
 
-    needs: ClassVar[Needs] = frozenset({Need.SPRING})
+    features: ClassVar[Features] = frozenset({Feature.SPRING})
     NUMBERS: ClassVar[tuple[str, ...]] = ("point_B", "anchor_W", "stiffness", "rest_length")
 
     @staticmethod
@@ -323,7 +323,7 @@ class PointAttraction(PointPotential):
         if not np.any(self.point_B) and not np.any(self.anchor_W):
             raise BadInput("anchor_W", "the fixed point, as point_B is", "a point that the body's does not always lie on")
 
-    needs: ClassVar[Needs] = frozenset({Need.ATTRACTION})
+    features: ClassVar[Features] = frozenset({Feature.ATTRACTION})
     NUMBERS: ClassVar[tuple[str, ...]] = ("point_B", "anchor_W", "strength")
 
     @staticmethod

@@ -15,7 +15,7 @@ from ..arithmetic import cosine, product, scale, sine
 from ..attitude import Array, from_quaternion, triple
 from ..check import describe, numbers, positive_number, replace_unchecked, set_fields, unit_vector
 from ..errors import BadInput
-from ..needs import Need, Needs, needs_of
+from ..features import Feature, Features, features_of
 from .gravity_gradient import GravityGradient
 from .potential import Potential, depends_on_time
 
@@ -146,9 +146,9 @@ class Turning:
         set_fields(self, potential=potential, orbit=orbit)
 
     @property
-    def needs(self) -> Needs:
-        """Members of `Need` for scenes with it."""
-        return needs_of(self.potential) | {Need.TURNING}
+    def features(self) -> Features:
+        """Members of `Feature` for scenes with it."""
+        return features_of(self.potential) | {Feature.TURNING}
 
     def in_orbit(self, R_WB: Array, t: Array) -> Array:
         """Return R_OB, (..., 3, 3), of attitudes (..., 3, 3) at times (...), s."""

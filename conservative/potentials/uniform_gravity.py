@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..arithmetic import cross, dot, fuse, halfway, vertical
 from ..attitude import Array
 from ..check import finite_array, finite_number, replace_unchecked, set_fields
-from ..needs import Need, Needs
+from ..features import Feature, Features
 from .field import FieldPotential, into_axes, lengths, turned_moment
 
 ZERO = (0.0, 0.0, 0.0)
@@ -109,7 +109,7 @@ class UniformGravity(FieldPotential):
         """Weight times centre of mass (3,), N m, body axes. The motion depends on nothing else."""
         return self.weight * self.com_B
 
-    needs: ClassVar[Needs] = frozenset({Need.GRAVITY})
+    features: ClassVar[Features] = frozenset({Feature.GRAVITY})
     NUMBERS: ClassVar[tuple[str, ...]] = ("weight", "com_B")
 
     @staticmethod

@@ -33,7 +33,7 @@ ENGINE = {
     "settings": {"pipeline": "generalized", "precision": "f64"},
     "orders": {"generalized": 1, "positional": 1, "spring": 1},
     "free_only": "Brax reads no ball joint",
-    "card": {
+    "method_info": {
         "variants": ("generalized", "positional", "spring", "generalized,precision=f32"),
         "as_installed": ("precision=f32",),
     },

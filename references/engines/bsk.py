@@ -26,7 +26,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None},
     "tolerance": "tol",
     "free_only": "a spacecraft is free: nothing in Basilisk holds a point of its hub",
-    "card": {
+    "method_info": {
         "variants": ("Euler", "RK2", "RK4", "RKF78"),
         "suite": ("RK4", "RKF78"),
         "as_installed": ("RK4",),

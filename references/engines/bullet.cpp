@@ -5,7 +5,7 @@
  * ENGINE = {
  *   "package": "libbullet-dev", "module": "bullet-float64", "precision": "f64",
  *   "settings": {"gyroscopic": "body", "as_installed": false}, "orders": {"body": 1, "world": 1, "explicit": 1},
- *   "card": {"variants": ["body", "world", "explicit", "body,as_installed=true"], "as_installed": ["body,as_installed=true"]}
+ *   "method_info": {"variants": ["body", "world", "explicit", "body,as_installed=true"], "as_installed": ["body,as_installed=true"]}
  * }
  */
 #include "../worker/program.hpp"

@@ -29,7 +29,7 @@ ENGINE = {
     "orders": dict.fromkeys(("DOP853", "Vern8", "Vern7", "Tsit5", "RK45", "RK23")),
     "tolerance": "rtol",
     "fields": FIELDS,
-    "card": {"variants": ("", "Vern8", "Vern7", "Tsit5"), "suite": ("", "rtol=1e-9")},
+    "method_info": {"variants": ("", "Vern8", "Vern7", "Tsit5"), "suite": ("", "rtol=1e-9")},
 }
 
 

@@ -18,7 +18,7 @@ ENGINE = {
     "title": "semi-implicit Euler",
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "child", "world", "time"),
-    "card": {
+    "method_info": {
         "as_installed": ("",),
         "usual_dt": 0.001,
     },

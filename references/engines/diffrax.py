@@ -23,7 +23,7 @@ ENGINE = {
     "orders": {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8},
     "tolerance": "rtol",
     "fields": ("UniformGravity",),
-    "card": {
+    "method_info": {
         "variants": ("", "Dopri8", "Dopri8,rtol=1e-12"),
         "suite": ("", "Dopri8,rtol=1e-12"),
     },

@@ -43,7 +43,7 @@ ENGINE = {
     "tolerance": "accuracy",
     "fields": FIELDS,
     "descriptions": ("frame", "offset", "file", "child", "world", "time"),
-    "card": {
+    "method_info": {
         "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
         "suite": ("discrete", "runge_kutta5"),
         "as_installed": ("default",),

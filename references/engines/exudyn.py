@@ -35,7 +35,7 @@ ENGINE = {
         **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
     },
     "fields": FIELDS,
-    "card": {
+    "method_info": {
         "variants": ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"),
         "suite": ("RK44", "RK67"),
         "as_installed": ("default",),

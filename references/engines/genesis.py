@@ -35,7 +35,7 @@ ENGINE = {
     "oldest": "1.4",
     "settings": {"integrator": "implicitfast", "precision": "f64", "as_installed": False},
     "orders": {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2},
-    "card": {
+    "method_info": {
         "variants": ("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32", AS_INSTALLED),
         "as_installed": (AS_INSTALLED,),
     },

@@ -27,7 +27,7 @@ ENGINE = {
     "settings": {"integrator": "RungeKutta4", "precision": "f64"},
     "orders": {"SemiImplicitEuler": 1, "RungeKutta4": 4},
     "free_only": "JaxSim's joints are revolute, prismatic or fixed",
-    "card": {
+    "method_info": {
         "variants": ("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32"),
         "as_installed": ("SemiImplicitEuler",),
     },

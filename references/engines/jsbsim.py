@@ -34,7 +34,7 @@ ENGINE = {
     "orders": {"RectEuler": 1, "Trapezoidal": 1, "AB2": 2, "AB3": 2, "AB4": 2, "AB5": 2},
     "choices": {"attitude": ("", *INTEGRATORS)},
     "free_only": "an aircraft flies: nothing in JSBSim holds one of its points",
-    "card": {
+    "method_info": {
         "variants": ("RectEuler", "Trapezoidal", "AB2", "AB5"),
         "as_installed": ("RectEuler",),
     },

@@ -25,7 +25,7 @@ ENGINE = {
     "settings": {"method": "nve"},
     "orders": {"nve": 2, "rigid": 2},
     "free_only": "it has no rigid bodies about fixed points",
-    "card": {"variants": ("", "rigid"), "as_installed": ("",)},
+    "method_info": {"variants": ("", "rigid"), "as_installed": ("",)},
 }
 
 

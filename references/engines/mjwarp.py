@@ -32,7 +32,7 @@ ENGINE = {
     "precision": "f32",
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "child", "damping"),
-    "card": {
+    "method_info": {
         "variants": ("Euler", "RK4", "implicitfast"),
         "many": ("RK4",),
         "as_installed": ("Euler",),

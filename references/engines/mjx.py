@@ -31,7 +31,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "child", "damping"),
-    "card": {
+    "method_info": {
         "variants": ("Euler", "implicitfast", "RK4", "RK4,precision=f32"),
         "many": ("RK4", "RK4,precision=f32"),
         "as_installed": ("Euler,precision=f32",),

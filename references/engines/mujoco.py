@@ -41,7 +41,7 @@ ENGINE = {
     "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
     "fields": FIELDS,
     "descriptions": ("frame", "offset", "file", "setter", "child", "joints", "world", "time", "damping", "saved"),
-    "card": {
+    "method_info": {
         "variants": INTEGRATORS,
         "report": ("Euler", ""),
         "suite": ("Euler", "RK4"),

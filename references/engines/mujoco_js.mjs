@@ -5,7 +5,7 @@ import { dirname, join } from 'path';
 export const ENGINE = {
   "package": "@mujoco/mujoco", "precision": "f64",
   "settings": {"integrator": "RK4"}, "orders": {"Euler": 1, "RK4": 2, "implicit": 1, "implicitfast": 1},
-  "card": {"variants": ["Euler", "RK4", "implicit", "implicitfast"], "as_installed": ["Euler"]},
+  "method_info": {"variants": ["Euler", "RK4", "implicit", "implicitfast"], "as_installed": ["Euler"]},
   "formats": ["urdf", "mjcf"]
 };
 export const start = (mujoco) => mujoco();

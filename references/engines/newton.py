@@ -47,7 +47,7 @@ ENGINE = {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
         "XPBD": "no settings of SolverXPBD were found with which its ball joint holds a body right",
     },
-    "card": {
+    "method_info": {
         "variants": (*ORDERS, "SemiImplicit,as_installed=true"),
         "as_installed": ("SemiImplicit,as_installed=true",),
     },

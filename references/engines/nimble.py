@@ -18,7 +18,7 @@ ENGINE = {
     "oldest": "0.10",
     "title": "semi-implicit Euler",
     "fields": ("UniformGravity",),
-    "card": {
+    "method_info": {
         "as_installed": ("",),
     },
 }

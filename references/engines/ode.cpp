@@ -4,7 +4,7 @@
  * ENGINE = {
  *   "package": "libode-dev", "module": "ode", "precision": "f64", "settings": {"rotation": "finite"},
  *   "orders": {"finite": 1, "infinitesimal": 1},
- *   "card": {"variants": ["finite", "infinitesimal"], "as_installed": ["infinitesimal"]}
+ *   "method_info": {"variants": ["finite", "infinitesimal"], "as_installed": ["infinitesimal"]}
  * }
  */
 #include "../worker/program.hpp"

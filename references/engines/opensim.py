@@ -33,7 +33,7 @@ ENGINE = {
     },
     "tolerance": "accuracy",
     "fields": ("UniformGravity",),
-    "card": {
+    "method_info": {
         "variants": ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-14", "RungeKuttaFeldberg,accuracy=1e-15"),
         "as_installed": ("RungeKuttaMerson,accuracy=1e-3",),
     },

@@ -28,7 +28,7 @@ ENGINE = {
     "prefix": "aba+",
     "fields": FIELDS,
     "descriptions": ("frame", "offset", "file", "child", "joints"),
-    "card": {
+    "method_info": {
         "variants": ("Euler", "RK4"),
         "report": ("",),
         "suite": ("RK4",),

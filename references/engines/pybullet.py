@@ -33,7 +33,7 @@ ENGINE = {
     "free_only": {"maximal": "PyBullet has no joint to the world for a body in maximal coordinates"},
     "rate_limit": 100.0,  # maxJointVelocity
     "descriptions": ("offset", "file", "world"),
-    "card": {
+    "method_info": {
         "variants": ("", "maximal", "as_installed=true"),
         "as_installed": ("as_installed=true",),
         "usual_dt": 1 / 240,

@@ -28,7 +28,7 @@ ENGINE = {
     "precision": "f32",
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "world", "damping"),
-    "card": {
+    "method_info": {
         "variants": ("", "substeps=1", "as_installed=true"),
         "as_installed": ("as_installed=true",),
         "usual_dt": 1 / 60,

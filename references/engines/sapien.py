@@ -29,7 +29,7 @@ ENGINE = {
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "world"),
     "rate_limit": 100.0,  # max_angular_velocity
-    "card": {
+    "method_info": {
         "variants": ("", "as_installed=true"),
         "as_installed": ("as_installed=true",),
         "usual_dt": 0.01,

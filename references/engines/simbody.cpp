@@ -6,7 +6,7 @@
  *   "package": "libsimbody-dev", "module": "simbody", "precision": "f64",
  *   "settings": {"integrator": "RungeKuttaMerson", "accuracy": 0.0},
  *   "orders": {"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "Verlet": 2}, "tolerance": "accuracy",
- *   "card": {"variants": ["", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"], "as_installed": ["accuracy=1e-3"]}
+ *   "method_info": {"variants": ["", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"], "as_installed": ["accuracy=1e-3"]}
  * }
  */
 #include "../worker/program.hpp"

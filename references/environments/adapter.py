@@ -15,14 +15,14 @@ import numpy as np
 
 from conservative import registry
 from conservative.batch import Batch
-from conservative.card import Card, Maker
 from conservative.check import choice, finite_number, positive_integer
 from conservative.errors import BadInput, Unsupported
+from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
+from conservative.method_info import Maker, MethodInfo
 from conservative.methods.many import RunMany
 from conservative.methods.units import in_own_units
-from conservative.needs import Need
 from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
@@ -70,9 +70,9 @@ class EngineData(Distribution):
         First word of labels, for engines without a choice.
     prefix
         Text before the first setting in labels.
-    card
-        The engine's `conservative.card.Card`, as a dictionary; "flight" and "rotors" instead of `takes`: True if it integrates
-        the translation in free flight, and bodies with a rotor.
+    method_info
+        The engine's `conservative.MethodInfo`, as a dictionary; "flight" and "rotors" instead of `supports`: True if it
+        integrates the translation in free flight, and bodies with a rotor.
     """
 
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class EngineData(Distribution):
     rate_limit: float = math.inf
     title: str = ""
     prefix: str = ""
-    card: Mapping[str, Any] = field(default_factory=dict)
+    method_info: Mapping[str, Any] = field(default_factory=dict)
 
 
 SCRIPTS = {".mjs": "npm", ".cpp": "apt"}
@@ -101,9 +101,9 @@ def read_script(path: Path) -> ModuleType:
     words, _, code = path.read_text(encoding="utf-8").partition("ENGINE = ")
     data, _ = json.JSONDecoder().raw_decode(code.replace("\n *", "\n"))
     common = {"kind": SCRIPTS[path.suffix], "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
-    card = {"variants": ("", "as_installed=true"), "as_installed": ("as_installed=true",)}
+    method_info = {"variants": ("", "as_installed=true"), "as_installed": ("as_installed=true",)}
     module = ModuleType(f"{__package__}.{path.stem}", words[3:].partition("*/")[0].replace("\n *", "\n"))
-    vars(module).update(__file__=str(path), ENGINE=common | {"fields": ("UniformGravity",), "card": card} | data)
+    vars(module).update(__file__=str(path), ENGINE=common | {"fields": ("UniformGravity",), "method_info": method_info} | data)
     return module
 
 
@@ -150,10 +150,12 @@ class AdapterMethod(Method):
         if "adapter" not in vars(cls):
             return
         cls.family, cls.data = cls.adapter.__name__.rpartition(".")[2], EngineData(**cls.adapter.ENGINE)
-        card, words = cls.data.card, {"flight": Need.FLIGHT, "rotors": Need.ROTOR}
-        takes = {need for kind in FIELDS if kind.__name__ in cls.data.fields for need in NEEDS[kind]}
-        takes |= {need for word, need in words.items() if card.get(word)}
-        cls.card = Card(**{name: value for name, value in card.items() if name not in words}, takes=frozenset(takes))
+        method_info, words = cls.data.method_info, {"flight": Feature.FLIGHT, "rotors": Feature.ROTOR}
+        supports = {feature for kind in FIELDS if kind.__name__ in cls.data.fields for feature in NEEDS[kind]}
+        supports |= {feature for word, feature in words.items() if method_info.get(word)}
+        cls.method_info = MethodInfo(
+            **{name: value for name, value in method_info.items() if name not in words}, supports=frozenset(supports)
+        )
         if "precision" not in cls.data.settings:
             cls.precision = cls.data.precision
 

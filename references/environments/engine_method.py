@@ -11,10 +11,10 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar, Generic, TypeVar
 
 from conservative.batch import Batch
-from conservative.card import Maker
 from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
 from conservative.grid import Grid
 from conservative.method import Run
+from conservative.method_info import Maker
 from conservative.methods.many import RunMany
 from conservative.registry import read_name
 from conservative.scene import Scene

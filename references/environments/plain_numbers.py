@@ -10,10 +10,10 @@ import numpy as np
 from conservative.attitude import to_quaternion
 from conservative.batch import Batch
 from conservative.errors import IntegrationFailed
+from conservative.features import Feature, Features, features_of
 from conservative.grid import Grid
 from conservative.methods.many import Block
 from conservative.methods.units import SI, find_units
-from conservative.needs import Need, Needs, needs_of
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction
 from conservative.potentials.turning import Turning, static_part
@@ -37,7 +37,7 @@ FIELDS: dict[Any, tuple[str, ...]] = {
 }
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
 
-NEEDS: dict[Any, Needs] = {kind: frozenset({Need.TURNING}) if kind is Turning else needs_of(kind) for kind in FIELDS}
+NEEDS: dict[Any, Features] = {kind: frozenset({Feature.TURNING}) if kind is Turning else features_of(kind) for kind in FIELDS}
 """Needs of these fields."""
 
 

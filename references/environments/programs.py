@@ -64,8 +64,8 @@ def _each(is_right: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 _TEXTS, _FORMATS = (_are_texts, "a list of texts"), ("urdf", "mjcf", "sdf", "usd")
 _NAMES = tuple(kind.__name__ for kind in FIELDS)
-EARLIER = "ways"
-"""Earlier name of `descriptions`, which programs may still use."""
+FORMER = {"ways": "descriptions", "card": "method_info"}
+"""Former names of fields, which programs may still use."""
 DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "settings": (_each(_is_setting), "an object of texts, numbers, true or false"),
     "order": (_is_order, "an integer or null"),
@@ -76,20 +76,19 @@ DESCRIPTION: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "fields": (lambda value: _are_texts(value) and {*value} <= {*_NAMES}, f"a list of {', '.join(_NAMES)}"),
     "formats": (lambda value: _are_texts(value) and {*value} <= {*_FORMATS}, f"a list of {', '.join(_FORMATS)}"),
     "descriptions": _TEXTS,
-    EARLIER: _TEXTS,
-    "card": (lambda value: isinstance(value, dict), "an object"),
+    "method_info": (lambda value: isinstance(value, dict), "an object"),
     "variants": _TEXTS,
     "flight": (lambda value: isinstance(value, bool), "true or false"),
     "rotors": (lambda value: isinstance(value, bool), "true or false"),
 }
-"""Fields of `engine` in the answer to `hello`, and of its `card`, and what they have to be."""
+"""Fields of `engine` in the answer to `hello`, and of its `method_info`, and what they have to be."""
 _COMMAND = "an executable or a command line"
 
 
 def _check_description(engine: dict[str, Any]) -> None:
     """Raise `ValueError` for a field of another kind. Unknown fields are found where they are used."""
-    card = engine.get("card")
-    for name, value in [*engine.items(), *(card.items() if isinstance(card, dict) else ())]:
+    method_info = engine.get("method_info")
+    for name, value in [*engine.items(), *(method_info.items() if isinstance(method_info, dict) else ())]:
         is_right, words = DESCRIPTION.get(name, (lambda value: True, ""))
         if not is_right(value):
             raise ValueError(f"`{name}` is {describe(value)}; expected {words}")
@@ -103,10 +102,9 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)
-        _check_description(greeting.get("engine", {}))
-        module.ENGINE = {**every, **greeting.get("engine", {})}
-        if EARLIER in module.ENGINE:
-            module.ENGINE["descriptions"] = module.ENGINE.pop(EARLIER)
+        engine = {FORMER.get(name, name): value for name, value in greeting.get("engine", {}).items()}
+        _check_description(engine)
+        module.ENGINE = {**every, **engine}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)

@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from conservative.attitude import Array
 from conservative.body import RigidBody
-from conservative.card import Card
 from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
+from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.invariants import axial_direction
 from conservative.method import Method, Role, Run
+from conservative.method_info import MethodInfo
 from conservative.methods.bounds import within_round_off
-from conservative.needs import Need
 from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
@@ -130,7 +130,9 @@ class Exact(Method):
     role: ClassVar[Role] = Role.TRUTH
     order = None
     conserves = frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
-    card: ClassVar[Card] = Card(report=(), colour="black", takes=frozenset({Need.GRAVITY, Need.FLIGHT}))
+    method_info: ClassVar[MethodInfo] = MethodInfo(
+        report=(), colour="black", supports=frozenset({Feature.GRAVITY, Feature.FLIGHT})
+    )
 
     bounds = within_round_off
 

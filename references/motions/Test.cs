@@ -7,7 +7,7 @@ using System.Linq;
 
 class Motion {
   public Dictionary<string, List<double[]>> Rows = new Dictionary<string, List<double[]>>(); // the numbers of the lines of each key
-  public List<string> Needs = new List<string>(), Mistakes = new List<string>();
+  public List<string> Features = new List<string>(), Mistakes = new List<string>();
   public double[] Get(string key) { return Rows.ContainsKey(key) ? Rows[key][0] : new double[9]; }
 }
 
@@ -79,15 +79,15 @@ static class Test {
     foreach (var file in files) {
       var m = new Motion();
       foreach (var fields in File.ReadAllLines(file).Select(line => line.Split(','))) {
-        if (fields[0] == "needs") m.Needs.AddRange(fields.Skip(1));
+        if (fields[0] == "features") m.Features.AddRange(fields.Skip(1));
         if (fields[0] == "catches") m.Mistakes.Add(fields[1]);
         if (!m.Rows.ContainsKey(fields[0])) m.Rows[fields[0]] = new List<double[]>();
         double x;
         m.Rows[fields[0]].Add(fields.Skip(1).Select(
             each => double.TryParse(each, NumberStyles.Float, CultureInfo.InvariantCulture, out x) ? x : 0).ToArray());
       }
-      var part = m.Needs.FirstOrDefault(each => !HAS.Contains(each));
-      if (part != null) { Console.WriteLine(file + ": skipped, it needs " + part); continue; }
+      var part = m.Features.FirstOrDefault(each => !HAS.Contains(each));
+      if (part != null) { Console.WriteLine(file + ": skipped, it has " + part); continue; }
       tested++;
       var allowed = m.Rows["tolerance"].First(row => row[0] == ORDER && row[1] == ANGLE);
       var limit = allowed.Skip(3).Select(x => x + (SINGLE ? m.Get("single")[0] : 0)).ToArray();

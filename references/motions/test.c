@@ -114,10 +114,10 @@ int main(int argc, char **argv) {
     FILE *file = fopen(argv[f], "r");
     for (lines = 0; file && fgets(line[lines], sizeof *line, file); lines++) line[lines][strcspn(line[lines], "\r\n")] = 0;
     if (file) fclose(file);
-    char needs[99], *need;
-    strcpy(needs, lines > 3 ? line[3] : "no such file");
-    for (strtok(needs, ","); (need = strtok(NULL, ",")) && strstr(HAS, need);) {}
-    if (need) { printf("%s: skipped, it needs %s\n", argv[f], need); continue; }
+    char features[99], *feature;
+    strcpy(features, lines > 3 ? line[3] : "no such file");
+    for (strtok(features, ","); (feature = strtok(NULL, ",")) && strstr(HAS, feature);) {}
+    if (feature) { printf("%s: skipped, it has %s\n", argv[f], feature); continue; }
     tested++;
     int n, k, most = 0, near = 0, first = 0;
     for (n = 0; get("tolerance", n, allowed) && (allowed[0] != ORDER || allowed[1] != ANGLE); n++) {}

@@ -18,7 +18,7 @@ using Row = std::vector<double>;
 using State = std::array<double, 7>; // quaternion, scalar first, body to world; rates in body axes, rad/s
 struct Motion {
   std::map<std::string, std::vector<Row>> rows; // the numbers of the lines of each key
-  std::vector<std::string> needs, mistakes;
+  std::vector<std::string> features, mistakes;
   Row operator()(const std::string &key) const { return rows.count(key) ? rows.at(key)[0] : Row(9, 0.0); }
 };
 
@@ -89,15 +89,15 @@ int main(int argc, char **argv) {
       std::getline(fields, key, ',');
       Row values;
       for (bool first = true; std::getline(fields, field, ','); first = false) {
-        if (key == "needs") m.needs.push_back(field);
+        if (key == "features") m.features.push_back(field);
         if (key == "catches" && first) m.mistakes.push_back(field);
         values.push_back(std::strtod(field.c_str(), nullptr));
       }
       m.rows[key].push_back(values);
     }
-    auto missing = std::find_if(m.needs.begin(), m.needs.end(), [](auto &each) { return HAS.find(each) == std::string::npos; });
-    if (missing != m.needs.end() || m.rows.empty()) {
-      std::printf("%s: skipped, it needs %s\n", argv[f], m.rows.empty() ? "to exist" : missing->c_str());
+    auto missing = std::find_if(m.features.begin(), m.features.end(), [](auto &each) { return HAS.find(each) == std::string::npos; });
+    if (missing != m.features.end() || m.rows.empty()) {
+      std::printf("%s: skipped, it has %s\n", argv[f], m.rows.empty() ? "no rows" : missing->c_str());
       continue;
     }
     tested++;

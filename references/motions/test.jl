@@ -33,8 +33,8 @@ for file in ARGS
     number(x) = something(tryparse(Float64, x), 0.0)
     rows(key) = [number.(line[2:end]) for line in lines if line[1] == key]
     get(key) = isempty(rows(key)) ? zeros(9) : rows(key)[1]
-    lacking = setdiff(only(line[2:end] for line in lines if line[1] == "needs"), HAS)
-    isempty(lacking) || (println("$file: skipped, it needs $(join(lacking, ", "))"); continue)
+    lacking = setdiff(only(line[2:end] for line in lines if line[1] == "features"), HAS)
+    isempty(lacking) || (println("$file: skipped, it has $(join(lacking, ", "))"); continue)
     global tested += 1
     allowed = only(row for row in rows("tolerance") if row[1] == ORDER && row[2] == ANGLE)
     limit, exact, steps = allowed[4:7] .+ SINGLE * get("single")[1], rows("sample"), Int(allowed[3])

@@ -42,8 +42,8 @@ function worst(m, steps) { // the largest errors with so many steps before each 
 
 let failing = [], tested = 0; // of each motion that fails: its name, the mistakes that explain it, and the exponent of the step
 for (const file of readdirSync(folder).filter((name) => name.endsWith(".json"))) {
-  const m = JSON.parse(readFileSync(`${folder}/${file}`, "utf8")), part = m.needs.find((each) => !HAS.includes(each));
-  if (part) { console.log(`${m.name}: skipped, it needs ${part}`); continue; }
+  const m = JSON.parse(readFileSync(`${folder}/${file}`, "utf8")), part = m.features.find((each) => !HAS.includes(each));
+  if (part) { console.log(`${m.name}: skipped, it has ${part}`); continue; }
   tested++;
   const allowed = m.tolerance.find((each) => each.order === ORDER && each.angle === ANGLE);
   const limit = names.map((name) => allowed[name] + (SINGLE ? m.single : 0)), found = worst(m, allowed.steps);

@@ -10,7 +10,7 @@ type State = [f64; 7]; // quaternion, scalar first, body to world; rates in body
 #[derive(Default)]
 struct Motion {
     rows: HashMap<String, Vec<Vec<f64>>>, // the numbers of the lines of each key
-    needs: Vec<String>,
+    features: Vec<String>,
     mistakes: Vec<String>,
 }
 impl Motion {
@@ -81,13 +81,13 @@ fn main() {
             let values = fields[1..].iter().map(|x| x.parse().unwrap_or(0.0)).collect();
             m.rows.entry(fields[0].to_string()).or_default().push(values);
             match fields[0] {
-                "needs" => m.needs = fields[1..].iter().map(|x| x.to_string()).collect(),
+                "features" => m.features = fields[1..].iter().map(|x| x.to_string()).collect(),
                 "catches" => m.mistakes.push(fields[1].to_string()),
                 _ => {}
             }
         }
-        if let Some(part) = m.needs.iter().find(|each| !HAS.contains(&each.as_str())) {
-            println!("{file}: skipped, it needs {part}");
+        if let Some(part) = m.features.iter().find(|each| !HAS.contains(&each.as_str())) {
+            println!("{file}: skipped, it has {part}");
             continue;
         }
         tested += 1;

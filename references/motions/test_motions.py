@@ -78,8 +78,8 @@ failing: dict[str, tuple[dict[str, float], float]] = {}
 @pytest.mark.parametrize("path", sorted(Path(__file__).parent.glob("*.json")), ids=lambda path: path.stem)
 def test_motion(path):
     m = json.loads(path.read_text())
-    if missing := set(m["needs"]) - HAS:
-        pytest.skip(f"it needs {', '.join(missing)}")
+    if missing := set(m["features"]) - HAS:
+        pytest.skip(f"it has {', '.join(missing)}")
     tested.append(m["name"])
     (allowed,) = (each for each in m["tolerance"] if each["order"] == ORDER and each["angle"] == ANGLE)
     limit = [allowed[name] + SINGLE * m["single"] for name in NAMES]

@@ -11,14 +11,14 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.batch import Batch
-from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number, positive_integer
 from conservative.errors import BadInput
+from conservative.features import Feature, features_of
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
+from conservative.method_info import Maker, MethodInfo
 from conservative.methods.many import Block, RunMany
 from conservative.methods.units import in_own_units
-from conservative.needs import Need, needs_of
 from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -89,7 +89,7 @@ class Heyoka(Method):
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
     order = None
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         # Base vectors are the cheapest frame to read if many samples are kept. Lean is often the same: one tolerance is enough.
         variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors"),
         report=("", "frame=non_spinning", "frame=lean"),
@@ -99,7 +99,7 @@ class Heyoka(Method):
             *("frame=base_vectors,driver=ensemble", "frame=lean", "frame=base_vectors,width=8,numbers=compiled"),
         ),
         colour="green",
-        takes=frozenset({Need.TURNING, Need.ROTOR}).union(*map(needs_of, accelerations.READERS)),
+        supports=frozenset({Feature.TURNING, Feature.ROTOR}).union(*map(features_of, accelerations.READERS)),
     )
 
     def __post_init__(self) -> None:

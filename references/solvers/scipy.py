@@ -14,13 +14,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion, hat
-from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
+from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
+from conservative.method_info import Maker, MethodInfo
 from conservative.methods.units import in_own_units
-from conservative.needs import Need
 from conservative.potentials.load import Window, load_field
 from conservative.potentials.potential import torque_W
 from conservative.potentials.turning import static_part
@@ -77,12 +77,12 @@ class SciPy(Method):
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
     order = None
-    card: ClassVar[Card] = Card(
+    method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("rtol=1e-9", "rtol=1e-12", "loop=compiled", "LSODA,loop=compiled"),
         report=("loop=compiled",),
         suite=("rtol=1e-9",),
         colour="orange",
-        takes=frozenset(Need) - {Need.FLIGHT},
+        supports=frozenset(Feature) - {Feature.FLIGHT},
     )
 
     def __post_init__(self) -> None:

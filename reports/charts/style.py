@@ -39,7 +39,7 @@ PALETTE = {
     "black": "#000000",
     "grey": "#7F7F7F",
 }
-"""Colours that `Card.colour` can name; legends list families of one role in this order."""
+"""Colours that `MethodInfo.colour` can name; legends list families of one role in this order."""
 _OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE", "#CC6677", "#6699CC")
 """For families that name no colour, in the order of their names (Tol's muted scheme)."""
 
@@ -54,12 +54,13 @@ def family_colours() -> dict[str, str]:
     places = list(PALETTE)
 
     def place(family: type[Method]) -> tuple[int, int]:
-        colour = family.card.colour
+        colour = family.method_info.colour
         return list(Role).index(family.role), places.index(colour) if colour in places else len(places)
 
-    families = [family for family in registry.list_families().values() if family.card.colour is not None]
+    families = [family for family in registry.list_families().values() if family.method_info.colour is not None]
     return {
-        family.family: PALETTE.get(str(family.card.colour), str(family.card.colour)) for family in sorted(families, key=place)
+        family.family: PALETTE.get(str(family.method_info.colour), str(family.method_info.colour))
+        for family in sorted(families, key=place)
     }
 
 

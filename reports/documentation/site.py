@@ -32,8 +32,13 @@ LIVE = {"index": False, "reports/documentation/why_does_it_flip": True}
 """Pages whose picture becomes the live figure, and whether it has sliders."""
 COLUMNS = 6
 """Largest number of columns of a table; a wider one becomes several, each with the first column."""
-ROOMS = (".github", "conservative", "references", "benchmarks", "reports")
-DIVIDED = ("README.md", *(f"{room}/README.md" for room in ROOMS[1:]), "conservative/extending.md", "conservative/reference.md")
+PACKAGES = (".github", "conservative", "references", "benchmarks", "reports")
+DIVIDED = (
+    "README.md",
+    *(f"{room}/README.md" for room in PACKAGES[1:]),
+    "conservative/extending.md",
+    "conservative/reference.md",
+)
 SETTINGS = {
     "project": "conservative",
     "version": VERSION,
@@ -135,7 +140,7 @@ def written(source: Path) -> None:
     from conservative.reports.cli.main import main
 
     pages = {path: sections(path) for path in DIVIDED}
-    whole = [ROOT / "CHANGELOG.md", *(page for room in ROOMS for page in (ROOT / room).rglob("*.md")), *HERE.glob("*.ipynb")]
+    whole = [ROOT / "CHANGELOG.md", *(page for room in PACKAGES for page in (ROOT / room).rglob("*.md")), *HERE.glob("*.ipynb")]
     for path in sorted({page.relative_to(ROOT).as_posix() for page in whole} - {*DIVIDED, CONTENTS}):
         pages[path] = {posixpath.splitext(path)[0].lstrip("."): (ROOT / path).read_text(encoding="utf-8")}
     paper = pages["reports/documentation/paper.md"]  # its title is a field, above headings of the first level

@@ -32,7 +32,7 @@ _BEGINNING = '{"format": '
 """First characters of every file of unfinished work."""
 _MOST_DIFFERENCES = 3
 """Largest number of differences in a message."""
-_ROOMS = (".", "references", "benchmarks")
+_PACKAGES = (".", "references", "benchmarks")
 """Packages whose source determines measurements. `reports` only shows them."""
 
 
@@ -188,7 +188,9 @@ def _source_hash() -> str:
     """Return the hash of all source that determines measurements. A commit does not show local changes and needs git."""
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
-    for file in sorted({file for room in _ROOMS for file in (root / room).rglob("*.py")} - set((root / "reports").rglob("*"))):
+    for file in sorted(
+        {file for room in _PACKAGES for file in (root / room).rglob("*.py")} - set((root / "reports").rglob("*"))
+    ):
         digest.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
     return digest.hexdigest()[:12]
 

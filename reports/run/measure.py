@@ -91,7 +91,7 @@ def compile_kernels(plan: Plan, step: Step) -> None:
         for scene, method in product(study.scenes, study.competitors):
             if method.role != Role.ENGINE:
                 case = Case("compilation", scene, method, Grid(scene.dt, 2))
-                cases[method.card.kernel or method.family].add(case)
+                cases[method.method_info.kernel or method.family].add(case)
 
     def compile_one(kernel: str) -> None:
         mine = cases[kernel]

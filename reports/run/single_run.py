@@ -90,7 +90,7 @@ def plan_runs(scene: Scene, names: Sequence[str], dt: float | None, t_end: float
     longest = scene.t_end if t_end is None else t_end
     planned = []
     for name, method in chosen:
-        step = min(method.card.usual_dt or scene.dt, longest) if usual and dt is None else dt
+        step = min(method.method_info.usual_dt or scene.dt, longest) if usual and dt is None else dt
         planned.append(Planned(name, method, bounded_grid(scene, step, t_end), method.unsupported(scene) or ""))
     if all(each.refusal for each in planned):
         require_support(planned[0].method, scene)

@@ -6,7 +6,7 @@ import math
 import shlex
 from collections import Counter
 
-from conservative.benchmarks.contest import costs, credit
+from conservative.benchmarks.speed_ratio import costs, credit
 from conservative.benchmarks.studies import work_precision
 
 from ..document.cells import DASH, numeric, tolerance
@@ -14,8 +14,8 @@ from ..document.model import Emphasis, Paragraph, Row, Section, Table, filled
 from ..rows.names import MethodClass
 from . import random_bodies
 from .measured import Measured, of_scene
-from .ratios import contest_cell
-from .scene_contests import sides
+from .ratios import ratio_cell
+from .scene_ratios import sides
 from .summary import ERRORS
 
 HEADER = ("motion", "error, rad", "use", "µs per simulated s", "fastest engine or solver", "its time / ours", "repeat with")
@@ -44,7 +44,7 @@ def section(measured: Measured) -> Section:
                     engine, cost = each.theirs.name if each.theirs else DASH, numeric(1e6 * each.ours.time)
                     argument = shlex.quote(measured.plan.arguments[scene.name])
                     command = f"conservative run {argument} -m {best['method']} --dt {best['dt']:.10g}"
-                    rows.append([scene.name, tolerance(each.error), each.ours.name, cost, engine, contest_cell(each), command])
+                    rows.append([scene.name, tolerance(each.error), each.ours.name, cost, engine, ratio_cell(each), command])
     general, closed = families.values()
     parts = []
     if general:

@@ -6,8 +6,8 @@ import math
 
 import pandas as pd
 
-from conservative.benchmarks.contest import costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import costs
 from conservative.benchmarks.studies import convergence, paper, speed
 from conservative.method import Role
 from conservative.scene import Scene

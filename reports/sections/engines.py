@@ -9,9 +9,9 @@ from itertools import groupby
 
 import pandas as pd
 
-from conservative.benchmarks.contest import cost
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import cost
 from conservative.benchmarks.studies import engines_at_one_step, engines_over_steps
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import SpeedRatio, cheapest, costs
 from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST, STUDY
 from conservative.outcome import OutcomeKind
 
@@ -50,7 +50,7 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         legend = vega_embed.legend(families_of(points), marks=False)
         figure = Figure("many_bodies", title, summary, picture, panels, legend, Layout.PANELS)
     more = Section("Methods that did not run", filled(absent(table)), folded=True)
-    compared = as_table(contests(rows, reached))
+    compared = as_table(speed_ratios(rows, reached))
     blocks = filled(figure, compared, cost_table(rows, reached), more, Paragraph(TERMS, Emphasis.NOTE))
     return Section("Many bodies", blocks, "many-bodies")
 
@@ -76,21 +76,21 @@ def body_costs(rows: pd.DataFrame) -> pd.DataFrame:
     return reached.astype({"bodies": int})
 
 
-class BatchContest(NamedTuple):
-    """A contest of a class of ours and an engine at a statistic of the errors and a number of bodies.
+class BatchRatio(NamedTuple):
+    """A speed ratio of a class of ours and an engine at a statistic of the errors and a number of bodies.
 
-    The scene of the contest is the kind of the bodies.
+    The scene of the speed ratio is the kind of the bodies.
     """
 
     group: MethodClass
     engine: str
     statistic: str
     bodies: int
-    contest: Contest
+    speed_ratio: SpeedRatio
 
 
-def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[BatchContest]:
-    """Yield the contests of each class of ours with each engine.
+def speed_ratios(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[BatchRatio]:
+    """Yield the speed ratios of each class of ours with each engine.
 
     Both sides run bodies at once on one thread, or in their only way. The number of bodies is the largest with times of both
     sides, or of either.
@@ -110,32 +110,34 @@ def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[BatchContest
                         here["name"].isin([*names, *theirs]) & (here["measure"] == Measure.TIME.text) & here["value"].notna()
                     ]
                     for error in ERRORS:
-                        size, contest = _largest(str(kind), error, sides, timed["bodies"])
-                        yield BatchContest(group, str(rival), statistic, size, contest)
+                        size, speed_ratio = _largest(str(kind), error, sides, timed["bodies"])
+                        yield BatchRatio(group, str(rival), statistic, size, speed_ratio)
 
 
-def _largest(kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], timed: pd.Series[float]) -> tuple[int, Contest]:
-    """Return the contest among the most bodies at which both sides reach the error; else the one among the fewest."""
+def _largest(
+    kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], timed: pd.Series[float]
+) -> tuple[int, SpeedRatio]:
+    """Return the speed ratio among the most bodies at which both sides reach the error; else the one among the fewest."""
 
-    def at(size: int) -> Contest:
-        return Contest(kind, error, *(cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides))
+    def at(size: int) -> SpeedRatio:
+        return SpeedRatio(kind, error, *(cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides))
 
     sizes = sorted(map(int, timed.unique()), reverse=True) or [1]
     size = next((each for each in sizes if at(each).ours and at(each).theirs), sizes[-1])
     return size, at(size)
 
 
-def as_table(compared: Iterable[BatchContest]) -> Table:
-    """Return the results of `contests`, a row for each kind, engine and error."""
+def as_table(compared: Iterable[BatchRatio]) -> Table:
+    """Return the results of `speed_ratios`, a row for each kind, engine and error."""
     header = ["bodies", "our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
     rows: list[Row] = []
-    for group, engine, statistic, bodies, contest in compared:
-        sides = (contest.ours, contest.theirs)
+    for group, engine, statistic, bodies, speed_ratio in compared:
+        sides = (speed_ratio.ours, speed_ratio.theirs)
         times = [numeric(each.time * 1e6, digits=3) if each else DASH for each in sides]
         names = [each.name if each else "no time" for each in sides]
-        error, count = numeric(contest.error, tolerance(contest.error)), numeric(bodies, f"{bodies:,}")
-        kind = contest.scene.replace("_", " ")
-        ratio = grade_ratio(contest.ratio, interval=contest.interval)
+        error, count = numeric(speed_ratio.error, tolerance(speed_ratio.error)), numeric(bodies, f"{bodies:,}")
+        kind = speed_ratio.scene.replace("_", " ")
+        ratio = grade_ratio(speed_ratio.ratio, interval=speed_ratio.interval)
         rows.append([kind, group.value, engine, error, statistic, count, ratio, *times, *names])
     return Table([*header, "ours is", "engine is"], rows, "Many bodies: an engine's time divided by ours", Style.FILTERED)
 

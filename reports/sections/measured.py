@@ -18,7 +18,7 @@ from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
 from . import random_bodies
-from .scene_contests import EachStep, each_step
+from .scene_ratios import EachStep, each_step
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from conservative.benchmarks.contest import LINE, Cheapest, Ratios, contests, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import LINE, Cheapest, Ratios, costs, speed_ratios
 from conservative.benchmarks.studies.random import DECADES, STUDY
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
@@ -73,7 +73,7 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
         for field, bodies in taken[taken["family"].isin(members)].groupby("field", sort=False):
             indices = {str(scene): int(index) for scene, index in zip(bodies["scene"], bodies["body"], strict=True)}
             results += [
-                RandomRatios(contests(ours, side, indices, [error]), str(field), rival, error, indices) for error in DECADES
+                RandomRatios(speed_ratios(ours, side, indices, [error]), str(field), rival, error, indices) for error in DECADES
             ]
     return tuple(results)
 
@@ -128,8 +128,8 @@ def as_table(ratios: Iterable[RandomRatios]) -> Table:
             *(grade_ratio(body.ratio, interval=body.interval) for body in (*each.both[:1], *each.both[-1:])),
             *([] if each.both else [DASH, DASH]),
             str(each.indices[each.both[0].scene]) if each.both else DASH,
-            _most_often(contest.ours for contest in each.both),
-            _most_often(contest.theirs for contest in each.both),
+            _most_often(speed_ratio.ours for speed_ratio in each.both),
+            _most_often(speed_ratio.theirs for speed_ratio in each.both),
         ]
         for each in ratios
         if each.engine == ANY
@@ -157,7 +157,7 @@ def by_engine(ratios: Iterable[RandomRatios]) -> Table:
 
 def _mean(ratios: RandomRatios) -> Cell:
     """Return the mean with its interval, and on how many bodies both sides reach the error if that is not all."""
-    both, bodies = len(ratios.both), len(ratios.contests)
+    both, bodies = len(ratios.both), len(ratios.speed_ratios)
     counts = "" if both == bodies else f", {both} of {bodies} bodies"
     return numeric(ratios.ratio, ratio_text(ratios.ratio, ratios.interval) + counts)
 
@@ -167,7 +167,7 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
     return [
         {
             **{name: getattr(each, name) for name in ("field", "engine", "error", "only_ours", "won", "open", "lost")},
-            "bodies": len(each.contests),
+            "bodies": len(each.speed_ratios),
             "both": len(each.both),
             "only_engine": each.only_theirs,
             **{"mean": each.ratio, "worst": each.worst, "best": each.best, "mean_interval": each.interval},
@@ -185,10 +185,10 @@ def chart_points(ratios: Iterable[RandomRatios]) -> pd.DataFrame:
 
 def count_text(ratios: Ratios) -> str:
     """Return the number of bodies on which both sides reach the error, and how many only one or neither reaches."""
-    neither = len(ratios.contests) - len(ratios.both) - ratios.only_ours - ratios.only_theirs
+    neither = len(ratios.speed_ratios) - len(ratios.both) - ratios.only_ours - ratios.only_theirs
     missing = {"only ours": ratios.only_ours, "only engine": ratios.only_theirs, "neither": neither}
     reasons = ", ".join(f"{name} {count}" for name, count in missing.items() if count)
-    return f"{len(ratios.both)} of {len(ratios.contests)}" + (f" ({reasons})" if reasons else "")
+    return f"{len(ratios.both)} of {len(ratios.speed_ratios)}" + (f" ({reasons})" if reasons else "")
 
 
 def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios]) -> Summary:
@@ -221,7 +221,7 @@ def _means(reached: pd.DataFrame, bodies: int) -> pd.DataFrame:
 
 def sentence(ratios: Iterable[RandomRatios]) -> str:
     """Return the side that reaches `MIDDLE` faster, in the geometric mean over the bodies of all fields."""
-    every = Ratios(tuple(c for part in ratios if part.engine == ANY and part.error == MIDDLE for c in part.contests))
+    every = Ratios(tuple(c for part in ratios if part.engine == ANY and part.error == MIDDLE for c in part.speed_ratios))
     goal = f"{tolerance(MIDDLE)} rad"
     if not every.both:
         return f"On no random body do our integrators and an engine both reach {goal}."
@@ -229,13 +229,13 @@ def sentence(ratios: Iterable[RandomRatios]) -> str:
     low, high = every.interval if len(every.both) >= FEW else (math.nan, math.nan)
     ends = sorted((low, high) if every.ratio >= 1 else (1 / low, 1 / high)) if not math.isnan(low) else []
     parts = ["geometric mean", *([f"interval {' to '.join(map(factor, ends))}"] if ends else [])]
-    if slower := [1 / contest.ratio for contest in every.both if contest.lost]:
+    if slower := [1 / speed_ratio.ratio for speed_ratio in every.both if speed_ratio.lost]:
         parts.append(f"an engine or solver is faster on {len(slower)}, by up to {factor(max(slower))} times")
     else:
         parts.append(f"single bodies: {factor(every.worst)} to {factor(every.best)}")
     if every.open:
         parts.append(f"{every.open} are open")
-    if missed := len(every.contests) - len(every.both):
+    if missed := len(every.speed_ratios) - len(every.both):
         parts.append(f"{missed} more are not reached by both")
     bodies = "one random body" if len(every.both) == 1 else f"{len(every.both)} random bodies"
     times = f"{factor(max(every.ratio, 1 / every.ratio))} times as fast as {sides[1]} ({'; '.join(parts)})."

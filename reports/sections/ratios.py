@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from conservative.benchmarks.contest import Contest, costs
+from conservative.benchmarks.speed_ratio import SpeedRatio, costs
 from conservative.benchmarks.studies import each_step, random, work_precision
 
 from ..document.cells import DASH, grade_ratio, tolerance
@@ -11,7 +11,7 @@ from ..rows.names import MethodClass
 from ..rows.points import DECADES
 from .measured import Measured
 from .random_bodies import ANY, RandomRatios
-from .scene_contests import sides
+from .scene_ratios import sides
 
 _RATIOS = (
     "The time of the fastest engine or ODE solver divided by that of our fastest method, at each decade of the largest "
@@ -45,10 +45,10 @@ def ratio_table(measured: Measured) -> Table:
         runs |= {f"{scene.name}, {label}": reached for label, reached in every_step.runs.items()} if every_step else {}
         for label, reached in runs.items():
             for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
-                contests = sides(reached, kind)
-                if any(each.ours for each in contests):
-                    cells = {each.error: contest_cell(each) for each in contests}
-                    faster = (each.theirs for each in contests if each.theirs and cells[each.error].grade is Grade.BAD)
+                speed_ratios = sides(reached, kind)
+                if any(each.ours for each in speed_ratios):
+                    cells = {each.error: ratio_cell(each) for each in speed_ratios}
+                    faster = (each.theirs for each in speed_ratios if each.theirs and cells[each.error].grade is Grade.BAD)
                     names = dict.fromkeys(each.name for each in faster)
                     rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]
@@ -64,15 +64,15 @@ def ratio_table(measured: Measured) -> Table:
     )
 
 
-def contest_cell(contest: Contest) -> Cell:
+def ratio_cell(speed_ratio: SpeedRatio) -> Cell:
     """Return the ratio, or the side that is alone in reaching the error."""
-    if contest.ours and contest.theirs:
-        return grade_ratio(contest.ratio, digits=2, interval=contest.interval)
-    return Cell("✗ engine only", Grade.BAD) if contest.theirs else Cell("✓ ours only", Grade.GOOD)
+    if speed_ratio.ours and speed_ratio.theirs:
+        return grade_ratio(speed_ratio.ratio, digits=2, interval=speed_ratio.interval)
+    return Cell("✗ engine only", Grade.BAD) if speed_ratio.theirs else Cell("✓ ours only", Grade.GOOD)
 
 
 def _random_cell(ratios: RandomRatios) -> Cell:
-    note = f"{ratios.lost} of {len(ratios.contests)}" if ratios.lost else ""
+    note = f"{ratios.lost} of {len(ratios.speed_ratios)}" if ratios.lost else ""
     if ratios.lost and not ratios.both:
         return Cell("✗ engine only", Grade.BAD, note)
     return grade_ratio(ratios.ratio, note, digits=2, interval=ratios.interval)

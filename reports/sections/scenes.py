@@ -21,7 +21,7 @@ from ..document.model import Block, Cell, Emphasis, Figure, Paragraph, Row, Sect
 from ..rows import lines
 from ..rows.names import MethodClass, of_measure, of_study, outcomes
 from ..rows.points import front
-from . import scene_contests
+from . import scene_ratios
 from .drift import drift_figure, spheres_figure
 from .measured import Measured, of_scene
 from .summary import SAMPLE_TERMS, Summary
@@ -30,10 +30,10 @@ from .summary import SAMPLE_TERMS, Summary
 def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     """Return the section of a scene."""
     name, rows, points = scene.name, measured.scene_rows, of_scene(measured.points, scene.name)
-    contests = scene_contests.as_table(points, scene.t_end / step_ladder.SAMPLES, measured.every_step[name])
+    speed_ratios = scene_ratios.as_table(points, scene.t_end / step_ladder.SAMPLES, measured.every_step[name])
     sample = f"A sample is one of {step_ladder.SAMPLES} in the duration"
     sample += "; in the last rows, each of the scene's own steps." if measured.every_step[name] else "."
-    decades = replace(contests, caption=f"{name}: fastest method of each class at each decade of the error")
+    decades = replace(speed_ratios, caption=f"{name}: fastest method of each class at each decade of the error")
     drift_words = (
         f"Largest drift over {long_runs.end_of(scene) / scene.t_end:g} durations, relative (✓ up to {tolerance(CONSERVED)}, "
         f"≈ up to {tolerance(SMALL)}, ✗ more)."

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.contest import costs
+from conservative.benchmarks.speed_ratio import costs
 
 from ..charts import figures, vega_embed
 from ..charts.style import colours

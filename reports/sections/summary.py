@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
+from conservative.benchmarks.speed_ratio import Cheapest, SpeedRatio, cheapest, costs
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 
@@ -81,5 +81,5 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool, measured: boo
 
 def _speedup(fast: Cheapest, slow: Cheapest) -> str:
     """Return the ratio of two times, with its interval over processes if there is one."""
-    contest = Contest("", MIDDLE, fast, slow)
-    return ratio_text(contest.ratio, contest.interval, 2)
+    speed_ratio = SpeedRatio("", MIDDLE, fast, slow)
+    return ratio_text(speed_ratio.ratio, speed_ratio.interval, 2)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import cheapest, costs
 from conservative.benchmarks.studies import convergence, motion, speed
 from conservative.invariants import find_energy
 from conservative.method import Role

@@ -535,8 +535,8 @@ def plant(seed: int) -> Planted:
     noise = str(draw.random.choice([*NOISES], p=[0.4, 0.3, 0.2, 0.1] if coarse else [0.25] * 4))
     single = noise == "none" and draw.chance(0.3)
     wanted = {"transposed": "R", "order xyzw": "q", "order wxyz": "q", "world rates": "R w", "rates at other times": "R w"}
-    need = {"attitude": "R w", "reading": "w"}.get(kind, "")
-    need = wanted.get(mistake, "R w" if mistake == "body axes" else need)
+    feature = {"attitude": "R w", "reading": "w"}.get(kind, "")
+    feature = wanted.get(mistake, "R w" if mistake == "body axes" else feature)
     in_time = case.turning is not None or case.torque is not None or is_table(case.rotor) or case.damping is not None
 
     def fits(name: str) -> bool:
@@ -549,7 +549,7 @@ def plant(seed: int) -> Planted:
             "order wxyz": name in ("TUM", "ROS"),
         }
         plain = name != "world rates" or kind != "reading"
-        return unit and plain and order.get(mistake, True) and all(part in layout.has.split() for part in need.split())
+        return unit and plain and order.get(mistake, True) and all(part in layout.has.split() for part in feature.split())
 
     layout = str(draw.random.choice([name for name in LAYOUTS if fits(name)]))
     made = Planted(seed, replace(case, t_end=float(t[-1])), mistake, layout, noise, single, turns)

@@ -63,7 +63,7 @@ def list_runs(method, scenes):
     for scene in scenes:
         if method.unsupported(scene) is None:
             dt = min(scene.dt, 0.9 * method.longest_step(scene))
-            for n_steps in STEPS[bool(method.card.kernel) and not isinstance(scene.potential, cv.FunctionPotential)]:
+            for n_steps in STEPS[bool(method.method_info.kernel) and not isinstance(scene.potential, cv.FunctionPotential)]:
                 yield Run(method, scene, dt, n_steps)
 
 

@@ -15,7 +15,7 @@ from ..crossing import FREE, HEAVY, ROWS, TIMES, VALUES
 from ..independent import Case
 
 BASE = replace(FREE, field=HEAVY, rotor=np.array((0.6, -0.5, 0.9)), torque=(TIMES, VALUES), damping=0.1 * FREE.J)
-FLYING = ROWS[cv.needs.Need.FLIGHT]
+FLYING = ROWS[cv.features.Feature.FLIGHT]
 MADE = cv.Invariant("made", "J", 1.0, lambda R, w: w[:, 0])
 
 

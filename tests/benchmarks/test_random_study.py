@@ -8,10 +8,10 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.benchmarks.contest import costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.measures.processes import Processes
+from conservative.benchmarks.speed_ratio import costs
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import NOT_DRAWN, Case
 from conservative.benchmarks.studies.random import DECADES, SAMPLES, TimedSetting

@@ -76,7 +76,7 @@ def test_a_motion_has_the_states_of_its_first_duration_and_a_curve_on_the_unit_s
 
 
 def test_a_motion_has_signed_drifts_and_the_errors_of_the_first_duration_at_the_step_of_the_users(monkeypatch):
-    monkeypatch.setattr(NoSquish, "card", replace(NoSquish.card, usual_dt=0.004))
+    monkeypatch.setattr(NoSquish, "method_info", replace(NoSquish.method_info, usual_dt=0.004))
     rows, lines = findings("motion", NoSquish(), scenes=(TUMBLING,))
     assert {row.dt for row in rows} == {0.004}
     grid = Grid(0.004, 250)
@@ -92,7 +92,7 @@ def test_a_motion_has_signed_drifts_and_the_errors_of_the_first_duration_at_the_
 def test_hours_of_a_satellite_have_samples_that_fit_at_the_step_of_an_engine():
     scene, engine = registry.scene("librating_satellite"), registry.method("mujoco:RK4")
     (case,) = motion.list_runs(Study("motion", (scene,), (engine,), quick=True), scene, engine, drawn=True)
-    assert case.grid.dt == engine.card.usual_dt
+    assert case.grid.dt == engine.method_info.usual_dt
     assert case.grid.n_steps > 5 * motion.MOST_SAMPLES  # measured: 5,400,000; ten durations did not fit
     assert case.grid.n_samples <= motion.MOST_SAMPLES + 1
 

@@ -14,9 +14,9 @@ from conservative.benchmarks.studies.engine_selection import list_installed, sel
 from conservative.benchmarks.studies.line import list_settings
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, methods, series, tolerance_setting
 from conservative.benchmarks.suite.points import Point
-from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
+from conservative.method_info import Maker
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.adapter import LocalEngine, method_class
 from conservative.references.environments.environment import Environment, MissingEnvironment

@@ -14,10 +14,10 @@ import pytest
 import conservative as cv
 from conservative import invariants
 from conservative.attitude import axes_about, rotation_about
-from conservative.card import Card
 from conservative.errors import Diverged, InvalidResult, NotConserved
 from conservative.grid import Grid
 from conservative.invariants import kept_sizes
+from conservative.method_info import MethodInfo
 from conservative.methods.bounds import bounds_of
 from conservative.outcome import OutcomeKind
 from conservative.trajectory import Bounds, Trajectory
@@ -61,7 +61,7 @@ class Foreign(cv.Method):
 class WithKernel(Foreign):
     """The same method; compiled code checks its samples first."""
 
-    card: ClassVar[Card] = Card(kernel="reduced")
+    method_info: ClassVar[MethodInfo] = MethodInfo(kernel="reduced")
 
 
 kinds = pytest.mark.parametrize("kind", [Foreign, WithKernel])

@@ -26,8 +26,8 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.check import replace_unchecked
+from conservative.features import Feature
 from conservative.identity import digest, fields_of_motion, identify
-from conservative.needs import Need
 
 from ..crossing import ROWS, OwnField
 
@@ -615,9 +615,9 @@ def variants(value):
         yield "", change(value)
 
 
-@pytest.mark.parametrize("need", Need, ids=str)
-def test_a_change_of_any_number_or_function_changes_the_key(need):
-    built = ROWS[need].scene()
+@pytest.mark.parametrize("feature", Feature, ids=str)
+def test_a_change_of_any_number_or_function_changes_the_key(feature):
+    built = ROWS[feature].scene()
     extra = cv.Invariant("made", "J", 1.0, lambda R, w: w[:, 0])
     built = replace_unchecked(built, extra_invariants=(extra,))
     keys = {"": built.key}

@@ -26,7 +26,7 @@ def test_importing_the_package_imports_nothing_else():
     assert found == "['conservative', 'conservative.version'] False"
 
 
-CARD = """
+METHOD_INFO = """
 import conservative as cv, numpy as np
 s = cv.scenes.brick_flip()
 t = cv.Trajectory(s, np.zeros(1), s.R_WB0[None], s.w_WB_B0[None], "x")
@@ -34,7 +34,7 @@ repr(t), t._repr_html_()
 """
 
 
-@pytest.mark.parametrize("code", ["from conservative import *\n", CARD], ids=["public names", "card"])
+@pytest.mark.parametrize("code", ["from conservative import *\n", METHOD_INFO], ids=["public names", "method_info"])
 def test_public_names_and_cards_import_no_compiler_no_engine_and_no_tables(code):
     assert printed(f"{code}import sys; print([m for m in {FORBIDDEN!r} if m in sys.modules])") == "[]"
 

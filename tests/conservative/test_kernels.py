@@ -134,8 +134,8 @@ print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
 @pytest.mark.parametrize("setting", ["__pycache__", "NUMBA_CACHE_DIR"])
 def test_an_edit_of_an_inner_function_runs_new_code(tmp_path: Path, setting: str) -> None:
     """The file of the outer kernel and the modification time of the edited file do not change."""
-    rooms = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")
-    shutil.copytree(PACKAGE, tmp_path / "conservative", ignore=rooms)
+    packages = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")
+    shutil.copytree(PACKAGE, tmp_path / "conservative", ignore=packages)
     cache = str(tmp_path / "cache") if setting == "NUMBA_CACHE_DIR" else ""
     environment = {
         "PYTHONPATH": str(tmp_path),
@@ -167,7 +167,7 @@ def test_compiled_code_belongs_to_all_files_that_it_is_made_from(tmp_path: Path,
     assert digest(tmp_path / "copy") != before
 
 
-NAMES = sorted({family.card.kernel for family in list_families().values() if family.card.kernel})
+NAMES = sorted({family.method_info.kernel for family in list_families().values() if family.method_info.kernel})
 LOOSE = [name for name in NAMES if name != "taylor"]  # which takes its numbers in an array
 
 

@@ -78,8 +78,8 @@ CALLS = {
 
 def public_arrays():
     """Return the names of the public parameters that take arrays, by their annotations."""
-    rooms = {"": {name: getattr(cv, name) for name in cv.__all__}, "shapes.": vars(cv.shapes)}
-    for room, members in rooms.items():
+    packages = {"": {name: getattr(cv, name) for name in cv.__all__}, "shapes.": vars(cv.shapes)}
+    for room, members in packages.items():
         own = {
             name: each for name, each in members.items() if not room or getattr(each, "__module__", "") == cv.shapes.__name__
         }

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.features import Feature
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, composition_of
-from conservative.needs import Need
 
 from .one_body import free, in_field, top
 
@@ -49,7 +49,7 @@ def test_order_and_invariants(method, name, order, conserves):
     kept = {each for each in method.conserves if not each.endswith(" balance")}
     assert (method.name, method.order, kept, method.role) == (name, order, conserves, cv.Role.OURS)
     balances = {each.removesuffix(" balance") for each in method.conserves - kept}
-    assert balances == (kept if Need.TORQUE in method.takes else set())
+    assert balances == (kept if Feature.TORQUE in method.supports else set())
 
 
 @pytest.mark.parametrize(
@@ -102,9 +102,9 @@ def test_limits_are_included():
 
 def test_methods_give_the_reason_for_unsupported_scenes():
     said = [method.unsupported(scene) for method, scene in ((cv.Gauss(), SPRUNG), (cv.Lame(), SPRUNG), (cv.Lame(), GRAVITY))]
-    assert all(each.startswith("it does not take a spring; ") for each in said[:2])
+    assert all(each.startswith("it does not support a spring; ") for each in said[:2])
     assert said[2] == "body and field symmetric about one axis"
-    assert cv.MoserVeselov().unsupported(GRAVITY).startswith("it does not take uniform gravity; ")
+    assert cv.MoserVeselov().unsupported(GRAVITY).startswith("it does not support uniform gravity; ")
     assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
     assert cv.Splitting().unsupported(FREE).startswith("it is for bodies in a field")
     assert cv.Reduced(frame="non_spinning").unsupported(FREE).startswith("frame non_spinning needs")

@@ -65,7 +65,7 @@ def test_an_installation_that_is_older_than_the_files_is_named(monkeypatch):
     """Entry points are copied when a package is installed: a name may be missing, or a module may have moved since."""
     trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1)
     moved = EntryPoint("moved", "conservative.references.gone:Moved", deferred_imports.METHODS)
-    old = {deferred_imports.ROOMS: {}, deferred_imports.METHODS: {"moved": moved}, deferred_imports.ENGINES: {}}
+    old = {deferred_imports.PACKAGES: {}, deferred_imports.METHODS: {"moved": moved}, deferred_imports.ENGINES: {}}
     for module in (deferred_imports, registry):
         monkeypatch.setattr(module, "list_entries", old.get)
     with pytest.raises(BadInput, match=r"no entry point 'animation'; expected .*pip install -e \. again"):
@@ -77,8 +77,8 @@ def test_an_installation_that_is_older_than_the_files_is_named(monkeypatch):
 def test_the_core_names_no_room_above_it():
     """Contracts see imports only, and an import by a text is none."""
     core = Path(deferred_imports.__file__).parent
-    rooms = ("references", "benchmarks", "reports")
-    files = [path for path in core.rglob("*.py") if path.relative_to(core).parts[0] not in rooms]
+    packages = ("references", "benchmarks", "reports")
+    files = [path for path in core.rglob("*.py") if path.relative_to(core).parts[0] not in packages]
     texts = [
         (path.name, node.value)
         for path in files
@@ -86,7 +86,7 @@ def test_the_core_names_no_room_above_it():
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     ]
     assert len(files) > 80
-    assert [each for each in texts if re.match(rf"(conservative)?\.({'|'.join(rooms)})\b", each[1])] == []
+    assert [each for each in texts if re.match(rf"(conservative)?\.({'|'.join(packages)})\b", each[1])] == []
 
 
 @pytest.mark.parametrize(

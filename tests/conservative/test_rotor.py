@@ -84,7 +84,7 @@ def test_the_truth_is_not_that_of_another_rotor() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_method_is_accurate_and_conserves(kind: str, method: str, error: float) -> None:
     scene, chosen = gyrostat(kind, 1), registry.method(method)
-    taken = scene.needs <= chosen.takes and (kind, method) != ("free", "projected")
+    taken = scene.features <= chosen.supports and (kind, method) != ("free", "projected")
     assert (chosen.unsupported(scene) is None) == taken
     if taken:
         found, drift = errors(method, scene, scene.t_end / 1000)

@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative import grid
 from conservative.attitude import angle_between, rotation_about
-from conservative.card import Card, Cost
 from conservative.errors import AccuracyNotReached, MissingEngine
 from conservative.grid import Grid
+from conservative.method_info import Cost, MethodInfo
 from conservative.methods import automatic, search, trials
 from conservative.methods.between import SampleTimes
 from conservative.outcome import Progress
@@ -44,7 +44,7 @@ class Known(cv.Method):
 
     family: ClassVar[str] = "known"
     role: ClassVar[cv.Role] = cv.Role.OURS
-    card: ClassVar[Card] = Card(cost=lambda method: Cost(step=method.step, correction=3.0))
+    method_info: ClassVar[MethodInfo] = MethodInfo(cost=lambda method: Cost(step=method.step, correction=3.0))
     taken: ClassVar[list] = []
 
     @property
@@ -218,7 +218,7 @@ def runs(monkeypatch):
 
 
 def work(method, steps):
-    return method.card.cost(method).least * steps
+    return method.method_info.cost(method).least * steps
 
 
 @pytest.mark.parametrize("factor", [1.0, 5.0, 20.0])
@@ -370,23 +370,23 @@ def test_progress_is_reported_after_a_second_and_rarely():
 
 
 def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
-    def family(name, card, supported=True, missing=False):
+    def family(name, method_info, supported=True, missing=False):
         def prepare_settings(self):
             if missing:
                 raise MissingEngine(name, "nothing")
 
         members = {
             "family": name,
-            "card": card,
+            "method_info": method_info,
             "__post_init__": prepare_settings,
             "unsupported": lambda self, scene: None if supported else "no",
         }
         return dataclass(frozen=True)(type(name, (Known,), members))
 
-    first, second = family("first", Card(rank=2, group="group")), family("second", Card(rank=3, group="group"))
-    third, none = family("third", Card(rank=1)), family("none", Card())
-    exact = family("exact", Card(rank=4, exact=True))
-    gone, other = family("gone", Card(rank=0), missing=True), family("other", Card(rank=0), supported=False)
+    first, second = family("first", MethodInfo(rank=2, group="group")), family("second", MethodInfo(rank=3, group="group"))
+    third, none = family("third", MethodInfo(rank=1)), family("none", MethodInfo())
+    exact = family("exact", MethodInfo(rank=4, exact=True))
+    gone, other = family("gone", MethodInfo(rank=0), missing=True), family("other", MethodInfo(rank=0), supported=False)
 
     def names(*families):
         monkeypatch.setattr(search.registry, "list_families", lambda: {each.family: each for each in families})
@@ -395,7 +395,7 @@ def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
     assert names(second, none, first, third, gone, other) == ["third", "first"]
     assert names(second, first, exact) == ["exact"]
     assert names(none) == []
-    foreign = family("foreign", Card(rank=0))
+    foreign = family("foreign", MethodInfo(rank=0))
     foreign.role = cv.Role.ENGINE
     assert names(foreign, first) == ["first"]
 

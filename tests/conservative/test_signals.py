@@ -198,7 +198,7 @@ def states(trajectory: cv.Trajectory) -> tuple[bytes, bytes, object, str]:
 
 
 BLOCKS = (
-    *((scene, method, 1) for scene, method in LONG_RUNS if registry.method(method).card.kernel),
+    *((scene, method, 1) for scene, method in LONG_RUNS if registry.method(method).method_info.kernel),
     ("lagrange_top", "reduced", 30),
     ("lagrange_top", "reduced", 55),
     ("asymmetric_top", "reduced:order=4", 12),
@@ -213,7 +213,7 @@ def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, m
     """Short steps, long steps that the solver reaches in parts, and steps that fail."""
     chosen, motion = registry.method(method), registry.scene(scene)
     dt = min(factor * motion.dt, 0.9 * chosen.longest_step(motion))
-    run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.card.kernel)
+    run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.method_info.kernel)
     monkeypatch.setattr(kernel, "PAUSE", 0)
     whole = states(run())
     for pause in (1, 2, 7, 100):
@@ -222,7 +222,7 @@ def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, m
 
 
 @pytest.mark.parametrize(
-    "name", sorted({family.card.kernel for family in registry.list_families().values() if family.card.kernel})
+    "name", sorted({family.method_info.kernel for family in registry.list_families().values() if family.method_info.kernel})
 )
 def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Kernel:

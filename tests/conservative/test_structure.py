@@ -1,4 +1,4 @@
-"""Symmetry, symplecticity and conservation of every method whose card declares its structure, measured."""
+"""Symmetry, symplecticity and conservation of every method that declares its structure, measured."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ STEPS = 0.4, 0.8, 1.2  # s; 0.9 to 2.7 rad, so that a defect of a method of orde
 VISIBLE = {  # settings that show their defects
     "convected": ("tol=1e-13",),
     "taylor": ("order=8", "order=16", "tolerance=1e-3"),
-    "textbook": (*cv.Textbook.card.variants, "scheme=generalized_alpha,rho=1.0"),
+    "textbook": (*cv.Textbook.method_info.variants, "scheme=generalized_alpha,rho=1.0"),
 }
 PART = {"no_squish": 0.5, "rattle": 0.25, "lie_variational": 0.25}  # of STEPS: differences of longer steps have larger errors
 ROUND_OFF, DEFECT = 4e-12, 1e-10  # measured: at most 6e-13, no_squish:order=10 2e-12, and at least 3e-10
@@ -24,8 +24,8 @@ ROUND_OFF, DEFECT = 4e-12, 1e-10  # measured: at most 6e-13, no_squish:order=10 
 METHODS = [
     pytest.param(method, id=method.name)
     for name, family in list_families().items()
-    for method in map(family.configure, VISIBLE.get(name, family.card.variants))
-    if method.card.structure(method) is not None
+    for method in map(family.configure, VISIBLE.get(name, family.method_info.variants))
+    if method.method_info.structure(method) is not None
 ]
 
 
@@ -89,13 +89,13 @@ def largest(measure, method):
 @pytest.mark.parametrize("method", METHODS)
 def test_symmetry(method):
     asymmetry = largest(measure_asymmetry, method)
-    assert asymmetry < ROUND_OFF if method.card.structure(method).symmetric else asymmetry > DEFECT
+    assert asymmetry < ROUND_OFF if method.method_info.structure(method).symmetric else asymmetry > DEFECT
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_symplecticity(method):
     defect = largest(measure_symplecticity, method)
-    assert defect < ROUND_OFF if method.card.structure(method).symplectic else defect > DEFECT
+    assert defect < ROUND_OFF if method.method_info.structure(method).symplectic else defect > DEFECT
 
 
 @pytest.mark.parametrize(

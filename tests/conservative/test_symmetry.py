@@ -154,7 +154,7 @@ def test_symmetries_hold(method, kind, data):
     for symmetry in SYMMETRIES:
         if isinstance(method, cv.NoSquish) and symmetry in (turned_body, permuted_axes):
             continue  # equal moments have no axes of their own, and its error depends on the axes
-        structure = method.card.structure(method)
+        structure = method.method_info.structure(method)
         if symmetry is reversed_time and not (structure and structure.symmetric) and (method.order or 8) < 8:
             continue  # twice its truncation error remains
         R, w = symmetry(method, case, plain)

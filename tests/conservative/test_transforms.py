@@ -9,8 +9,8 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
+from conservative.features import FIELDS, IN_TIME, Feature
 from conservative.invariants import Invariant, momentum_W, sizes
-from conservative.needs import FIELDS, IN_TIME, Need
 from conservative.scenes.transforms import in_body_frame, slow_motion
 
 BODY = cv.RigidBody([[13, 0.5, 0.2], [0.5, 5, 0.3], [0.2, 0.3, 10]])
@@ -60,12 +60,12 @@ PARTS = {
     "motor, function": ({"body": cv.RigidBody(BODY.inertia, lambda t: (30 * t, 0.0, 20 * np.cos(t)))}, "rotor"),
     "all": ({"potential": GRAVITY, "torque": cv.Torque((TIMES, VALUES)), "damping": cv.Damping(MATRIX)}, "torque"),
 }
-REFUSED = FIELDS - {Need.GRAVITY} | IN_TIME
+REFUSED = FIELDS - {Feature.GRAVITY} | IN_TIME
 F = rotation_about((1, 2, 3), 0.7)
 
 
 def run(scene, steps=60):
-    return cv.integrate(scene, scene.t_end / steps, "projected" if Need.ATTITUDE in scene.needs else "reduced:order=4")
+    return cv.integrate(scene, scene.t_end / steps, "projected" if Feature.ATTITUDE in scene.features else "reduced:order=4")
 
 
 def without(scene, part):
@@ -74,8 +74,8 @@ def without(scene, part):
 
 
 def test_each_part_that_a_scene_can_need_is_carried_along_or_refused():
-    needed = frozenset().union(*(plain(**parts).needs for parts, _ in PARTS.values()))
-    assert needed | {Need.FLIGHT} | REFUSED == set(Need)
+    needed = frozenset().union(*(plain(**parts).features for parts, _ in PARTS.values()))
+    assert needed | {Feature.FLIGHT} | REFUSED == set(Feature)
     orbit = cv.Orbit(0.3, (0, 1, 0)).gravity_gradient(BODY.inertia, (1, 0, 0))
     function = cv.FunctionPotential(lambda R: R[2, 0], lambda R: np.outer([0, 0, 1], [1, 0, 0]), 1.0)
     for field in (orbit, function, cv.LinearSpring(3.0, (0.1, 0.2, 0.3), (1.0, 0.0, 0.5), 0.3)):

@@ -9,8 +9,8 @@ from scipy.special import ellipj, ellipk
 
 import conservative as cv
 from conservative.attitude import angle_between, hat, orthonormality, rotation_about
-from conservative.card import Card
 from conservative.invariants import JACOBI_INTEGRAL
+from conservative.method_info import MethodInfo
 from conservative.references.solvers.scipy import SciPy
 from conservative.scenes import satellites
 
@@ -130,7 +130,7 @@ def test_motions_of_any_speed(time):
 def test_a_run_that_loses_the_integral_is_cut():
     class Losing(cv.Method):
         family, role, order, conserves = "losing", cv.Role.OURS, 8, frozenset({JACOBI_INTEGRAL})
-        label, card = "losing", Card(takes=frozenset(cv.Need))
+        label, method_info = "losing", MethodInfo(supports=frozenset(cv.Feature))
 
         def prepare(self, scene, grid):
             good = cv.Projected().prepare(scene, grid)()

@@ -144,7 +144,9 @@ def test_every_field_of_a_description_of_another_kind_is_named(field, tmp_path):
     assert len(values) >= 4
     for value in values:
         with pytest.raises(ValueError, match=f"`{field}` is "):
-            _check_description({"card": {field: value}} if inside else {field: value})
-    command = written(tmp_path, "hello", "engine", json.dumps({"card": {field: values[0]}} if inside else {field: values[0]}))
+            _check_description({"method_info": {field: value}} if inside else {field: value})
+    command = written(
+        tmp_path, "hello", "engine", json.dumps({"method_info": {field: values[0]}} if inside else {field: values[0]})
+    )
     with pytest.raises(UnusableProgram, match=f"wrong, a program of .*`{field}`"):
         program_class(Program("wrong", tmp_path / "conservative.toml", " ".join(command)))

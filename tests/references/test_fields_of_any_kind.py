@@ -329,5 +329,5 @@ def test_mujocos_passive_force_leaves_other_models_alone(custom):
 def test_what_the_adapter_of_an_engine_lacks_is_named():
     function = cv.FunctionPotential(FIELDS["gravity"].energy, FIELDS["gravity"].gradient)
     method = registry.method("mujoco")
-    assert method.unsupported(scene_in(function)).startswith("it does not take a potential of Python functions; ")
+    assert method.unsupported(scene_in(function)).startswith("it does not support a potential of Python functions; ")
     assert method.unsupported(scene_in(TURNING["gravity"])) == "not supported by our adapter: Turning of UniformGravity"

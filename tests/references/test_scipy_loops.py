@@ -5,8 +5,8 @@ import pytest
 
 from conservative import registry
 from conservative.errors import BadInput, Unsupported
+from conservative.features import Feature
 from conservative.grid import Grid
-from conservative.needs import Need
 from conservative.references.solvers import scipy
 from conservative.references.solvers.scipy import SciPy
 from tests.crossing import FREE, ROWS
@@ -15,12 +15,12 @@ KINDS = [SciPy(name, 1e-10, "compiled") for name in scipy._COMPILED]
 
 
 @pytest.mark.parametrize("method", KINDS, ids=lambda each: each.integrator)
-@pytest.mark.parametrize("need", ROWS, ids=str)
-def test_every_part_is_right_or_refused_by_name(need, method):
+@pytest.mark.parametrize("feature", ROWS, ids=str)
+def test_every_part_is_right_or_refused_by_name(feature, method):
     """With its break points: torques and motors from tables, with a jump and corners."""
-    row = ROWS[need]
+    row = ROWS[feature]
     scene, grid = row.scene(), Grid(row.case.t_end / 8, 8)
-    if need is Need.FLIGHT:
+    if feature is Feature.FLIGHT:
         with pytest.raises(Unsupported, match="flight"):
             method.prepare(scene, grid)
         return

@@ -38,7 +38,7 @@ def test_the_settings_of_a_class_are_those_in_the_file_of_the_engine(family):
         name: (type(value).__name__, value) for name, value in family.adapter.ENGINE["settings"].items()
     }
     apart = getattr(catalogue, family.family)
-    assert (family.data, family.card, family().precision) == (apart.data, apart.card, apart.precision)
+    assert (family.data, family.method_info, family().precision) == (apart.data, apart.method_info, apart.precision)
 
 
 BAD = [
@@ -63,9 +63,21 @@ def test_bad_settings(method, settings, message):
 
 
 @pytest.mark.parametrize("name", ["colour", "variants", "suite", "rank", "candidates"])
-def test_an_entry_of_the_card_is_refused_as_a_class_attribute(name):
-    with pytest.raises(TypeError, match=rf"Mine\.{name} has no effect\. Write: card = Card\({name}="):
+def test_an_entry_of_method_info_is_refused_as_a_class_attribute(name):
+    with pytest.raises(TypeError, match=rf"Mine\.{name} has no effect\. Write: method_info = MethodInfo\({name}="):
         type("Mine", (cv.Method,), {name: ()})
+
+
+@pytest.mark.parametrize(("former", "name"), [("Need", "Feature"), ("Card", "MethodInfo"), ("needs", "features")])
+def test_a_former_public_name_is_an_error_with_the_new_one(former, name):
+    with pytest.raises(AttributeError, match=rf"{former} has another name now: conservative\.{name}$"):
+        getattr(cv, former)
+
+
+@pytest.mark.parametrize(("former", "name"), [("card", "method_info"), ("takes", "supports")])
+def test_a_former_class_attribute_is_an_error_with_the_new_one(former, name):
+    with pytest.raises(TypeError, match=rf"Mine\.{former} has another name now\. Write: {name}"):
+        type("Mine", (cv.Method,), {former: ()})
 
 
 def test_a_non_spinning_frame_needs_symmetry(free, heavy, top):

@@ -15,9 +15,9 @@ from click.testing import CliRunner
 
 from conservative import deferred_imports, registry
 from conservative.benchmarks.verification.finding import Verification
-from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.method import Method
+from conservative.method_info import settings_text
 from conservative.programs import list_programs
 from conservative.references.environments import environment
 from conservative.registry import read_name
@@ -55,7 +55,7 @@ CAPTURED = {
 GREETING = {
     "settings": {"integrator": "rk4", "fixed": False},
     "orders": {"rk4": 4, "euler": 1},
-    "card": {"variants": ["euler", "rk4"], "as_installed": ["euler,fixed=true"]},
+    "method_info": {"variants": ["euler", "rk4"], "as_installed": ["euler,fixed=true"]},
     "formats": ["urdf"],
 }
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from conservative import BadInput, MissingEngine, registry
-from conservative.benchmarks.contest import cheapest, costs
+from conservative.benchmarks.speed_ratio import cheapest, costs
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.document.model import Grade

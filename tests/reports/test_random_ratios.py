@@ -50,9 +50,9 @@ def found(*lines):
     return ratios(frame([each for rows in lines for each in rows]))
 
 
-def against(contests_found, engine=ANY, error=1e-6):
-    (contest,) = [each for each in contests_found if each.engine == engine and each.error == error]
-    return contest
+def against(ratios_found, engine=ANY, error=1e-6):
+    (speed_ratio,) = [each for each in ratios_found if each.engine == engine and each.error == error]
+    return speed_ratio
 
 
 TWICE = [line(0, "gauss", "ours", flat(1.0)), line(0, "heyoka", "engine", flat(2.0))]
@@ -63,38 +63,46 @@ NEITHER = [line(4, "gauss", "ours", flat(1.0, least=1e-4)), line(4, "heyoka", "e
 
 
 def test_the_mean_is_geometric_and_the_worst_body_is_named():
-    contest = against(found(*TWICE, *SLOWER))
-    assert (contest.ratio, contest.worst, contest.best) == (pytest.approx(1.0), 0.5, 2.0)
-    assert contest.both[0].scene == name_of(FIELD, 7, 1)
+    speed_ratio = against(found(*TWICE, *SLOWER))
+    assert (speed_ratio.ratio, speed_ratio.worst, speed_ratio.best) == (pytest.approx(1.0), 0.5, 2.0)
+    assert speed_ratio.both[0].scene == name_of(FIELD, 7, 1)
 
 
 def test_a_body_that_a_side_misses_is_counted_and_not_dropped():
-    contest = against(found(*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE, *NEITHER))
-    assert (len(contest.contests), len(contest.both), contest.only_ours, contest.only_theirs) == (5, 2, 1, 1)
-    assert contest.ratio == pytest.approx(1.0)
-    assert random_bodies.count_text(contest) == "2 of 5 (only ours 1, only engine 1, neither 1)"
+    speed_ratio = against(found(*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE, *NEITHER))
+    assert (len(speed_ratio.speed_ratios), len(speed_ratio.both), speed_ratio.only_ours, speed_ratio.only_theirs) == (
+        5,
+        2,
+        1,
+        1,
+    )
+    assert speed_ratio.ratio == pytest.approx(1.0)
+    assert random_bodies.count_text(speed_ratio) == "2 of 5 (only ours 1, only engine 1, neither 1)"
     assert random_bodies.count_text(against(found(*TWICE))) == "1 of 1"
 
 
 def test_a_decade_that_no_pair_reaches_has_no_ratio():
-    contest = against(found(*NEITHER))
-    assert all(math.isnan(value) for value in (contest.ratio, contest.worst, contest.best))
-    assert "neither" in random_bodies.count_text(contest)
+    speed_ratio = against(found(*NEITHER))
+    assert all(math.isnan(value) for value in (speed_ratio.ratio, speed_ratio.worst, speed_ratio.best))
+    assert "neither" in random_bodies.count_text(speed_ratio)
 
 
 def test_ours_is_the_cheapest_of_all_lines_and_so_is_the_engine():
     lean = line(0, "heyoka:frame=lean", "engine", flat(1.5))
-    contest = against(found(*TWICE, line(0, "projected", "ours", flat(0.5)), lean, line(0, "scipy", "engine", flat(9.0))))
-    assert contest.ratio == pytest.approx(3.0)
-    assert (contest.contests[0].ours.name, contest.contests[0].theirs.name) == ("projected", "heyoka frame=lean")
+    speed_ratio = against(found(*TWICE, line(0, "projected", "ours", flat(0.5)), lean, line(0, "scipy", "engine", flat(9.0))))
+    assert speed_ratio.ratio == pytest.approx(3.0)
+    assert (speed_ratio.speed_ratios[0].ours.name, speed_ratio.speed_ratios[0].theirs.name) == (
+        "projected",
+        "heyoka frame=lean",
+    )
     assert against(found(*TWICE, line(0, "scipy", "engine", flat(9.0))), "scipy").ratio == pytest.approx(9.0)
 
 
 def test_a_lucky_setting_of_ours_does_not_decide():
     lucky = line(0, "gauss", "ours", [(1e-9, 0.1), (1e-5, 0.9), (1e-13, 1.0)])
-    contest = against(found(lucky, line(0, "heyoka", "engine", flat(2.0))), error=1e-6)
+    speed_ratio = against(found(lucky, line(0, "heyoka", "engine", flat(2.0))), error=1e-6)
     between = 0.9 * (1.0 / 0.9) ** (1 / 8)
-    assert contest.ratio == pytest.approx(2.0 / between)  # and not 20
+    assert speed_ratio.ratio == pytest.approx(2.0 / between)  # and not 20
 
 
 def test_a_setting_that_was_not_timed_or_failed_is_no_way_there():
@@ -118,7 +126,7 @@ def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
 def test_a_body_without_a_confirmed_truth_is_in_no_count():
     dropped = {"scene": name_of(FIELD, 7, 9), "field": FIELD, "seed": 7, "body": 9, "role": "truth", "outcome": "skipped"}
     rows = [row("random", "precise:bits=96", Measure.AGREEMENT, 1e-12, **dropped)]
-    assert len(against(found(*TWICE, rows)).contests) == 1
+    assert len(against(found(*TWICE, rows)).speed_ratios) == 1
     confirmed = row("random", "precise:bits=96", Measure.AGREEMENT, 2e-15, **{**dropped, "body": 0, "outcome": "ok"})
     assert random_bodies.truths(frame([*rows, confirmed])) == (
         "Two reference solutions agree within 2e-15 rad on 1 bodies. They differ by more on 1, which are not compared."
@@ -158,9 +166,9 @@ def in_processes(*pairs):
 
 
 def test_a_ratio_has_an_interval_over_processes_and_is_open_around_1():
-    contest = against(found(*in_processes((1.0, 2.0), (1.1, 2.2), (1.0, 2.1), (2.0, 3.8), (1.0, 2.0))))
-    assert contest.ratio == pytest.approx((2 * 2 * 2.1 * 1.9 * 2) ** 0.2)
-    assert 1.9 <= contest.interval[0] < contest.ratio < contest.interval[1] <= 2.1
+    speed_ratio = against(found(*in_processes((1.0, 2.0), (1.1, 2.2), (1.0, 2.1), (2.0, 3.8), (1.0, 2.0))))
+    assert speed_ratio.ratio == pytest.approx((2 * 2 * 2.1 * 1.9 * 2) ** 0.2)
+    assert 1.9 <= speed_ratio.interval[0] < speed_ratio.ratio < speed_ratio.interval[1] <= 2.1
     even = found(*in_processes((1.0, 0.9), (1.0, 1.1), (1.0, 1.2), (1.0, 0.95), (1.0, 1.05)))
     assert (against(even).won, against(even).open, against(even).lost) == (0, 1, 0)
     shown = texts(random_bodies.as_table(even))[0]
@@ -180,8 +188,8 @@ def test_each_engine_has_a_row():
 
 def test_an_engine_is_compared_on_bodies_that_its_adapter_supports():
     refused = line(1, "scipy", "engine", [(math.nan, math.nan)], outcome="unsupported")
-    contest = against(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(9.0)), refused), "scipy")
-    assert len(contest.contests) == 1
+    speed_ratio = against(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(9.0)), refused), "scipy")
+    assert len(speed_ratio.speed_ratios) == 1
 
 
 def test_numbers_of_json_are_those_of_the_table():

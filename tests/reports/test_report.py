@@ -81,7 +81,7 @@ def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_every
     assert default.names == ("random", *MAIN)
     assert set(full.names) == set(studies.STUDIES) - set(ONLY)
     assert set(default.methods) < set(full.methods)
-    left_out = {name for name, family in registry.list_families().items() if family.card.report == ()}
+    left_out = {name for name, family in registry.list_families().items() if family.method_info.report == ()}
     assert {"exact", "textbook"} <= left_out
     assert {method.family for method in default.methods} == set(registry.list_methods()) - left_out
     assert "textbook" in {method.family for method in full.methods}
@@ -116,7 +116,7 @@ def test_settings_of_the_studies_of_each_kind_of_report():
 
 
 def test_methods_of_other_packages_are_part_of_the_default_report(monkeypatch):
-    monkeypatch.setattr(Gauss, "card", replace(Gauss.card, report=None))
+    monkeypatch.setattr(Gauss, "method_info", replace(Gauss.method_info, report=None))
     assert [method.name for method in selection.main_methods() if method.family == "gauss"] == [
         method.name for method in registry.method("gauss").settings_for("variants")
     ]

@@ -12,8 +12,8 @@ import conservative as cv
 from conservative import registry
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.motion import MOST_FRAMES, TURN
+from conservative.features import Feature
 from conservative.integration.one import read_method
-from conservative.needs import Need
 from conservative.references.truth import Disagreement
 from conservative.reports import report
 from conservative.reports.charts import style
@@ -32,7 +32,7 @@ from conservative.reports.sections.report import build
 from ..crossing import ROWS, write_file
 from . import made_up
 
-PARTS = [need for need, row in ROWS.items() if row.in_file]
+PARTS = [feature for feature, row in ROWS.items() if row.in_file]
 URDF = """<robot name="r"><link name="palm"><inertial><origin xyz="0.01 -0.02 0.03" rpy="0.3 -0.2 0.5"/><mass value="730"/>
 <inertia ixx="2.5" ixy="0.2" ixz="-0.1" iyy="1.7" iyz="0.15" izz="1.0"/></inertial></link></robot>"""
 
@@ -133,7 +133,7 @@ def test_a_scene_whose_reference_solutions_disagree_has_drifts(tmp_path, without
 
 
 def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_files):
-    path = write_file(tmp_path / "long.toml", replace(ROWS[Need.ROTOR].without, t_end=1000.0))
+    path = write_file(tmp_path / "long.toml", replace(ROWS[Feature.ROTOR].without, t_end=1000.0))
     path.write_text("dt = 0.5\n" + path.read_text())
     document, scene = made(str(path), ["moser_veselov", "reduced"], tmp_path)
     assert failed_parts(document.blocks) == []
@@ -146,7 +146,7 @@ def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_fil
 
 
 def test_samples_of_an_animation_are_close_enough_to_be_joined(tmp_path, without_files):
-    path = write_file(tmp_path / "fast.toml", replace(ROWS[Need.ROTOR].without, t_end=170.0))  # 300 rad
+    path = write_file(tmp_path / "fast.toml", replace(ROWS[Feature.ROTOR].without, t_end=170.0))  # 300 rad
     path.write_text("dt = 0.1\n" + path.read_text())
     document, scene = made(str(path), ["moser_veselov"], tmp_path)
     (drawing,) = [block for block in walk(document.blocks) if isinstance(block, Motion)]

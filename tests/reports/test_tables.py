@@ -16,7 +16,7 @@ from conservative.reports.document.model import Grade
 from conservative.reports.rows import lines
 from conservative.reports.rows.points import points
 from conservative.reports.run import single_run
-from conservative.reports.sections import failures, hard_cases, recommendation, scene_contests, scenes
+from conservative.reports.sections import failures, hard_cases, recommendation, scene_ratios, scenes
 from conservative.reports.sections import run as single
 from conservative.trajectory import Trajectory
 
@@ -155,7 +155,7 @@ def test_an_unsupported_method_has_one_row_with_its_first_reason():
 
 def test_contests_are_in_microseconds():
     lines = [*point("gauss", "ours", 1e-3, 2e-6), *point("scipy", "engine", 1e-3, 8e-6), *point("lame", "ours", 1e-3, 1e-6)]
-    table = scene_contests.as_table(points(frame(lines)), 0.5)
+    table = scene_ratios.as_table(points(frame(lines)), 0.5)
     *_, line = texts(table)
     assert [name for name in table.header if "µs" in name] == ["µs per s", "µs a sample"] * 3
     sides = (["gauss", "2.00", "1.00"], ["scipy", "8.00", "4.00"], ["4.00"], ["lame", "1.00", "0.500"], ["8.00"])

@@ -48,11 +48,11 @@ ROWS = measurement.frame([*OURS, *ALONE, *HEYOKA, *SHORT, *FREE, *THEIRS])
 @pytest.fixture(scope="module")
 def compared():
     rows = throughput.lines(with_names(ROWS))
-    return list(throughput.contests(rows, throughput.body_costs(rows)))
+    return list(throughput.speed_ratios(rows, throughput.body_costs(rows)))
 
 
-def contest(compared, kind, engine, group, error, statistic="median"):
-    """Number of bodies and contest of ours with an engine."""
+def speed_ratio(compared, kind, engine, group, error, statistic="median"):
+    """Number of bodies and speed ratio of ours with an engine."""
     ((size, found),) = [
         (size, each)
         for side, rival, which, size, each in compared
@@ -62,10 +62,10 @@ def contest(compared, kind, engine, group, error, statistic="median"):
 
 
 def test_contests_are_among_the_most_bodies_of_both_sides(compared):
-    size, found = contest(compared, "heavy_tops", "heyoka", GENERAL, 1e-3)
+    size, found = speed_ratio(compared, "heavy_tops", "heyoka", GENERAL, 1e-3)
     assert (size, found.ratio) == (10, pytest.approx(4.0))
     assert found.ours.name == "taylor"  # one at a time takes less, and is another way
-    size, found = contest(compared, "heavy_tops", "mujoco", GENERAL, 1e-3)
+    size, found = speed_ratio(compared, "heavy_tops", "mujoco", GENERAL, 1e-3)
     assert (size, found.ratio) == (1000, pytest.approx(1000.0))
 
 
@@ -79,7 +79,7 @@ def test_the_table_grades_the_ratio_and_a_side_without_a_time_has_none(compared)
     assert ratios["heyoka", "1e-3"] == ("10", "✓ 4.00", "taylor", "heyoka")
     assert ratios["heyoka", "1e-6"] == ("10", "✗ 0.500", "taylor", "heyoka")
     assert ratios["mujoco", "1e-6"][1:] == ("–", "taylor", "no time")
-    assert contest(compared, "heavy_tops", "mujoco", GENERAL, 1e-3, "95 %")[1].theirs is None
+    assert speed_ratio(compared, "heavy_tops", "mujoco", GENERAL, 1e-3, "95 %")[1].theirs is None
 
 
 def test_the_table_has_every_line_and_at_how_many_bodies():

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from conservative.benchmarks.contest import Cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import Cheapest, costs
 from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.rows import points as work_precision
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.rows.points import points
-from conservative.reports.sections import random_bodies, ratios, scene_contests
+from conservative.reports.sections import random_bodies, ratios, scene_ratios
 
 from .rows import frame, point, row, table, texts
 from .test_random_ratios import SLOWER, TWICE
@@ -20,23 +20,23 @@ OURS = (point("ours", "ours", 1e-2, 1.0, dt=0.4), point("ours", "ours", 1e-4, 4.
 ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine", 1e-8, 8.0))
 
 
-def contests(found, errors=work_precision.DECADES):
-    return scene_contests.sides(costs(found, errors), MethodClass.GENERAL, errors)
+def speed_ratios(found, errors=work_precision.DECADES):
+    return scene_ratios.sides(costs(found, errors), MethodClass.GENERAL, errors)
 
 
-def contest(error, *groups):
-    return contests(points(table(*groups)), [error])[0]
+def speed_ratio(error, *groups):
+    return speed_ratios(points(table(*groups)), [error])[0]
 
 
 def test_the_cheapest_of_several_lines_counts():
     dear = (point("dear", "ours", 1e-4, 5.0), point("dearer", "engine", 1e-4, 90.0))
-    found = contest(1e-4, *OURS, *ENGINE, *dear)
+    found = speed_ratio(1e-4, *OURS, *ENGINE, *dear)
     assert found.ours == Cheapest(4.0, "ours", (4.0,))
     assert found.theirs.name == "engine"
 
 
 def test_between_points_the_cost_is_log_log():
-    found = contest(1e-3, *OURS, *ENGINE)
+    found = speed_ratio(1e-3, *OURS, *ENGINE)
     assert found.ours.time == pytest.approx(2.0, rel=1e-14)  # half way in the exponent from 1 to 4
     assert found.ratio == pytest.approx(1.0, rel=1e-14)
 
@@ -56,23 +56,23 @@ def test_errors_below_the_resolution_of_the_reference_are_raised_to_it():
         return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
 
     checked = points(table(*OURS, *ENGINE, agreement(APPROXIMATE)))
-    assert [c.error for c in contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
+    assert [c.error for c in speed_ratios(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
     exact = points(table(*OURS, *ENGINE, agreement("")))
-    assert contests(exact)[-1].error == 1e-8
+    assert speed_ratios(exact)[-1].error == 1e-8
 
 
 def test_nothing_is_extrapolated():
-    found = contest(1e-7, *OURS, *ENGINE)
+    found = speed_ratio(1e-7, *OURS, *ENGINE)
     assert found.ours is None
     assert found.lost
     assert math.isnan(found.ratio)
-    assert contests(points(table(*OURS, *ENGINE)), [1e-9]) == []
+    assert speed_ratios(points(table(*OURS, *ENGINE)), [1e-9]) == []
 
 
 def test_points_of_failed_runs_and_of_truths_do_not_compete():
     failed = point("ours", "ours", float("nan"), float("nan"), outcome="not converged", dt=0.01)
     truth = point("exact", "truth", 1e-15, 1e-9)
-    found = contest(1e-5, *OURS, *ENGINE, failed, truth)
+    found = speed_ratio(1e-5, *OURS, *ENGINE, failed, truth)
     assert found.ours.time == pytest.approx(8.0, rel=1e-14)
     assert found.theirs.name == "engine"
 
@@ -95,9 +95,9 @@ def test_front_has_the_points_that_no_other_beats():
 
 
 def test_a_cell_has_the_ratio_or_the_side_that_is_alone():
-    cells = [str(ratios.contest_cell(each)) for each in contests(points(table(*OURS, *ENGINE)), [1e-2, 1e-6, 1e-7])]
+    cells = [str(ratios.ratio_cell(each)) for each in speed_ratios(points(table(*OURS, *ENGINE)), [1e-2, 1e-6, 1e-7])]
     assert cells == ["✓ 2.0", "✗ 0.29", "✗ engine only"]  # 2 x 4^0.6 / 16
-    assert [str(ratios.contest_cell(each)) for each in contests(points(table(*OURS)), [1e-2])] == ["✓ ours only"]
+    assert [str(ratios.ratio_cell(each)) for each in speed_ratios(points(table(*OURS)), [1e-2])] == ["✓ ours only"]
 
 
 POINTS = [*point("gauss", "ours", 1e-7, 4e-6), *point("heyoka", "engine", 1e-7, 2e-6)]
@@ -123,11 +123,11 @@ TABLE = frame(
         row("each_step", "mujoco", "attitude error max", 1e-3, DT, role="engine"),
     ]
 )
-FOUND = scene_contests.each_step(TABLE, "made_up")
+FOUND = scene_ratios.each_step(TABLE, "made_up")
 
 
 def test_contests_end_with_both_kinds_of_runs_in_the_units_of_their_columns():
-    table = scene_contests.as_table(points(TABLE), 0.5, FOUND)
+    table = scene_ratios.as_table(points(TABLE), 0.5, FOUND)
     assert table.header[1:4] == ("our fastest general integrator", "µs per s", "µs a sample")
     stored, own_loop, final = texts(table)[-3:]
     assert stored[:8] == ["1e-6, every 0.1 s stored", "gauss", "3.00", "0.300", "heyoka", "6.00", "0.600", "2.00"]
@@ -135,12 +135,12 @@ def test_contests_end_with_both_kinds_of_runs_in_the_units_of_their_columns():
     assert own_loop[:8] == [f"{stored[0]}, engines without conversion", *stored[1:5], "4.00", "0.400", "1.33"]
     only = ["1e-6, every 0.1 s, final state only", "reduced", "1.00", "0.100", "heyoka", "0.500", "0.0500", "0.500"]
     assert final[:8] == only
-    assert len(scene_contests.as_table(points(TABLE), 0.5).rows) == len(table.rows) - 3
+    assert len(scene_ratios.as_table(points(TABLE), 0.5).rows) == len(table.rows) - 3
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])
 def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
-    assert scene_contests.each_step(table, "made_up") is None
+    assert scene_ratios.each_step(table, "made_up") is None
 
 
 def test_the_verdict_has_a_row_for_each_motion_and_class_and_names_the_faster_engine():

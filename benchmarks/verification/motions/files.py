@@ -30,7 +30,7 @@ def describe(motion: Motion, measured: Measured, found: dict[str, Found]) -> dic
     return {
         "name": motion.name,
         "about": motion.about,
-        "needs": motion.needs,
+        "features": motion.features,
         "inertia_B": motion.inertia_B,
         "R_WB0": exact["R_WB"][0].tolist(),
         "quaternion_wxyz0": exact["quaternion_wxyz"][0].tolist(),

@@ -23,7 +23,7 @@ from conservative.scene import Scene
 GRAVITY, TERMS, BITS, ANGLE = 9.81, 60, 200, 0.2  # m/s^2; of a Taylor series, its precision, and its step, rad
 KINDS = {"rotor_momentum_B": "rotor", "torque_B": "torque", "torque_W": "torque", "damping": "damping",
          "weight": "fixed point", "orbit": "orbit"}  # fmt: skip
-"""The part that a motion needs by its key; a motion without any of them is free."""
+"""The feature of a motion by its key; a motion without any of them is free."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,8 @@ class Motion:
     orbit: float | None = None
 
     @property
-    def needs(self) -> list[str]:
-        """The parts that a program needs besides free rotation."""
+    def features(self) -> list[str]:
+        """The features that a program has to support besides free rotation."""
         return sorted({kind for key, kind in KINDS.items() if getattr(self, key) is not None})
 
     @property

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, from_quaternion, hat, to_quaternion
 from conservative.errors import BadInput
-from conservative.needs import IN_TIME
+from conservative.features import IN_TIME
 from conservative.scene import Scene
 
 from ..compare import (
@@ -62,7 +62,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
     Raises `BadInput` for times at which the scene has no motion.
     """
     (R, w), t, first = recording.data, recording.t, float(recording.t[0])
-    timed = bool(scene.loads or scene.needs & IN_TIME)
+    timed = bool(scene.loads or scene.features & IN_TIME)
     if first < 0 and (timed or not from_row):
         raise BadInput("run", recording.label(f"a first row at {first:g} s"), "times of the scene, from 0 on")
     if timed:  # its loads need values in all rows

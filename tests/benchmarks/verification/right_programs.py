@@ -399,7 +399,7 @@ def serve(program, name):
         request = json.loads(line)
         if request["do"] == "hello":
             engine = {"order": program.order, "precision": "f32" if program.single else "f64",
-                      "fields": ["UniformGravity", "GravityGradient", "Turning"], "card": {"rotors": True}}  # fmt: skip
+                      "fields": ["UniformGravity", "GravityGradient", "Turning"], "method_info": {"rotors": True}}  # fmt: skip
             answer = {"protocol": 1, "program": name, "version": "1", "framing": "lines", "engine": engine}
         elif request["do"] == "prepare":
             runs.append(request)

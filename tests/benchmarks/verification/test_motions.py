@@ -394,6 +394,6 @@ def test_the_engine_on_the_page(tmp_path):
     files_of = sorted(str(path) for path in MOTIONS.glob("*.csv"))
     lines = subprocess.run(["./a.out", *files_of], cwd=tmp_path, text=True, capture_output=True).stdout.splitlines()
     told = [line for line in lines if " error " in line]
-    tilted = {name for name, kept in FILES.items() if not kept["needs"] and np.count_nonzero(kept["inertia_B"]) > 3}
+    tilted = {name for name, kept in FILES.items() if not kept["features"] and np.count_nonzero(kept["inertia_B"]) > 3}
     assert {line.partition(".csv")[0].rpartition("/")[2] for line in told} == tilted
     assert summary(lines) == (len(tilted), {"no products of inertia": len(tilted)}, [])

@@ -1,4 +1,4 @@
-"""The card of a family of methods: its settings for tables and benchmarks, its place in the automatic choice, its colour.
+"""What a family of methods declares: its settings for tables and benchmarks, its place in the automatic choice, its colour.
 
 Settings are texts as in the name of a method, such as "RK4" or "order=4,tol=1e-9", and "" for the defaults.
 """
@@ -15,12 +15,12 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from .check import describe, real_number, set_fields
 from .errors import BadInput, nearest
-from .needs import FIELDS, Needs, read_needs
+from .features import FIELDS, Features, read_features
 from .version import VERSION
 
 T = TypeVar("T")
 Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates", "as_installed"]
-"""Purpose of a selection of settings; see `Card`."""
+"""Purpose of a selection of settings; see `MethodInfo`."""
 
 
 class Role(StrEnum):
@@ -29,7 +29,7 @@ class Role(StrEnum):
     OURS = "ours"
     """Compared with the engines in verdicts; its time is gated."""
     BASELINE = "baseline"
-    """A textbook method: in tables and pictures, in no contest and never chosen automatically."""
+    """A textbook method: in tables and pictures, without speed ratios, never chosen automatically."""
     ENGINE = "engine"
     """Other people's code."""
     TRUTH = "truth"
@@ -72,7 +72,7 @@ class Structure(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Card:
+class MethodInfo:
     """Declaration of a family of methods for reports, the benchmark suite and the automatic choice.
 
     Every field has a default. A selection of settings that is None is the same as `variants`.
@@ -111,9 +111,9 @@ class Card:
         Module in `conservative.kernels` whose function `enter` makes all steps of a run; "" if there is none.
     structure
         Returns the `Structure` of a setting; None if it is unknown.
-    takes
-        The parts of scenes that the method takes (`conservative.needs`); default: fields that depend on the attitude only. If a
-        scene needs more, `Method.unsupported` says so. Methods of the rotation alone also take free flight.
+    supports
+        The features of scenes that the method supports (`conservative.features`); default: fields that depend on the attitude
+        only. If a scene has others, `Method.unsupported` says so. Methods of the rotation alone also take free flight.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -132,10 +132,10 @@ class Card:
     colour: str | None = None
     kernel: str = ""
     structure: Callable[[Any], Structure | None] = lambda method: None
-    takes: Needs = FIELDS
+    supports: Features = FIELDS
 
     def __post_init__(self) -> None:
-        set_fields(self, takes=read_needs("takes", self.takes))
+        set_fields(self, supports=read_features("supports", self.supports))
 
     def settings(self, purpose: Purpose) -> tuple[str, ...]:
         """Return the settings for a purpose, with the defaults filled in."""

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from conservative.benchmarks.contest import (
+from conservative.benchmarks.speed_ratio import (
     SMALLEST,
     Cheapest,
-    Contest,
     Ratios,
+    SpeedRatio,
     bootstrap,
     cost,
     costs,
@@ -75,29 +75,33 @@ def test_the_settings_that_decide_are_the_first_that_is_credited_and_the_one_bef
     assert list_deciding([1e-1, 1e-2, 1e-7, 1e-4, 1e-8], error) == deciding
 
 
-def contest(*values, name="0"):
-    """Return a contest with these ratios in as many processes."""
-    return Contest(name, 1e-6, Cheapest(1.0, "ours", (1.0,) * len(values)), Cheapest(values[0], "theirs", values))
+def speed_ratio(*values, name="0"):
+    """Return a speed ratio with these ratios in as many processes."""
+    return SpeedRatio(name, 1e-6, Cheapest(1.0, "ours", (1.0,) * len(values)), Cheapest(values[0], "theirs", values))
 
 
 def ratios(*rows):
-    return Ratios(tuple(contest(*row, name=str(i)) for i, row in enumerate(rows)))
+    return Ratios(tuple(speed_ratio(*row, name=str(i)) for i, row in enumerate(rows)))
 
 
 def test_a_body_is_won_or_lost_only_outside_of_its_interval():
-    won, lost, even = contest(1.2, 1.3, 1.1, 1.2, 1.25), contest(0.8, 0.9, 0.85, 0.8, 0.9), contest(1.1, 0.95, 1.3, 1.2, 1.05)
+    won, lost, even = (
+        speed_ratio(1.2, 1.3, 1.1, 1.2, 1.25),
+        speed_ratio(0.8, 0.9, 0.85, 0.8, 0.9),
+        speed_ratio(1.1, 0.95, 1.3, 1.2, 1.05),
+    )
     assert won.ratio == pytest.approx((1.2 * 1.3 * 1.1 * 1.2 * 1.25) ** 0.2)
     assert won.interval == pytest.approx((1.12, 1.29), abs=0.02)  # with five processes about their range
     assert [(each.won, each.lost) for each in (won, lost, even)] == [(True, False), (False, True), (False, False)]
-    found = Ratios((won, lost, even, Contest("3", 1e-6, None, Cheapest(1.0, "theirs", (1.0,) * 5))))
+    found = Ratios((won, lost, even, SpeedRatio("3", 1e-6, None, Cheapest(1.0, "theirs", (1.0,) * 5))))
     assert (found.won, found.open, found.lost, found.only_theirs) == (1, 1, 2, 1)
-    assert contest(0.99).lost  # a single process has no interval
+    assert speed_ratio(0.99).lost  # a single process has no interval
 
 
 def test_times_are_paired_by_process():
     """A process that is slow for both sides changes no ratio, and one without a time of a side has none."""
     ours, theirs = Cheapest(1.0, "ours", (1.0, 7.0, math.nan)), Cheapest(2.0, "theirs", (2.0, 14.0, 2.0))
-    slow = Contest("0", 1e-6, ours, theirs)
+    slow = SpeedRatio("0", 1e-6, ours, theirs)
     assert slow.interval == pytest.approx((2.0, 2.0))
     assert len(slow.logs) == 2
 

@@ -1,4 +1,4 @@
-"""Contests of classes on one scene: at each decade of error, and with each of the scene's own steps stored."""
+"""Speed ratios of classes on one scene: at each decade of error, and with each of the scene's own steps stored."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Cheapest, Contest, contests, costs
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.speed_ratio import Cheapest, SpeedRatio, costs, speed_ratios
 from conservative.benchmarks.studies.each_step import ERROR, STUDY
 
 from ..document.cells import DASH, factor, numeric, ratio_text, tolerance
@@ -27,7 +27,7 @@ HEADER = (
 class EachStep:
     """Methods at their coarsest setting with an error of at most `ERROR` at each of a scene's own steps, `interval` s apart.
 
-    `runs` are the costs (see `contest.costs`) at `ERROR` by name: of runs with every step stored, of the same without an
+    `runs` are the costs (see `speed_ratio.costs`) at `ERROR` by name: of runs with every step stored, of the same without an
     engine's conversion of its states, and of runs with the final state only.
     """
 
@@ -53,10 +53,10 @@ def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
     return EachStep(interval, runs)
 
 
-def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[Contest]:
-    """Return the contests of one class of ours against all engines, on each scene, at each error that either side reaches."""
+def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[SpeedRatio]:
+    """Return the ratios of one class of ours to all engines, on each scene, at each error that either side reaches."""
     ours, theirs = of_classes(reached, kind), of_classes(reached, *OF_ENGINES)
-    return [each for each in contests(ours, theirs, reached["scene"].unique(), errors) if each.ours or each.theirs]
+    return [each for each in speed_ratios(ours, theirs, reached["scene"].unique(), errors) if each.ours or each.theirs]
 
 
 def as_table(points: pd.DataFrame, interval: float, each: EachStep | None = None) -> Table:
@@ -75,7 +75,7 @@ def as_table(points: pd.DataFrame, interval: float, each: EachStep | None = None
 def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> Iterator[tuple[float, Row]]:
     """Yield each error that any method reaches, large ones first, and its cost in each class."""
     general, solutions = (
-        {contest.error: contest for contest in sides(reached, kind, errors)}
+        {speed_ratio.error: speed_ratio for speed_ratio in sides(reached, kind, errors)}
         for kind in (MethodClass.GENERAL, MethodClass.SOLUTION)
     )
 
@@ -84,11 +84,11 @@ def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> 
             return ["not reached", DASH, DASH]
         return [line.name, *(numeric(time, factor(time, 3)) for time in (line.time * 1e6, line.time * interval * 1e6))]
 
-    def ratio(contest: Contest | None) -> str | Cell:
-        return numeric(contest.ratio, ratio_text(contest.ratio, contest.interval)) if contest else DASH
+    def ratio(speed_ratio: SpeedRatio | None) -> str | Cell:
+        return numeric(speed_ratio.ratio, ratio_text(speed_ratio.ratio, speed_ratio.interval)) if speed_ratio else DASH
 
     for error in errors:
         ours, solved = general.get(error), solutions.get(error)
         if either := ours or solved:
-            first, second = (cells(contest.ours if contest else None) for contest in (ours, solved))
+            first, second = (cells(speed_ratio.ours if speed_ratio else None) for speed_ratio in (ours, solved))
             yield error, [*first, *cells(either.theirs), ratio(ours), *second, ratio(solved)]

@@ -14,8 +14,8 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.errors import BadInput, Unsupported
+from conservative.features import LOADS, Feature
 from conservative.identity import digest, fields_of_motion
-from conservative.needs import LOADS, Need
 from conservative.references.truth import reference
 
 from ..crossing import ROWS
@@ -41,7 +41,7 @@ def turning_torque(t, R_WB):
 
 
 class MyField(cv.UniformGravity):
-    needs = frozenset({Need.FIELD})
+    features = frozenset({Feature.FIELD})
 
 
 def scene(**parts):
@@ -50,40 +50,40 @@ def scene(**parts):
 
 
 PARTS = {
-    Need.GRAVITY: lambda: scene(potential=cv.UniformGravity(3.0, (0.1, 0.3, 0.2))),
-    Need.SPRING: lambda: scene(potential=cv.LinearSpring(3.0, (0.1, 0.3, 0.2), (0.5, 0, 1), 0.2)),
-    Need.ATTRACTION: lambda: scene(potential=cv.PointAttraction(3.0, (0.1, 0.3, 0.2), (0.5, 0, 1))),
-    Need.GRADIENT: lambda: scene(potential=cv.GravityGradient(0.8, TENSOR, (0, 1, 0))),
-    Need.FIELD: lambda: scene(potential=MyField(3.0, (0.1, 0.3, 0.2))),
-    Need.FUNCTION: lambda: scene(potential=cv.FunctionPotential(energy, gradient)),
-    Need.TURNING: lambda: scene(potential=ORBIT.gravity_gradient((TENSOR + TENSOR.T) / 2, (1, 0, 0))),
-    Need.TIME: lambda: scene(potential=cv.FunctionPotential(energy, gradient, time_dependent=True)),
-    Need.ROTOR: lambda: scene(body=cv.RigidBody(TENSOR, (0.3, -0.5, 0.9))),
-    Need.MOTOR: lambda: scene(body=cv.RigidBody(TENSOR, MOTOR)),
-    Need.TORQUE: lambda: scene(torque=cv.Torque(TABLE)),
-    Need.DAMPING: lambda: scene(damping=cv.Damping(np.diag([0.5, 0.3, 0.7]), ([0.0, 1.0, 1.0, 2.0], [0, 1, 2, 0.5]))),
-    Need.ATTITUDE: lambda: scene(torque=cv.Torque(turning_torque, "world")),
-    Need.FLIGHT: lambda: cv.Scene("flight", cv.shapes.box((1, 2, 0.5), mass=2), R0, (0.7, -0.4, 1.3), 2.0, p_WB0=(0, 0, 1)),
+    Feature.GRAVITY: lambda: scene(potential=cv.UniformGravity(3.0, (0.1, 0.3, 0.2))),
+    Feature.SPRING: lambda: scene(potential=cv.LinearSpring(3.0, (0.1, 0.3, 0.2), (0.5, 0, 1), 0.2)),
+    Feature.ATTRACTION: lambda: scene(potential=cv.PointAttraction(3.0, (0.1, 0.3, 0.2), (0.5, 0, 1))),
+    Feature.GRADIENT: lambda: scene(potential=cv.GravityGradient(0.8, TENSOR, (0, 1, 0))),
+    Feature.FIELD: lambda: scene(potential=MyField(3.0, (0.1, 0.3, 0.2))),
+    Feature.FUNCTION: lambda: scene(potential=cv.FunctionPotential(energy, gradient)),
+    Feature.TURNING: lambda: scene(potential=ORBIT.gravity_gradient((TENSOR + TENSOR.T) / 2, (1, 0, 0))),
+    Feature.TIME: lambda: scene(potential=cv.FunctionPotential(energy, gradient, time_dependent=True)),
+    Feature.ROTOR: lambda: scene(body=cv.RigidBody(TENSOR, (0.3, -0.5, 0.9))),
+    Feature.MOTOR: lambda: scene(body=cv.RigidBody(TENSOR, MOTOR)),
+    Feature.TORQUE: lambda: scene(torque=cv.Torque(TABLE)),
+    Feature.DAMPING: lambda: scene(damping=cv.Damping(np.diag([0.5, 0.3, 0.7]), ([0.0, 1.0, 1.0, 2.0], [0, 1, 2, 0.5]))),
+    Feature.ATTITUDE: lambda: scene(torque=cv.Torque(turning_torque, "world")),
+    Feature.FLIGHT: lambda: cv.Scene("flight", cv.shapes.box((1, 2, 0.5), mass=2), R0, (0.7, -0.4, 1.3), 2.0, p_WB0=(0, 0, 1)),
 }
 
 
 def test_every_member_has_a_scene_here():
-    assert set(PARTS) == set(Need)
+    assert set(PARTS) == set(Feature)
 
 
-@pytest.mark.parametrize("need", Need, ids=str)
-def test_a_scene_declares_each_of_its_parts(need):
-    assert need in PARTS[need]().needs
+@pytest.mark.parametrize("feature", Feature, ids=str)
+def test_a_scene_declares_each_of_its_parts(feature):
+    assert feature in PARTS[feature]().features
 
 
-@pytest.mark.parametrize("need", Need, ids=str)
+@pytest.mark.parametrize("feature", Feature, ids=str)
 @pytest.mark.parametrize("family", registry.list_methods())
-def test_prepare_refuses_a_part_that_is_not_taken(family, need):
+def test_prepare_refuses_a_part_that_is_not_taken(family, feature):
     kind = registry.list_families().get(family)
     if kind is None:
         pytest.skip("not installed")
-    built, method = PARTS[need](), kind()
-    missing = built.needs - method.takes
+    built, method = PARTS[feature](), kind()
+    missing = built.features - method.supports
     if not missing:
         return
     with pytest.raises(Unsupported) as refusal:
@@ -92,10 +92,10 @@ def test_prepare_refuses_a_part_that_is_not_taken(family, need):
     assert method.unsupported(built) is not None
 
 
-@pytest.mark.parametrize("need", sorted(LOADS | {Need.ATTITUDE}))
+@pytest.mark.parametrize("feature", sorted(LOADS | {Feature.ATTITUDE}))
 @pytest.mark.parametrize("name", ["projected", "reduced:order=8", "scipy:rtol=1e-13"])
-def test_methods_agree_with_the_truth_at_and_between_break_points(need, name):
-    built, method = PARTS[need](), registry.method(name)
+def test_methods_agree_with_the_truth_at_and_between_break_points(feature, name):
+    built, method = PARTS[feature](), registry.method(name)
     if method.unsupported(built):
         return
     grid = cv.Grid(0.02, 100, 10)
@@ -146,7 +146,7 @@ def test_jumps_of_a_function_are_found_and_smooth_pulses_reported():
 def test_break_points_are_those_of_own_units(size):
     clock = 1e4 if size > 1 else 1e-4 if size < 1 else 1.0
     times, values = np.array(TABLE[0]) * clock, np.array(TABLE[1]) * size / clock**2
-    base = PARTS[Need.TORQUE]()
+    base = PARTS[Feature.TORQUE]()
     built = cv.Scene("sized", cv.RigidBody(base.body.inertia * size), R0, base.w_WB_B0 / clock, 2 * clock,
                      torque=cv.Torque((times, values)))  # fmt: skip
     found, right = cv.integrate(built, 0.04 * clock, "projected"), cv.integrate(base, 0.04, "projected")
@@ -165,7 +165,7 @@ def test_a_change_of_any_field_changes_the_key():
         built = build()
         assert built.key == build().key
         assert built.rename("other", group="x", source="y", dt=0.3).key == built.key
-    base = PARTS[Need.TORQUE]()
+    base = PARTS[Feature.TORQUE]()
     keys = {base.key}
     changed = (
         base.rename("s", w_WB_B0=np.nextafter(base.w_WB_B0, 9)),
@@ -225,9 +225,9 @@ def test_estimates_are_those_of_the_scene():
         assert np.abs(found.R_WB[-1] - truth.R_WB[-1]).max() < 1e-8
 
 
-@pytest.mark.parametrize("need", Need, ids=str)
-def test_scenes_and_trajectories_can_be_pickled(need):
-    built = PARTS[need]()
+@pytest.mark.parametrize("feature", Feature, ids=str)
+def test_scenes_and_trajectories_can_be_pickled(feature):
+    built = PARTS[feature]()
     _ = built.invariants  # cached functions of the scene
     method = next(each for each in ("projected", "taylor") if registry.method(each).unsupported(built) is None)
     found = cv.integrate(built, 0.1, method)
@@ -263,8 +263,8 @@ def drifting(_t):
         (lambda: cv.RigidBody((1, 2, 3), ([0, 1, 1, 2], [[0, 0, 0], [0, 0, 1], [0, 0, 2], [0, 0, 0]])), "rotor_momentum"),
         (lambda: cv.RigidBody((1, 2, 3), lambda t: (0, 0)), "rotor_momentum"),
         (lambda: scene(body=cv.RigidBody((1, 2, 3), lambda t: (0, 0, float(t > 1)))).breaks, "rotor_momentum"),
-        (lambda: cv.integrate(PARTS[Need.TORQUE](), 0.1, t_end=3.0), "torque"),
-        (lambda: cv.integrate(PARTS[Need.TORQUE](), error=1e-3, t_end=3.0), "torque"),
+        (lambda: cv.integrate(PARTS[Feature.TORQUE](), 0.1, t_end=3.0), "torque"),
+        (lambda: cv.integrate(PARTS[Feature.TORQUE](), error=1e-3, t_end=3.0), "torque"),
     ],
 )
 def test_bad_loads_are_refused_by_name(build, argument):
@@ -274,7 +274,7 @@ def test_bad_loads_are_refused_by_name(build, argument):
 
 
 def test_the_last_step_may_end_after_a_table():
-    built = PARTS[Need.TORQUE]()
+    built = PARTS[Feature.TORQUE]()
     found = cv.integrate(built, 0.013)
     assert found.t[-1] > 2.0
     assert found.ok
@@ -288,8 +288,8 @@ NUMBERS = ("symmetric", "for bodies in a field", "right angles")
 def test_a_method_takes_every_part_that_it_declares(name):
     """Pages show what is declared. `projected` and `splitting` declared free flight, and refused it."""
     method = registry.method(name)
-    for need in method.takes:
-        reason = method.unsupported(ROWS[need].scene())
-        assert reason is None or any(words in reason for words in NUMBERS), (need, reason)
-        assert (need, reason) != (cv.Need.FLIGHT, "it is for bodies in a field")
-    assert method.takes == method.card.takes
+    for feature in method.supports:
+        reason = method.unsupported(ROWS[feature].scene())
+        assert reason is None or any(words in reason for words in NUMBERS), (feature, reason)
+        assert (feature, reason) != (cv.Feature.FLIGHT, "it is for bodies in a field")
+    assert method.supports == method.method_info.supports

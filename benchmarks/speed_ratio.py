@@ -116,7 +116,7 @@ def cheapest(reached: pd.DataFrame) -> Cheapest | None:
 
 
 @dataclass(frozen=True)
-class Contest:
+class SpeedRatio:
     """An error on a scene, and the cheapest line of either side; None if a side does not reach the error."""
 
     scene: str
@@ -189,46 +189,48 @@ def _resamples(count: int) -> Array:
     return np.random.default_rng(count).multinomial(count, np.full(count, 1 / count), RESAMPLES) / count
 
 
-def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]) -> tuple[Contest, ...]:
-    """Return the contest of two sides, given by rows of `costs`, at each error on each scene, even if no side reaches it."""
+def speed_ratios(
+    ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]
+) -> tuple[SpeedRatio, ...]:
+    """Return the ratio of two sides, given by rows of `costs`, at each error on each scene, even if no side reaches it."""
     best = []
     for reached in (ours, theirs):
         rows = reached.loc[reached.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(reached) else reached
         keys = zip(rows["scene"], rows["error"], strict=True)
         best.append(dict(zip(keys, map(Cheapest, rows["time"], rows["name"], rows["times"]), strict=True)))
-    return tuple(Contest(scene, error, *(side.get((scene, error)) for side in best)) for scene in scenes for error in errors)
+    return tuple(SpeedRatio(scene, error, *(side.get((scene, error)) for side in best)) for scene in scenes for error in errors)
 
 
 @dataclass(frozen=True)
 class Ratios:
-    """The ratios of contests at one error on several bodies; bodies on which a side does not reach the error are counted."""
+    """The speed ratios at one error on several bodies; bodies on which a side does not reach the error are counted."""
 
-    contests: tuple[Contest, ...]
+    speed_ratios: tuple[SpeedRatio, ...]
 
     @cached_property
-    def both(self) -> list[Contest]:
-        """Contests in which both sides reach the error, smallest ratio first."""
-        return sorted((each for each in self.contests if each.ours and each.theirs), key=lambda each: each.ratio)
+    def both(self) -> list[SpeedRatio]:
+        """Cases in which both sides reach the error, smallest ratio first."""
+        return sorted((each for each in self.speed_ratios if each.ours and each.theirs), key=lambda each: each.ratio)
 
     @property
     def only_ours(self) -> int:
         """Number of bodies on which only our side reaches the error."""
-        return sum(each.theirs is None and each.ours is not None for each in self.contests)
+        return sum(each.theirs is None and each.ours is not None for each in self.speed_ratios)
 
     @property
     def only_theirs(self) -> int:
         """Number of bodies on which only the other side reaches the error."""
-        return sum(each.ours is None and each.theirs is not None for each in self.contests)
+        return sum(each.ours is None and each.theirs is not None for each in self.speed_ratios)
 
     @property
     def won(self) -> int:
         """Number of bodies on which ours is faster beyond the interval of the body, or alone in reaching the error."""
-        return sum(each.won for each in self.contests)
+        return sum(each.won for each in self.speed_ratios)
 
     @property
     def lost(self) -> int:
         """The same for theirs."""
-        return sum(each.lost for each in self.contests)
+        return sum(each.lost for each in self.speed_ratios)
 
     @property
     def open(self) -> int:
