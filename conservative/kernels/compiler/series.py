@@ -31,7 +31,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arithmetic import Axes, Traced, fuse
-from . import COMPILED, LINKED
+from . import COMPILED
 from .traced import join, lanes_like
 
 LOWEST, HIGHEST = 4, 18
@@ -47,32 +47,6 @@ if COMPILED:
 
     MOST_STORED = 24 * (HIGHEST + 1)
     """Registers that a step may store."""
-
-if LINKED:
-
-    class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
-        """A load that LLVM does not move. Otherwise it would keep all coefficients in registers and spill them."""
-
-        def descr(self, buf):
-            """Write the instruction to a list of texts, as llvmlite asks it to."""
-            (pointer,) = self.operands
-            kind = pointer.type
-            align = 8 * kind.pointee.count
-            buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {align}\n")
-
-    class LoopMetadata(ir.MDValue):  # type: ignore[misc]  # llvmlite has no types
-        """Metadata whose first operand is itself, as LLVM's loops have it."""
-
-        def __init__(self, module, rest):
-            super().__init__(module, rest, name=str(len(module.metadata)))
-
-        def descr(self, buf):
-            """Write the metadata to a list of texts, as llvmlite asks it to."""
-            operands = ", ".join([f"!{self.name}", *(each.get_reference() for each in self.operands)])
-            buf += (f"distinct !{{ {operands} }}", "\n")
-
-
-if COMPILED:
 
     class Memory:
         """Registers like that of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
@@ -104,12 +78,7 @@ if COMPILED:
 
         def load(self, place):
             """Return the number at a place."""
-            address = self._address(self.count_bytes(place))
-            if not LINKED:
-                return Symbol(self.builder, [self.builder.load(address, align=self._bytes)])
-            found = VolatileLoad(self.builder.block, address, "")
-            self.builder._insert(found)
-            return Symbol(self.builder, [found])
+            return Symbol(self.builder, [self.builder.load(self._address(self.count_bytes(place)), align=self._bytes)])
 
         def load_behind(self, place, byte):
             """Return the number at a place plus a variable number of bytes."""
@@ -290,11 +259,7 @@ class Series:
             for phi, x, y in zip(numbers, begin, end if isinstance(end, Axes) else (end,), strict=True):
                 phi.add_incoming(x.registers[0], before)
                 phi.add_incoming(y.registers[0], body)
-        branch = builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
-        if LINKED:
-            # Unrolled, loops of all orders would not fit into the instruction cache.
-            rolled = builder.module.add_metadata([ir.MetaDataString(builder.module, "llvm.loop.unroll.disable")])
-            branch.set_metadata("llvm.loop", LoopMetadata(builder.module, [rolled]))
+        builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
         builder.position_at_end(after)
         return [[total] for total in found]
 
