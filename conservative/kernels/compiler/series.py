@@ -232,6 +232,9 @@ class Series:
         starts = [(zero,) * width if total is None else total for (total,), width in zip(totals, widths, strict=True)]
         places = sums[0][0][0].places
         step = places[2][0] - places[1][0]  # of all histories: the same values are stored for every order
+        # Empty machine code returns its argument, the end of the loop, and LLVM does not see that it is constant. A loop with a
+        # constant end is unrolled, and a step of order 12 or 16 of many bodies then takes 1.3 to 1.4 times as long.
+        end = builder.asm(ir.FunctionType(INTEGER, [INTEGER]), "", "=r,0", [memory.count_bytes(n * step)], False)
         before, body = builder.block, builder.append_basic_block(f"loop_{n}")
         after = builder.append_basic_block(f"after_{n}")
         builder.branch(body)
@@ -255,11 +258,11 @@ class Series:
             found.append(self._add([total], [(read(x, i), read(y, j)) for x, y in pairs])[0])
         following = builder.add(i, memory.count_bytes(step))
         i.add_incoming(following, body)
-        for numbers, begin, end in zip(phis, starts, found, strict=True):
-            for phi, x, y in zip(numbers, begin, end if isinstance(end, Axes) else (end,), strict=True):
+        for numbers, begin, total in zip(phis, starts, found, strict=True):
+            for phi, x, y in zip(numbers, begin, total if isinstance(total, Axes) else (total,), strict=True):
                 phi.add_incoming(x.registers[0], before)
                 phi.add_incoming(y.registers[0], body)
-        builder.cbranch(builder.icmp_unsigned("<", following, memory.count_bytes(n * step)), body, after)
+        builder.cbranch(builder.icmp_unsigned("<", following, end), body, after)
         builder.position_at_end(after)
         return [[total] for total in found]
 
