@@ -91,7 +91,7 @@ def test_limits_are_included():
     assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
     assert [cv.Taylor(order).order for order in (4, 18)] == [4, 18]
     assert cv.Substepped(most=1).most == 1
-    heun = explicit.ExplicitTableau("", 3, ((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4))
+    heun = explicit.HEUN_3
     assert heun.c == pytest.approx((0, 1 / 3, 2 / 3))
     factors, columns, starts = heun.packed
     assert (factors.tolist(), columns.tolist()) == ([1 / 3, 2 / 3, 1 / 4, 3 / 4], [0, 1, 0, 2])
