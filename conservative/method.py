@@ -234,7 +234,7 @@ class Method(ABC):
         BadInput
             A setting is unknown or has a wrong value.
         """
-        return call_with_settings(cls, f"method {cls.family}", settings)
+        return call_with_settings(cls, f"method {cls.family}", settings, cls.method_info.removed)
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
         """Return the trajectory with step size dt to t_end, s, whatever its outcome. `integrate` raises exceptions instead.

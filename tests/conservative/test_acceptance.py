@@ -279,7 +279,6 @@ def test_bounds() -> None:
     assert bounds_of(ordinary, grid).orthonormality == 1e-13
     loose = bounds_of(ordinary, grid, 1e-9, None)
     assert loose.orthonormality == loose.drift > 1e-7
-    assert cv.Reduced(tol=1e-9).bounds(ordinary, grid) == bounds_of(ordinary, grid, 1e-9)
     assert cv.Convected(1e-7).bounds(ordinary, grid) == bounds_of(ordinary, grid, 1e-7, None)
     assert cv.Substepped(most=8).bounds(ordinary, grid) == cv.Reduced().bounds(ordinary, Grid(0.0125, 720))
 
