@@ -19,7 +19,7 @@ from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .units import in_own_units
 
 MAX_ITERATIONS = 20
@@ -60,7 +60,7 @@ class Convected(Method):
         positive_number("tol", self.tol)
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid, self.tol, None)
+        return within_round_off(self, scene, grid, self.tol, None)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -19,8 +19,7 @@ from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.field import into_axes
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.compositions import COMPOSED, COMPOSITIONS, composition_of
 from .columns import (
     find_unit_of_time,
@@ -108,16 +107,14 @@ class Reduced(Method):
     def conserves(self) -> frozenset[str]:
         return _MOMENTA_AND_ENERGY if self.frame == "body" else _MOMENTA
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid, TOLERANCE)
+    bounds = within_round_off
 
     @property
     def stages(self) -> int:
         """Number of substeps of order 2 in a step."""
         return composition_of(self.order).stages
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return frame_unsupported(self.frame, scene)
+    unsupported = frame_unsupported
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

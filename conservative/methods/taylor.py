@@ -18,7 +18,7 @@ from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .many import RunMany
 from .run_kernel import KernelRun, prepare_run
 from .taylor_dense import prepare_dense
@@ -120,7 +120,7 @@ class Taylor(Method):
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         if self.tolerance is not None:
             grid = Grid(grid.dt, PARTS * grid.n_steps, PARTS * grid.n_steps)
-        return bounds_of(scene, grid)
+        return within_round_off(self, scene, grid)
 
     @property
     def terms(self) -> int:
