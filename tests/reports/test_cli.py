@@ -11,7 +11,6 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from conservative import registry
 from conservative.reports.cli.main import main
 
 from ..environments import run_python
@@ -245,9 +244,7 @@ def test_the_advice_for_an_inaccurate_run_is_a_command_that_is_accurate(scene, t
 
 
 def test_no_command_is_advised_without_an_accurate_run(monkeypatch):
-    monkeypatch.setattr("conservative.reports.run.single_run.candidates", lambda scene: (registry.method("reduced"),))
-    monkeypatch.setattr("conservative.reports.run.single_run.PARTS", (1,))
-    monkeypatch.setattr("conservative.reports.run.single_run.LARGE", 1e-12)
+    monkeypatch.setattr("conservative.reports.run.single_run.LARGE", 1e-18)
     summary = run_as_json("brick_flip", "--dt", "0.1")
     assert summary["error"]["better"] is None
     shown = conservative("run", "brick_flip", "--dt", "0.1").stdout
