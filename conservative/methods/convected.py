@@ -15,6 +15,7 @@ from ..deferred_imports import kernels
 from ..errors import NotConverged
 from ..features import ROTATION
 from ..grid import Grid
+from ..invariants import MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
@@ -48,7 +49,7 @@ class Convected(Method):
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
     order = 2
-    conserves = frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
+    conserves = frozenset({"energy", *MOMENTA})
     method_info: ClassVar[MethodInfo] = MethodInfo(
         pictures=("",),
         colour="sky",

@@ -14,7 +14,7 @@ from ..check import choice
 from ..deferred_imports import kernels
 from ..features import LOADS, ROTATION, Feature
 from ..grid import Grid
-from ..invariants import with_balances
+from ..invariants import MOMENTA, with_balances
 from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.field import into_axes
@@ -40,7 +40,7 @@ from .units import in_own_units
 TOLERANCE = 1e-20
 """Relative tolerance of the solver in a stage: below round-off, because even a small systematic error becomes a drift after
 10^8 steps."""
-_MOMENTA = with_balances("momentum", "vertical momentum", "momentum along the field's axis")
+_MOMENTA = with_balances(*MOMENTA)
 _MOMENTA_AND_ENERGY = _MOMENTA | with_balances("energy")
 
 

@@ -14,6 +14,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import FIELDS, IN_TIME, ROTATION, Feature
 from ..grid import Grid
+from ..invariants import AXIAL_MOMENTUM, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
@@ -73,8 +74,7 @@ class Splitting(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        momenta = {"momentum", "vertical momentum", "momentum along the field's axis"}
-        return frozenset(momenta if self.kind == "AXES" else momenta | {"axial momentum"})
+        return frozenset(MOMENTA if self.kind == "AXES" else (*MOMENTA, AXIAL_MOMENTUM))
 
     bounds = within_round_off
 

@@ -12,7 +12,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import ROTATION, Feature
 from ..grid import Grid
-from ..invariants import JACOBI_INTEGRAL
+from ..invariants import AXIAL_MOMENTUM, JACOBI_INTEGRAL, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.turning import Orbit, Turning, static_part
@@ -88,9 +88,7 @@ class Taylor(Method):
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
-    conserves = frozenset(
-        {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
-    )
+    conserves = frozenset({"energy", JACOBI_INTEGRAL, *MOMENTA, AXIAL_MOMENTUM})
     method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("order=8", "order=12", "order=16", "tolerance=1e-9"),
         report=("order=12",),

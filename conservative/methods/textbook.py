@@ -12,6 +12,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import IN_TIME, ROTATION
 from ..grid import Grid
+from ..invariants import AXIAL_MOMENTUM, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
@@ -23,8 +24,7 @@ from .units import in_own_units
 
 Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic", "spiers", "spiers_rates"]
 _RADIUS = "a spectral radius from 0 to 1"
-_IN_WORLD = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
-_AXIAL = frozenset({"axial momentum"})
+_IN_WORLD, _AXIAL = frozenset(MOMENTA), frozenset({AXIAL_MOMENTUM})
 
 
 class Formula(NamedTuple):
