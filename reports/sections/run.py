@@ -53,7 +53,7 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _advice(error: dict[str, Any]) -> str:
     if error["better"] is None:
         return "no accurate run was found; use a shorter --dt or a shorter --t-end"
-    end = ", and no run that was tried is accurate for longer" if error["better"]["shorter"] else ""
+    end = ", which stays accurate up to that time only" if error["better"]["shorter"] else ""
     return f"{error['better']['command']} (attitude error {angle(error['better']['attitude'])} rad{end})"
 
 

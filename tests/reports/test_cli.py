@@ -11,7 +11,6 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from conservative import registry
 from conservative.reports.cli.main import main
 
 from ..environments import run_python
@@ -245,9 +244,7 @@ def test_the_advice_for_an_inaccurate_run_is_a_command_that_is_accurate(scene, t
 
 
 def test_no_command_is_advised_without_an_accurate_run(monkeypatch):
-    monkeypatch.setattr("conservative.reports.run.single_run.candidates", lambda scene: (registry.method("reduced"),))
-    monkeypatch.setattr("conservative.reports.run.single_run.PARTS", (1,))
-    monkeypatch.setattr("conservative.reports.run.single_run.LARGE", 1e-12)
+    monkeypatch.setattr("conservative.reports.run.single_run.LARGE", 1e-18)
     summary = run_as_json("brick_flip", "--dt", "0.1")
     assert summary["error"]["better"] is None
     shown = conservative("run", "brick_flip", "--dt", "0.1").stdout
@@ -256,7 +253,7 @@ def test_no_command_is_advised_without_an_accurate_run(monkeypatch):
 
 
 def test_a_table_marks_inaccurate_runs_and_says_what_to_do_once():
-    names = ("reduced", "reduced:tol=1e-09", "taylor:order=12")
+    names = ("reduced", "reduced:frame=auto", "taylor:order=12")
     lines = conservative(
         "run", "brick_flip", "--dt", "0.1", *(text for name in names for text in ("-m", name))
     ).stdout.splitlines()
@@ -293,8 +290,9 @@ def test_a_failed_run_reports_the_failure_and_writes_its_samples(tmp_path):
         (["brik_flip"], ["scene: got 'brik_flip'", "'brick_flip' (nearest)"]),
         (["brick_flip", "-m", "redused"], ["method: got 'redused'", "'reduced' (nearest)"]),
         (["brick_flip", "-m", "runge"], ["method: got 'runge'; expected one of "]),
-        (["brick_flip", "-m", "reduced:tool=1"], ["method reduced: got 'tool=1'", "'tol' (nearest)"]),
-        (["brick_flip", "-m", "reduced:tol=-1"], ["tol: got -1", "above 0"]),
+        (["brick_flip", "-m", "convected:tool=1"], ["method convected: got 'tool=1'", "'tol' (nearest)"]),
+        (["brick_flip", "-m", "convected:tol=-1"], ["tol: got -1", "above 0"]),
+        (["brick_flip", "-m", "reduced:tol=1e-9"], ["method reduced: got 'tol=1e-9'", "without tol"]),
         (["brick_flip", "--dt", "0"], ["dt: got 0.0", "above 0"]),
         (["brick_flip", "--dt", "nan"], ["dt: got nan", "above 0"]),
         (["brick_flip", "--dt", "7"], ["dt: got 7", "at most t_end = 6"]),

@@ -12,7 +12,6 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
-from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -161,7 +160,7 @@ def verify_recording(
         got = describe(error) if real_number(error) is None else f"{error:g}"
         raise BadInput("error", got, "a finite number of 1e-12 or more, which the exact motion is rounded to")
     name = name or (recording.path.name if recording.path else "recording")
-    rows = prepare(rotation_only(scene), recording, from_row, error)
+    rows = prepare(scene.rotation_only, recording, from_row, error)
     recording, notes = rows.recording, rows.notes
     tell("compare")
     found = compare(rows.case, recording, from_row)
