@@ -72,7 +72,11 @@ class Baseline:
 
 
 def limit(measure: str, value: float, spread: float) -> float:
-    """Return the worst value that passes: above it for errors, drifts and counts, below it for an observed order."""
+    """Return the worst value that passes: above it for errors, drifts and counts, below it for an observed order.
+
+    No interval: values do not scatter between processes. They change by the last digits of the start only, and `spread` is the
+    range of a few of such changes, of which nothing is known about the tails.
+    """
     if measure == ORDER:
         return value - ORDER_MARGIN
     return value + (SPREADS * spread if measure in COUNTS else max(SPREADS * spread, 1e-6 * abs(value), ROUND_OFF))
