@@ -16,6 +16,7 @@ from conservative.errors import BadInput
 from conservative.files import make_folder, read_text, write_text
 from conservative.trajectory import Counters
 
+from ..measures.change import Range
 from ..measures.measure import Measure
 from .results import Results, Row, Status, find_runaway
 
@@ -50,6 +51,11 @@ class Allowed:
     spread: float
     runs: int
     limit: float
+
+    @property
+    def range(self) -> Range:
+        """The values that are no change: to the limit, and as far on the other side."""
+        return Range(self.value, *sorted((self.limit, 2 * self.value - self.limit)))
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,9 @@ from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
 from ..gate.baseline import COUNTS, ORDER, update_baseline
-from ..gate.compare import Verdict, Violation
+from ..gate.compare import Verdict
 from ..gate.results import Results, Row, Status, find_runaway
+from ..measures.change import Change, RowName
 from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
@@ -296,19 +297,20 @@ def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingP
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
     verdict = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
-    others = {(each.scene, each.method) for each in moved.values()}
-    violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]
+    others = {(change.row.scene, change.row.method) for change in moved.values()}
+    kept = (change for change in verdict.violations if (change.row.scene, change.row.method) not in others)
+    violations = [*moved.values(), *kept]
     paid, unused = list[str](), set(prices)
     for line in comparison.lines:
         if (time := line.times) and time.failed:
             last, price = time.again or time.first, prices.get(line.setting)
-            if price and not time.reason and last.low <= price.factor:
+            if price and not time.reason and last.direction(price.factor) <= 0:
                 paid.append(f"{line.scene}, {line.setting}: {last.value:.3g} times as long, {price}")
                 unused.discard(line.setting)
                 continue
-            longer = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
             most = f"at most {price.factor if price else 1 + SLOWER:g} times as long"
-            violations.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
+            name = RowName(line.scene, line.setting, TIME)
+            violations.append(Change(name, f"{time.was:.3g} s", time.reason or last, most))
             unused.discard(line.setting)
     paid += [f"{name}: no row needs the longer time, {prices[name]}" for name in sorted(unused)]
     notes = (
@@ -340,12 +342,12 @@ def _moves(was: Row, now: Row) -> bool:
     return was.status is Status.PASSED and error_of(was) <= LOST < OTHER < error_of(now)
 
 
-def _moved(was: Row, now: Row) -> Violation:
-    """Return the violation by another motion, with its cause."""
+def _moved(was: Row, now: Row) -> Change:
+    """Return the change to another motion, with its cause."""
     before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.reason})"
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
     cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
-    return Violation(MOTION, now.scene, now.method, before, f"{size}. {cause}", "")
+    return Change(RowName(now.scene, now.method, MOTION), before, f"{size}. {cause}")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
@@ -368,7 +370,7 @@ def faster(line: ProjectLine) -> bool:
     """Return whether a row is faster than before. A motion that is lost is not."""
     now = line.results[-1]
     lost = now is None or error_of(now) > LOST
-    return line.times is not None and not lost and line.times.first.high < 1 / (1 + SLOWER)
+    return line.times is not None and not lost and line.times.first.direction() < 0
 
 
 def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) -> Iterator[str]:

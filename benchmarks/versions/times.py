@@ -25,6 +25,7 @@ from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 from conservative.grid import grid_for
 
+from ..measures.change import Range, direction, exact
 from ..measures.interval import interval
 from ..studies.study import Progress
 from .comparison import TIMING
@@ -58,27 +59,27 @@ class Process(Protocol):
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """Time of the later version divided by that of the earlier one: value, interval, and number of processes."""
+class Ratio(Range):
+    """Time of the later version divided by the time of the earlier one, its interval, and the number of processes."""
 
-    value: float
-    low: float
-    high: float
     processes: int
+
+    def direction(self, factor: float = 1 + SLOWER) -> int:
+        """Return 1 if the whole interval is slower by more than a factor, -1 if it is faster, otherwise 0."""
+        return direction(exact(1.0), self, factor)
 
     @property
     def slower(self) -> bool:
         """True if the whole interval is above the limit."""
-        return self.low > 1 + SLOWER
-
-    def beyond(self, factor: float) -> bool:
-        """Return whether the whole interval is above a factor, or below its inverse."""
-        return self.low > factor or self.high < 1 / factor
+        return self.direction() > 0
 
     @property
     def open(self) -> bool:
         """True if the interval contains the limit, so that more processes are needed."""
-        return self.low <= 1 + SLOWER < self.high
+        return not self.slower and self.high > 1 + SLOWER
+
+    def __str__(self) -> str:
+        return f"{self.value:.3f} times as long ({self.low:.3f} to {self.high:.3f})"
 
 
 @dataclass(frozen=True)

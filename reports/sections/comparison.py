@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
-from conservative.benchmarks.gate.compare import Violation
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
+from conservative.benchmarks.measures.change import Change
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.prices import Price
 from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, decide, faster
@@ -76,7 +76,7 @@ def build(
 ) -> Document:
     """Return the document of a comparison; `made` names how and where it was measured, `prices` longer times by method."""
     versions, decided, made = comparison.versions, decide(comparison, prices or {}), made or {}
-    findings = [each.finding for each in decided.violations]
+    findings = [change.finding for change in decided.violations]
     timed = sum(line.times is not None for line in comparison.lines)
     rows, violations = len(comparison.lines), len(findings)
     verdict = (
@@ -85,8 +85,8 @@ def build(
     )
     # A check for each row, and one for each violation that belongs to no row.
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
-    for each in decided.violations:
-        failed.setdefault((each.scene, each.method), []).append(each.finding)
+    for change in decided.violations:
+        failed.setdefault((change.row.scene, change.row.method), []).append(change.finding)
     packages = [(each.title, each.environment.runtime, ", ".join(each.packages)) for each in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
     notes = Items.of(f"note: {note}" for note in decided.notes)
@@ -97,7 +97,7 @@ def build(
             when: {"name": version.name, "commit": version.commit, "packages": version.packages}
             for when, version in zip(("was", "is"), versions, strict=True)
         },
-        "violations": decided.violations,
+        "violations": [change.texts for change in decided.violations],
         "notes": decided.notes,
         "rows": [_record(line) for line in comparison.lines],
     }
@@ -119,10 +119,12 @@ def build(
     )
 
 
-def table(comparison: ProjectComparison, violations: Sequence[Violation]) -> Table:
+def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
     """Return the rows: failed ones first, then those with the largest change of time."""
-    failed = [(each.scene, each.method, each.measure) for each in violations]
-    measures = [[name for *row, name in failed if row == [line.scene, line.setting]] for line in comparison.lines]
+    failed = [change.row for change in violations]
+    measures = [
+        [row.measure for row in failed if (row.scene, row.method) == (line.scene, line.setting)] for line in comparison.lines
+    ]
     standings = [(_standing(line, worse), line) for line, worse in zip(comparison.lines, measures, strict=True)]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:

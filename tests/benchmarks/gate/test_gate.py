@@ -76,7 +76,7 @@ def failures(kept, latest):
     """Return the violations as (measure, method)."""
     verdict = compare.decide(kept, latest)
     assert verdict.passed == (not verdict.violations)
-    return {(each.measure, each.method) for each in verdict.violations}
+    return {(change.row.measure, change.row.method) for change in verdict.violations}
 
 
 @pytest.mark.parametrize(
@@ -302,7 +302,7 @@ def test_the_same_results_pass_and_values_at_their_limit():
 
 def test_a_violation_has_the_value_before_and_now_and_the_limit():
     verdict = compare.decide(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
-    assert [tuple(vars(each).values()) for each in verdict.violations] == [
+    assert [tuple(change.texts.values()) for change in verdict.violations] == [
         ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
         ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
     ]
@@ -329,8 +329,8 @@ TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
 )
 def test_rows_that_cannot_be_compared(latest, expected):
     (each,) = compare.decide(KEPT, latest).violations
-    assert (each.measure, each.was, each.now, each.allowed) == expected
-    assert (each.scene, each.method) == ("brick", "reduced")
+    assert (each.row.measure, each.was, each.now, each.allowed) == expected
+    assert (each.row.scene, each.row.method) == ("brick", "reduced")
 
 
 def test_a_measure_that_is_gone():
@@ -355,7 +355,7 @@ def test_a_runaway_is_a_failure_with_any_baseline(drift, failed):
     values = {results.ENERGY_DRIFT: drift}
     row = replace(OTHER, values=values)
     unknown = compare.decide(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
-    assert [each.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
+    assert [each.row.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
     as_before = baseline.BaselineRow(
         "top", "gauss", row.engine, "other", {results.ENERGY_DRIFT: baseline.Allowed(drift, 0, 1, 3e11)}
     )

@@ -255,7 +255,8 @@ for words in json.loads(sys.argv[1]):
     if not baseline.PATH.exists():
         baseline.write(baseline.update_baseline(None, [run], "first"), baseline.PATH)
     try:
-        missing = [each.scene for each in compare.decide(baseline.read(baseline.PATH), run).violations if each.now == "missing"]
+        violations = compare.decide(baseline.read(baseline.PATH), run).violations
+        missing = [change.row.scene for change in violations if change.now == "missing"]
     except baseline.NothingToCompare:
         missing = []
     ended[words] = code, sorted(run.rows), sorted(missing)

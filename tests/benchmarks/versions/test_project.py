@@ -10,6 +10,7 @@ from conservative.benchmarks.suite import points
 from conservative.benchmarks.versions import project
 from conservative.benchmarks.versions.prices import Price, read_prices
 from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, define_scene, faster
+from conservative.benchmarks.versions.times import Ratio
 from conservative.errors import BadInput
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
@@ -27,7 +28,7 @@ def compare(was, now, time=None):
 def violations(*arguments):
     result = compare(*arguments)
     assert result.passed == (not result.violations)
-    return {each.measure for each in result.violations}
+    return {change.row.measure for change in result.violations}
 
 
 def test_equal_rows_pass_without_notes():
@@ -52,8 +53,8 @@ def test_differences_in_the_last_digits_pass():
 
 def test_a_time_fails_if_it_is_slower_twice():
     (each,) = compare(row(), row(), timed(SLOW, SLOW)).violations
-    assert (each.measure, each.scene, each.method) == (TIME, "brick_flip", "reduced")
-    assert each.now == "1.100 times as long (1.080 to 1.120)"
+    assert each.row == ("brick_flip", "reduced", TIME, "")
+    assert (each.now, str(each.now)) == (Ratio(*SLOW, 7), "1.100 times as long (1.080 to 1.120)")
     assert compare(row(), row(), timed(SLOW, SAME)).notes == (
         "brick_flip, reduced: looked slower (1.100), and was not when measured again (1.000)",
     )
@@ -74,7 +75,7 @@ def test_a_row_that_fails_now_or_is_gone_fails():
 def test_another_motion_is_one_violation_with_its_cause():
     lost = row(attitude_error_max=3.1, rate_error_max=5.0, energy_drift_max=0.5)
     (each,) = compare(row(), replace(lost, mistake="no torque", cause="no torque")).violations
-    assert (each.measure, each.allowed) == (MOTION, "")
+    assert (each.row.measure, each.allowed) == (MOTION, "")
     assert "no torque" in each.finding
     assert violations(row(), lost) == {MOTION}  # without a cause
     assert violations(row(), replace(row(), mistake="late", cause="late")) == {MOTION}  # which the scene does not show
