@@ -16,6 +16,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from conservative.attitude import Array
 
@@ -63,7 +64,7 @@ def interval(
 
 
 @lru_cache(maxsize=64)
-def _resamples(count: int) -> Array:
+def _resamples(count: int) -> NDArray[np.intp]:
     """Return the indices (RESAMPLES, count) of resampled values; the same every time."""
     drawn = np.random.default_rng(count).multinomial(count, np.full(count, 1 / count), RESAMPLES)
     return np.repeat(np.tile(np.arange(count), RESAMPLES), drawn.ravel()).reshape(RESAMPLES, count)

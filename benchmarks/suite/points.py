@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import rotation_about
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.scene import Scene
@@ -23,6 +20,7 @@ from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, attempt
 from ..studies.study import FindTruth, remember_truths
 from .description import describe
+from .motion import PROBES, Motion
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
@@ -30,8 +28,6 @@ PAPER = SCENES[:2]
 """Scenes on which orders are fitted."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
-PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
-"""Attitudes at which energies distinguish two potentials."""
 STEPS = 6
 """Number of steps that an observed order is fitted to; high orders need all of theirs, which are short."""
 ROUND_OFF = 1.6
@@ -88,27 +84,8 @@ class Point:
 
     @property
     def definition(self) -> str:
-        """Hash of scene, method and steps: measures of two definitions cannot be compared."""
-        found = describe(self.scene, np.array(PROBES))
-        words = [self.scene.name, self.method.name, *found["invariants"]]
-        # The empty text once described how times were taken. Without it, every definition in every baseline would change.
-        return _hash([words, [_digits(each) for each in arrange(found, self.grid.n_steps)], ""])
-
-
-def define(words: list[str], values: Iterable[object]) -> str:
-    """Return a hash of words, and of numbers but for the last digits, in which two machines differ."""
-    return _hash([words, [_digits(each) for each in values]])
-
-
-def arrange(description: Mapping[str, Any], *more: float) -> list[Any]:
-    """Return the numbers of a description (`describe`), with more numbers beside the duration and the step."""
-    start = [description[each] for each in ("inertia", "R_WB0", "w_WB_B0")]
-    parts = [each for each in description["parts"] if len(each)]
-    return [*start, [*description["ends"], *more], description["energies"], *parts]
-
-
-def _hash(content: object) -> str:
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        """Hash of scene, method and steps."""
+        return Motion(describe(self.scene, np.array(PROBES))).definition(self.scene.name, self.method.name)
 
 
 def points() -> Iterator[Point]:
@@ -155,10 +132,3 @@ def fit_order(point: Point, few: bool = False) -> dict[str, float]:
     )
     order = observed_order([grid.dt for grid in grids], np.where(sizes > ROUNDED, sizes, np.nan))
     return {} if order.reason else {Measure.ORDER.text: order.slope}
-
-
-def _digits(values: object) -> list[float]:
-    """Return numbers without the last digits, in which two machines differ."""
-    flat = np.ravel(np.asarray(values, dtype=float))
-    scale = np.abs(flat).max(initial=0.0) or 1.0
-    return [float(f"{value:.9e}") + 0.0 for value in np.round(flat / scale, 10) * float(f"{scale:.10e}")]

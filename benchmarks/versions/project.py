@@ -39,6 +39,7 @@ from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
 from ..suite import description, points
+from ..suite.motion import motion_of
 from . import inside
 from .comparison import Comparison, Line, compare
 from .prices import Price
@@ -106,24 +107,24 @@ class ProjectSide:
 
     def measure(self, scene: str) -> Iterator[tuple[str, Row]]:
         """Yield a row for each setting on a scene; a failure is in its row."""
-        here, rows = define_scene(scene), {}
-        for each in self.settings:
-            row_id = f"{scene} / {each['name']}"
-            rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
+        here, rows = motion_of(scene), {}
+        for setting in self.settings:
+            name, definition = setting["name"], here.definition(scene, setting["name"])
+            rows[name] = Row(f"{scene} / {name}", scene, name, Status.PASSED, setting["engine"], definition)
         try:
-            there = define_scene(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
+            there = motion_of(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
         except IntegrationFailed as failure:
             yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
             return
         for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
-            if here == there:
+            if here.key == there.key:
                 row = self._measure(scene, setting, row)
                 if row.status is not Status.SKIPPED:
                     found = self._find_causes(setting)[not registry.scene(scene).free]
                     row = replace(row, mistake=found.key, cause=found.sentence)
                 yield name, row
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
-                yield name, replace(row, definition=there, reason="another motion")
+                yield name, replace(row, definition=there.definition(scene, name), reason="another motion")
 
     def _measure(self, name: str, setting: Mapping[str, Any], row: Row) -> Row:
         try:
@@ -222,15 +223,6 @@ class Remote(StandIn):
         return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, failure)
 
 
-def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = description.describe_scene) -> str:
-    """Return the hash of the motion of a registered scene, by default as this process has it, whatever its name is.
-
-    Raise `BadInput` if it does not have the scene.
-    """
-    answer = describe(scene=name, probes=np.array(points.PROBES))
-    return points.define(answer["invariants"], points.arrange(answer))
-
-
 def decide_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
     nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
@@ -260,7 +252,7 @@ def compare_projects(
         This process does not have a scene, or neither version has one of the methods, or any.
     """
     for name in scenes:
-        define_scene(name)  # before any work
+        motion_of(name)  # before any work
     truths = remember_truths()
     with (
         closing(ProjectSide(base, methods, truths, explain=explain)) as was,

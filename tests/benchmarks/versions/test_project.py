@@ -7,9 +7,10 @@ import pytest
 
 from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
+from conservative.benchmarks.suite.motion import motion_of
 from conservative.benchmarks.versions import project
 from conservative.benchmarks.versions.prices import Price, read_prices
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, define_scene, faster
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, faster
 from conservative.benchmarks.versions.times import Ratio
 from conservative.errors import BadInput
 from conservative.references.worker.client import EngineCrashed
@@ -235,7 +236,7 @@ def test_a_scene_that_a_version_does_not_support_is_skipped():
 
 
 def test_fields_that_turn_have_different_definitions():
-    assert define_scene("stable_satellite") != define_scene("unstable_satellite")
+    assert motion_of("stable_satellite").key != motion_of("unstable_satellite").key
 
 
 def test_methods_that_no_version_has_are_named():
