@@ -7,17 +7,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from conservative.outcome import OK
+
 from ..measures.change import Change, RowName, direction, exact
 from .baseline import ORDER, Allowed, Baseline, BaselineRow, NothingToCompare
-from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, Status, find_runaway
+from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, find_runaway
 
 ACCEPT = 'accept with: conservative gate --update "REASON"'
 MISSING = "missing"
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Violations, which are the changes that are not allowed, notes, and the number of rows that were compared."""
+class Decision:
+    """What the gate decided: violations (changes that are not allowed), notes, and the number of compared rows."""
 
     violations: tuple[Change, ...]
     notes: tuple[str, ...]
@@ -50,8 +52,8 @@ class Verdict:
         return "\n".join([*lines, "", *notes]) + "\n"
 
 
-def decide(baseline: Baseline, results: Results) -> Verdict:
-    """Return the verdict on results. An empty baseline is a violation, because everything would pass.
+def decide(baseline: Baseline, results: Results) -> Decision:
+    """Return the decision on results. An empty baseline is a violation, because everything would pass.
 
     Rows that the run left out are not compared. Raise `NothingToCompare` if these are all.
     """
@@ -61,20 +63,18 @@ def decide(baseline: Baseline, results: Results) -> Verdict:
         raise NothingToCompare("results", got, "a selection with one of them")
     baseline = replace(baseline, rows={id: row for id, row in baseline.rows.items() if id not in left_out})
     violations = [] if baseline.rows else [Change(RowName("all", "all", "rows"), "none", "none", "one or more")]
-    notes = [
-        f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status is Status.PASSED
-    ]
+    notes = [f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.outcome.ok]
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results)
     for id, row in results.rows.items():  # energy that ran away although the run ended without an error, whatever the baseline
-        if row.status is Status.PASSED and find_runaway(row.values):
+        if row.outcome.ok and find_runaway(row.values):
             before = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
             name = RowName(row.scene or id, row.method or id, ENERGY_DRIFT)
             value = before.value if before else MISSING
             violations.append(Change(name, value, row.values.get(ENERGY_DRIFT, MISSING), f"at most {RUNAWAY:g}"))
     notes += _improvements(baseline, results)
     notes += [f"not compared: {len(left_out)} rows of the baseline, which were not selected"] * bool(left_out)
-    return Verdict(tuple(violations), tuple(notes), len(baseline.rows))
+    return Decision(tuple(violations), tuple(notes), len(baseline.rows))
 
 
 def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Change]:
@@ -90,9 +90,9 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Cha
             for other in results.rows.values()
             if other.definition and (other.definition, other.scene, other.method) == (was.definition, was.scene, was.method)
         )
-        yield violation("row", Status.PASSED, next(renamed, MISSING), Status.PASSED)
-    elif row.status is not Status.PASSED:
-        yield violation("row", Status.PASSED, row.status, Status.PASSED)
+        yield violation("row", OK, next(renamed, MISSING), str(OK))
+    elif not row.outcome.ok:
+        yield violation("row", OK, row.outcome, str(OK))
     elif row.definition != was.definition:
         yield violation("definition", was.definition, row.definition, was.definition)
     elif row.engine != was.engine:

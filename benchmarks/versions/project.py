@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import cached_property, partial
 from pathlib import Path
 from time import monotonic
@@ -24,7 +25,7 @@ from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Role
-from conservative.outcome import Outcome, OutcomeKind
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import Answer
 from conservative.scene import Scene
@@ -32,8 +33,8 @@ from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
 from ..gate.baseline import COUNTS, ORDER, update_baseline
-from ..gate.compare import Verdict
-from ..gate.results import Results, Row, Status, find_runaway
+from ..gate.compare import Decision
+from ..gate.results import Results, Row, find_runaway
 from ..measures.change import Change, RowName
 from ..measures.measure import Measure
 from ..studies.selection import StandIn
@@ -51,12 +52,27 @@ ATTITUDE = Measure.ATTITUDE_MAX.text
 LOST, OTHER, FAR = 0.1, 1.0, 3.0
 """Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
 than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
+ANOTHER_SCENE = Outcome(OutcomeKind.OK, "the scene is another one")
+"""Outcome of a row that was not measured, because its scene has another definition than in this process."""
 SLOW = 1.0
 """Duration of a run, s, above which a row is measured with fewer points."""
 _ADAPTER, _DESCRIPTION = str(Path(inside.__file__).resolve()), str(Path(description.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]
+
+
+class Standing(StrEnum):
+    """The standing of a row of the later version against the earlier one, the worst first."""
+
+    MOTION = "another motion"
+    SLOWER = "slower"
+    WORSE = "worse"
+    PAID = "slower, accepted"
+    FASTER = "faster"
+    NEW = "new"
+    SAME = "same"
+    NOTHING = "not compared"
 
 
 class Explained(NamedTuple):
@@ -110,34 +126,35 @@ class ProjectSide:
         here, rows = motion_of(scene), {}
         for setting in self.settings:
             name, definition = setting["name"], here.definition(scene, setting["name"])
-            rows[name] = Row(f"{scene} / {name}", scene, name, Status.PASSED, setting["engine"], definition)
+            rows[name] = Row(f"{scene} / {name}", scene, name, OK, setting["engine"], definition)
         try:
             there = motion_of(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
         except IntegrationFailed as failure:
-            yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
+            missing = Outcome(OutcomeKind.MISSING, str(failure.outcome))
+            yield from ((name, replace(row, outcome=missing)) for name, row in rows.items())
             return
         for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
             if here.key == there.key:
                 row = self._measure(scene, setting, row)
-                if row.status is not Status.SKIPPED:
+                if row.outcome.kind is not OutcomeKind.UNSUPPORTED:
                     found = self._find_causes(setting)[not registry.scene(scene).free]
                     row = replace(row, mistake=found.key, cause=found.sentence)
                 yield name, row
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
-                yield name, replace(row, definition=there.definition(scene, name), reason="another motion")
+                yield name, replace(row, definition=there.definition(scene, name), outcome=ANOTHER_SCENE)
 
     def _measure(self, name: str, setting: Mapping[str, Any], row: Row) -> Row:
         try:
             pair = self.ask("describe_pair", scene=name, method=setting["name"])
             if pair["unsupported"]:
-                return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
+                return replace(row, outcome=Outcome(OutcomeKind.UNSUPPORTED, pair["unsupported"]))
             method = self._remote(setting, name, pair["longest_step"])
             point = points.Point(registry.scene(name), method, self._truths)
             spent = monotonic()
             first = method.solve(point.scene, point.grid)
             spent = monotonic() - spent
             if not first.ok:
-                return replace(row, status=Status.FAILED, reason=str(first.outcome))
+                return replace(row, outcome=first.outcome)
             if self._decides and spent > SLOW:  # the first run may compile
                 spent = monotonic()
                 method.solve(point.scene, point.grid)
@@ -145,7 +162,7 @@ class ProjectSide:
                     self.few.add(row.id)
             return decide_values(row, *points.measure(point, row.id in self.few))
         except IntegrationFailed as failure:
-            return replace(row, status=Status.FAILED, reason=str(failure.outcome))
+            return replace(row, outcome=failure.outcome)
 
     def _remote(self, setting: Mapping[str, Any], scene: str = "", longest: float = math.inf) -> Remote:
         names = setting["name"], setting["label"], setting["order"]
@@ -225,9 +242,10 @@ class Remote(StandIn):
 
 def decide_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
-    nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
-    if reason := "; ".join(filter(None, [find_runaway(values), *nonsense])):
-        return replace(row, status=Status.FAILED, reason=reason)
+    if nonsense := [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]:
+        return replace(row, outcome=Outcome(OutcomeKind.INVALID, "; ".join(nonsense)))
+    if runaway := find_runaway(values):
+        return replace(row, outcome=Outcome(OutcomeKind.NOT_CONSERVED, runaway))
     return replace(row, values=values, spreads=spreads)
 
 
@@ -266,8 +284,7 @@ def compare_projects(
         good = [
             (line.scene, line.setting)
             for line in made.lines
-            if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
-            and not _moves(*line.results)  # type: ignore[arg-type]  # neither is None
+            if all(row and row.outcome == OK for row in line.results) and not _moves(*line.results)  # type: ignore[arg-type]  # neither is None
         ]
         times = compare_times(was, now, good, processes, tell) if processes else {}
         lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
@@ -280,17 +297,17 @@ def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]
     return [name for name in methods if name.partition(":")[0] not in families]
 
 
-def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
-    """Return the verdict on the last step of a comparison: other motions, the gate's on values, and times without a price."""
+def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Decision:
+    """Return the decision on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
-    before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
+    before = {was.id: was for _, was, _ in steps if was is not None and was.outcome.ok}
     both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
     before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
-    verdict = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
+    decision = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
     others = {(change.row.scene, change.row.method) for change in moved.values()}
-    kept = (change for change in verdict.violations if (change.row.scene, change.row.method) not in others)
+    kept = (change for change in decision.violations if (change.row.scene, change.row.method) not in others)
     violations = [*moved.values(), *kept]
     paid, unused = list[str](), set(prices)
     for line in comparison.lines:
@@ -312,7 +329,7 @@ def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingP
         *_same_builds(base, head),
         *_packages(base, head),
     )
-    return Verdict((*violations,), notes, len(comparison.lines))
+    return Decision((*violations,), notes, len(comparison.lines))
 
 
 def error_of(row: Row) -> float:
@@ -327,17 +344,19 @@ def _conserved(row: Row) -> dict[str, float]:
 
 def _moves(was: Row, now: Row) -> bool:
     """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
-    if Status.SKIPPED in (was.status, now.status) or was.status is Status.ERROR or was.definition != now.definition:
+    if OutcomeKind.UNSUPPORTED in (was.outcome.kind, now.outcome.kind) or was.outcome.kind is OutcomeKind.MISSING:
+        return False
+    if was.definition != now.definition:
         return False
     if now.mistake not in ("", was.mistake):  # also where the motion is lost in both
         return True
-    return was.status is Status.PASSED and error_of(was) <= LOST < OTHER < error_of(now)
+    return was.outcome.ok and error_of(was) <= LOST < OTHER < error_of(now)
 
 
 def _moved(was: Row, now: Row) -> Change:
     """Return the change to another motion, with its cause."""
-    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.reason})"
-    size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
+    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.outcome})"
+    size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.outcome})"
     cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
     return Change(RowName(now.scene, now.method, MOTION), before, f"{size}. {cause}")
 
@@ -348,8 +367,8 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
     for when, row in (("was", was), ("is", now)):
         if row is None:
             yield f"{name}: {when} not there"
-        elif row.status is not Status.SKIPPED and row.reason:
-            yield f"{name}: {when} without values: {row.reason}"
+        elif row.outcome != OK and row.outcome.kind is not OutcomeKind.UNSUPPORTED:
+            yield f"{name}: {when} without values: {row.outcome}"
     if time and time.again and not time.failed:
         yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
     if faster(line) and time:
@@ -365,11 +384,26 @@ def faster(line: ProjectLine) -> bool:
     return line.times is not None and not lost and line.times.first.direction() < 0
 
 
+def standing_of(line: ProjectLine, violations: Sequence[Change]) -> Standing:
+    """Return the standing of a row, of which `violations` may be some."""
+    measures = [
+        change.row.measure for change in violations if (change.row.scene, change.row.method) == (line.scene, line.setting)
+    ]
+    if measures:
+        return Standing.MOTION if MOTION in measures else Standing.SLOWER if TIME in measures else Standing.WORSE
+    if line.results[0] is None:
+        return Standing.NEW
+    if line.times is None:
+        return Standing.NOTHING
+    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
+
+
 def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) -> Iterator[str]:
     """Yield the notes on settings: mistakes of both versions, or of the earlier one, and scenes that they do not support."""
     scenes: dict[str, list[str]] = {}
     for line, was, now in steps:
-        for text in dict.fromkeys(row.reason for row in (was, now) if row and row.status is Status.SKIPPED):
+        ends = [row.outcome for row in (was, now) if row and row.outcome.kind is OutcomeKind.UNSUPPORTED]
+        for text in dict.fromkeys(outcome.reason for outcome in ends):
             scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
         if was and was.cause:
             still = "in both versions" if now and now.mistake == was.mistake else "not any more"

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
 from typing import Any
 
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.change import Change
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.prices import Price
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, decide, faster
+from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, Standing, decide, standing_of
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
 from ..document.cells import DASH, number, numeric
@@ -50,19 +49,6 @@ EXPLANATION = (
     f"have {CONFIDENCE:.0%} confidence. A row fails if its whole interval is more than {SLOWER:.0%} slower, in a second "
     "measurement too, or if another value is worse than round-off explains."
 )
-
-
-class Standing(StrEnum):
-    """The result of a row, in the order of the table."""
-
-    MOTION = "another motion"
-    SLOWER = "slower"
-    WORSE = "worse"
-    PAID = "slower, accepted"
-    FASTER = "faster"
-    NEW = "new"
-    SAME = "same"
-    NOTHING = "not compared"
 
 
 _GRADES = {
@@ -121,11 +107,7 @@ def build(
 
 def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
     """Return the rows: failed ones first, then those with the largest change of time."""
-    failed = [change.row for change in violations]
-    measures = [
-        [row.measure for row in failed if (row.scene, row.method) == (line.scene, line.setting)] for line in comparison.lines
-    ]
-    standings = [(_standing(line, worse), line) for line, worse in zip(comparison.lines, measures, strict=True)]
+    standings = [(standing_of(line, violations), line) for line in comparison.lines]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:
         ratio = _ratio(entry[1])
@@ -136,8 +118,8 @@ def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
 
 def _row(line: ProjectLine, standing: Standing) -> Row:
     (was, now), time, ratio, graded = line.results, line.times, _ratio(line), _GRADES.get(standing)
-    mark = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}.get(graded or Grade.NONE, "")
-    cells: list[str | Cell] = [line.scene, line.setting, Cell(f"{mark}{standing}", graded)]
+    text = graded.mark(standing) if graded in (Grade.GOOD, Grade.BAD) else standing
+    cells: list[str | Cell] = [line.scene, line.setting, Cell(text, graded)]
     if ratio is None:
         cells += [DASH, DASH]
     else:
@@ -159,22 +141,12 @@ def _ratio(line: ProjectLine) -> Ratio | None:
     return None if ratio is None or math.isnan(ratio.value) else ratio
 
 
-def _standing(line: ProjectLine, failed: Sequence[str]) -> Standing:
-    if failed:
-        return Standing.MOTION if MOTION in failed else Standing.SLOWER if TIME in failed else Standing.WORSE
-    if line.results[0] is None:
-        return Standing.NEW
-    if line.times is None:
-        return Standing.NOTHING
-    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
-
-
 def _record(line: ProjectLine) -> dict[str, Any]:
     record: dict[str, Any] = {"scene": line.scene, "method": line.setting, "was": None, "is": None, "time": None}
     for when, row in zip(("was", "is"), line.results, strict=True):
         if row is not None:
             values = {"values": row.values, "spreads": row.spreads}
-            record[when] = {"status": row.status, "reason": row.reason, "mistake": row.mistake, "cause": row.cause, **values}
+            record[when] = {"outcome": row.outcome, "mistake": row.mistake, "cause": row.cause, **values}
     if (time := line.times) is not None:
         again = {} if time.again is None else {"again": time.again}
         ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}

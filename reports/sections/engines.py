@@ -243,8 +243,8 @@ def _drift(rows: pd.DataFrame, quantity: str) -> Cell:
 def _turns(turns: float, expected: float) -> Cell:
     if math.isnan(turns) or math.isnan(expected):
         return Cell(DASH)
-    right = turns == expected
-    return Cell(f"{'✓' if right else '✗'} {turns:.0f} of {expected:.0f}", Grade.GOOD if right else Grade.BAD)
+    graded = Grade.GOOD if turns == expected else Grade.BAD
+    return Cell(graded.mark(f"{turns:.0f} of {expected:.0f}"), graded)
 
 
 def _order(line: pd.DataFrame, expected: float) -> Cell:
@@ -258,7 +258,7 @@ def _order(line: pd.DataFrame, expected: float) -> Cell:
         return numeric(order, f"{DASH} not seen ({expected:.0f})")
     text = f"{order:.2f} ± {_value(line, Measure.ORDER_STDERR):.2f} ({expected:.0f})"
     low = order < expected - FAR_FROM_ORDER
-    return Cell(f"✗ {text}" if low else text, Grade.BAD if low else None, value=order)
+    return Cell(Grade.BAD.mark(text), Grade.BAD, value=order) if low else numeric(order, text)
 
 
 def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:

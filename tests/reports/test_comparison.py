@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.gate.results import Status
-from conservative.benchmarks.versions.project import decide
+from conservative.benchmarks.versions.project import Standing, decide
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 from conservative.reports.document import text as text_of
-from conservative.reports.sections.comparison import EXPLANATION, Standing, build, table
+from conservative.reports.sections.comparison import EXPLANATION, build, table
 from conservative.reports.terminal import progress
 
 from ..benchmarks.versions.made_up import comparison, row, timed
@@ -39,7 +39,7 @@ def document(*compared, **others):
 
 
 SLOWER = document(time=timed(SLOW, SLOW))
-FAILED = row("diverged at 1 s", status=Status.FAILED)
+FAILED = row(Outcome(OutcomeKind.DIVERGED))
 STANDINGS = {
     Standing.SAME: answer(),
     Standing.SLOWER: answer(time=timed(SLOW, SLOW)),
