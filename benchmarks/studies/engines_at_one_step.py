@@ -1,4 +1,4 @@
-"""The study of engines at the scene's step size: errors, drifts, flips and the time per step.
+"""Engines at the scene's step size: errors, drifts, flips and the time per step.
 
 Times are measured in the process of each engine, in rounds interleaved across all engines, one engine at a time. A crash or a
 hang affects the rows of one method only.

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from conservative import registry
+from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.scene import Scene
@@ -114,8 +116,15 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
     nudged = {name: [each[name] for each in measured] for name in measured[0]}
     least = ROUND_OFF * float(np.finfo(number).eps)
     spreads = {name: max(max(values) - min(values), 0.0 if name in counters else least) for name, values in nudged.items()}
-    order = fit_order(point, few) if point.scene.name.partition(":")[0] in PAPER else {}
+    order = fit_order(point, few) if _is_of_paper(point.scene.name) else {}
     return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
+
+
+def _is_of_paper(scene: str) -> bool:
+    try:
+        return registry.read_name(scene, "scene").base in PAPER
+    except BadInput:  # a scene of a project may have any name
+        return False
 
 
 def fit_order(point: Point, few: bool = False) -> dict[str, float]:

@@ -32,7 +32,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
-from ..gate.baseline import COUNTS, ORDER, update_baseline
+from ..gate.baseline import COUNTS, update_baseline
 from ..gate.compare import Decision
 from ..gate.results import Results, Row, find_runaway
 from ..measures.change import Change, RowName
@@ -48,6 +48,8 @@ from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Checkout, Version
 
 TIME, MOTION = "time of a step", "another motion"
+OF_ATTITUDE = {measure.text for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.ORDER)}
+"""Measures that mean nothing if the attitude is lost."""
 ATTITUDE = Measure.ATTITUDE_MAX.text
 LOST, OTHER, FAR = 0.1, 1.0, 3.0
 """Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
@@ -293,8 +295,8 @@ def compare_projects(
 
 def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]:
     """Return the methods of which no version has a setting."""
-    families = {setting.partition(":")[0] for setting in settings}
-    return [name for name in methods if name.partition(":")[0] not in families]
+    families = {registry.read_name(setting).base for setting in settings}
+    return [name for name in methods if registry.read_name(name, "methods").base not in families]
 
 
 def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Decision:
@@ -339,7 +341,7 @@ def error_of(row: Row) -> float:
 
 def _conserved(row: Row) -> dict[str, float]:
     """Return the values of a row that mean something although its attitude is lost."""
-    return {name: value for name, value in row.values.items() if not name.endswith("error max") and name != ORDER}
+    return {name: value for name, value in row.values.items() if name not in OF_ATTITUDE}
 
 
 def _moves(was: Row, now: Row) -> bool:
