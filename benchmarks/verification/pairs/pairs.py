@@ -5,7 +5,6 @@ Symbols: W is the world, F the axes of the first description, G the axes of the 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,7 +14,6 @@ import numpy as np
 
 from conservative.attitude import Array, rotation_about, to_quaternion
 from conservative.body import RigidBody
-from conservative.errors import ImpossibleInertia
 from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.engine import principal_axes
@@ -80,9 +78,7 @@ class Description:
     def scene(self) -> Scene:
         """The same motion as a scene. The attitude of a free body does not depend on its mass and its centre."""
         field = UniformGravity(self.mass * self.gravity, self.com) if self.gravity else None
-        with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # of reduced bodies
-            body = RigidBody(self.joint_inertia)
-        return Scene("pair", body, self.R0, self.w0, self.dt * self.n_steps, field)
+        return Scene("pair", RigidBody(self.joint_inertia), self.R0, self.w0, self.dt * self.n_steps, field)
 
     @property
     def numbers(self) -> dict[str, Any]:
