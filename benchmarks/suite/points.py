@@ -106,7 +106,7 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
-    number: Any = {"f64": np.float64, "f32": np.float32}[getattr(point.method, "precision", "f64")]
+    number: Any = np.float32 if selection.bits_of(point.method) == 32 else np.float64
     last_digit = np.array([1.0, -1.0, 1.0]) * float(np.spacing(number(np.abs(scene.w_WB_B0).max())))
     for units in (0, *(NUDGES[1:-1] if few else NUDGES)):
         trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)

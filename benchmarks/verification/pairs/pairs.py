@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, rotation_about, to_quaternion
-from conservative.body import RigidBody
+from conservative.body import RigidBody, find_impossible
 from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.engine import principal_axes
@@ -73,6 +73,11 @@ class Description:
         """Inertia (3, 3), kg m^2, about the fixed point, the origin of F, or about the centre of mass of a free body."""
         arm = self.com if self.gravity else np.zeros(3)
         return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+
+    @property
+    def possible(self) -> bool:
+        """True if a mass distribution has this inertia."""
+        return not find_impossible(np.linalg.eigvalsh(self.inertia))
 
     @property
     def scene(self) -> Scene:

@@ -21,6 +21,7 @@ from conservative.references.samples import to_body_axes
 from conservative.references.worker.calls import python_worker, run_within
 from conservative.references.worker.client import EngineTimeout, Worker, time_limit
 
+from ...studies.selection import bits_of
 from .pairs import Description, Pair, Samples
 
 RUN_LIMIT = 60.0
@@ -51,7 +52,7 @@ class Runner:
 
     def __init__(self, method: Method) -> None:
         self.method, self.adaptive, self._tolerances = method, method.order is None, tuple[str, ...]()
-        self.precision = float(np.finfo("f4" if getattr(method, "precision", "f64") == "f32" else "f8").eps)
+        self.precision = float(np.finfo("f4" if bits_of(method) == 32 else "f8").eps)
         if self.adaptive:
             own = getattr(getattr(method, "data", None), "tolerance", "")
             self._tolerances = tuple(filter(None, (own, "rtol", "tol")))

@@ -354,7 +354,7 @@ class _Pair:
         if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, one)):
             detail = f"the difference of {apart.value:.2g} is a small share of the error of the step, {own:.2g}"
             return self.finding(Relation.NEGLIGIBLE, replace(apart, allowed=OWN_SHARE * own), detail, threshold=threshold)
-        first = _reduce(one, lambda each: wrong(each) and stays(each))
+        first = _reduce(one, pair, scale, lambda each: wrong(each) and stays(each))
         motion = apart.failure or _describe_motion(engine, pair, first, scale)
         return self.wrong(apart, first, motion, threshold)
 
@@ -434,10 +434,10 @@ SIMPLER: tuple[Callable[[Description], Description], ...] = (
     *(lambda one, axis=axis: replace(one, w0=np.linalg.norm(one.w0) * np.eye(3)[axis]) for axis in range(3)),
     lambda one: replace(one, w0=np.array([float(f"{value:.1g}") for value in one.w0])),
 )
-"""Simplifications of a body and its start, each kept if the pair still differs."""
+"""Simplifications of a body and its start, each kept if the pair still differs and both bodies are possible."""
 
 
-def _reduce(one: Description, wrong: Callable[[Description], bool]) -> Description:
+def _reduce(one: Description, pair: Pair, scale: float | None, wrong: Callable[[Description], bool]) -> Description:
     """Return the simplest body with the fewest steps, to 1 %, that still differs."""
     few, enough = 0, one.n_steps
     while enough - few > max(1, few // 100):
@@ -450,7 +450,7 @@ def _reduce(one: Description, wrong: Callable[[Description], bool]) -> Descripti
         one = replace(one, n_steps=enough, every=enough)
     for simpler in SIMPLER:
         candidate, _ = to_principal(simpler(one))
-        if wrong(candidate):
+        if candidate.possible and pair.second(candidate, *_scaled(scale)).possible and wrong(candidate):
             one = candidate
     return one
 
