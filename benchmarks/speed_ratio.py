@@ -13,21 +13,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import accumulate, zip_longest
 from typing import TYPE_CHECKING
 
+from .measures.interval import interval
+
 if TYPE_CHECKING:
     import pandas as pd
-
-    from conservative.attitude import Array
 
 SMALLEST = 1e-17
 """Replaces an error of 0."""
 LINE = ("scene", "name", "family", "class")
 """Columns of points that identify a line of settings."""
 CONFIDENCE = 0.95
-RESAMPLES = 4999
 
 
 def credit(errors: Sequence[float]) -> list[float]:
@@ -161,12 +160,9 @@ def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
     """Return the interval of exp(mean) of logarithms of ratios: a row for each body, a column for each process.
 
     Means over bodies and means over processes are resampled, and the squares of both margins are added (Owen 2007, The
-    pigeonhole bootstrap). Percentiles of a bootstrap of few values are too narrow; they are widened as by Hesterberg 2015 (What
-    teachers should know about the bootstrap, 5.3): with five processes, their margin is about their range. NaN for a single
-    value.
+    pigeonhole bootstrap). With five processes, their margin is about their range. NaN for a single value.
     """
     import numpy as np
-    from scipy.special import ndtr, stdtrit  # scipy.stats takes as long to import as everything else of a command
 
     processes = min(map(len, logs), default=0)
     values = np.array([row[:processes] for row in logs])
@@ -174,19 +170,10 @@ def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
         return math.nan, math.nan
     squares = np.zeros(2)
     for means in (values.mean(axis=1), values.mean(axis=0)):
-        if (n := len(means)) > 1:
-            tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + CONFIDENCE) / 2))
-            squares += (np.quantile(_resamples(n) @ means, (tail, 1 - tail)) - values.mean()) ** 2
+        if len(means) > 1:
+            squares += (np.array(interval(means, CONFIDENCE, widened=True)) - values.mean()) ** 2
     low, high = values.mean() + np.sqrt(squares) * (-1, 1)
     return math.exp(low), math.exp(high)
-
-
-@lru_cache(maxsize=64)
-def _resamples(count: int) -> Array:
-    """Return the weights (RESAMPLES, count) of resampled values; the same every time."""
-    import numpy as np
-
-    return np.random.default_rng(count).multinomial(count, np.full(count, 1 / count), RESAMPLES) / count
 
 
 def speed_ratios(

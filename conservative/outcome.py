@@ -27,6 +27,8 @@ class OutcomeKind(StrEnum):
     UNSUPPORTED = "unsupported"
     MISSING = "missing"
     SKIPPED = "skipped"
+    FAILED = "failed"
+    """In benchmarks only: a test of pytest failed."""
     NO_ORDER = "no order"
     """In studies only: no order of convergence can be fitted to the errors."""
 

@@ -51,10 +51,14 @@ class Case:
     def scene(self, name: str = "case", **options: Any) -> cv.Scene:
         """Return the scene of the package with these numbers."""
         breaks = {True: {"breaks": self.breaks}, False: {}}
-        with warnings.catch_warnings(action="ignore", category=cv.ImpossibleInertia):  # random tensors are what they are
+        with warnings.catch_warnings(record=True, action="always") as caught:  # random tensors can be impossible
             body: Any = cv.RigidBody(self.J)
             if self.rotor is not None:
                 body = cv.RigidBody(self.J, rotor_momentum=self.rotor, **breaks[callable(self.rotor)])
+        assert {warning.category for warning in caught} <= {cv.ImpossibleInertia}
+        low, middle, high = np.linalg.eigvalsh(np.diag(self.J) if np.ndim(self.J) == 1 else self.J)
+        if abs(excess := (high - low - middle) / high) > 1e-6:  # a flat body is neither
+            assert bool(caught) == (excess > 0)
         if self.flight is not None:
             mass, com, g, p, v = self.flight
             body = cv.shapes.MassDistribution(mass, com, self.J)

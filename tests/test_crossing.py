@@ -25,8 +25,8 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative import deferred_imports, registry
+from conservative.benchmarks.suite.motion import motion_of
 from conservative.benchmarks.verification.explain import Diagnosis
-from conservative.benchmarks.versions.project import define_scene
 from conservative.features import Feature
 from conservative.programs import Program
 from conservative.references.engine import mass_model, principal_axes
@@ -268,8 +268,8 @@ def protocol(cell: Cell) -> None:
 
 def gate(cell: Cell) -> None:
     """Two versions of a project are compared on the same scene only."""
-    assert define_scene(cell.name) == define_scene(cell.copy)
-    assert len({define_scene(each) for each in (cell.name, cell.other, cell.without)}) == 3
+    assert motion_of(cell.name).key == motion_of(cell.copy).key
+    assert len({motion_of(name).key for name in (cell.name, cell.other, cell.without)}) == 3
 
 
 # Commands

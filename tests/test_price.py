@@ -44,7 +44,9 @@ def test_the_rows_are_medians_and_the_largest_error():
     assert [row["value"] for row in rows[4:]] == [1.0, 2.0, 3.0, 1.0]
 
 
-def test_the_bodies_are_two_of_each_field():
+def test_the_bodies_are_two_of_each_field_and_all_different():
     pairs = price.pairs()
-    assert len({type(scene.potential) for scene, _ in pairs}) >= 4
+    assert len({type(scene.potential) for scene, _ in pairs}) == len(pairs) == len(price.FIELDS)
     assert all(type(a.potential) is type(b.potential) for a, b in pairs)
+    bodies = [scene for pair in pairs for scene in pair]
+    assert len({scene.key for scene in bodies}) == len({tuple(scene.body.moments) for scene in bodies}) == len(bodies)

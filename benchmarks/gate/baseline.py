@@ -14,10 +14,12 @@ from typing import Any
 
 from conservative.errors import BadInput
 from conservative.files import make_folder, read_text, write_text
+from conservative.outcome import OutcomeKind
 from conservative.trajectory import Counters
 
+from ..measures.change import Range
 from ..measures.measure import Measure
-from .results import Results, Row, Status, find_runaway
+from .results import Results, Row, find_runaway
 
 PATH = Path("benchmarks") / "baseline.json"
 """Path of a project's baseline, relative to its root."""
@@ -51,6 +53,11 @@ class Allowed:
     runs: int
     limit: float
 
+    @property
+    def range(self) -> Range:
+        """The values that are no change: to the limit, and as far on the other side."""
+        return Range(self.value, *sorted((self.limit, 2 * self.value - self.limit)))
+
 
 @dataclass(frozen=True)
 class BaselineRow:
@@ -72,7 +79,11 @@ class Baseline:
 
 
 def limit(measure: str, value: float, spread: float) -> float:
-    """Return the worst value that passes: above it for errors, drifts and counts, below it for an observed order."""
+    """Return the worst value that passes: above it for errors, drifts and counts, below it for an observed order.
+
+    No interval: values do not scatter between processes. They change by the last digits of the start only, and `spread` is the
+    range of a few of such changes, of which nothing is known about the tails.
+    """
     if measure == ORDER:
         return value - ORDER_MARGIN
     return value + (SPREADS * spread if measure in COUNTS else max(SPREADS * spread, 1e-6 * abs(value), ROUND_OFF))
@@ -91,10 +102,11 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
     if not reason.strip():
         raise BadInput("update", repr(reason), "the reason for the change, which goes into the history of the baseline")
     before = old.rows if old else {}
-    failed = [row.id for run in runs for row in run.rows.values() if row.status in (Status.FAILED, Status.ERROR)]
+    accepted = (OutcomeKind.OK, OutcomeKind.SKIPPED)
+    failed = [row.id for run in runs for row in run.rows.values() if row.outcome.kind not in accepted]
     if failed:
         raise BadInput("results", f"rows that failed: {', '.join(failed)}", "runs without failures: a failure is not accepted")
-    rows = {row.id: _row(row, runs) for row in runs[0].rows.values() if row.status is Status.PASSED}
+    rows = {row.id: _row(row, runs) for row in runs[0].rows.values() if row.outcome.ok}
     left_out = {id for run in runs for id in run.left_out}
     rows = {id: row for id, row in before.items() if id in left_out and id not in runs[0].rows} | rows
     entry = {
@@ -112,7 +124,7 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
 
 def _row(first: Row, runs: Sequence[Results]) -> BaselineRow:
     same = [run.rows[first.id] for run in runs if first.id in run.rows]
-    kinds = {(row.status, row.definition, row.engine) for row in same}
+    kinds = {(row.outcome, row.definition, row.engine) for row in same}
     if len(same) < len(runs) or len(kinds) > 1:
         raise BadInput("results", f"runs that disagree about {first.id}", "runs of the same benchmarks with the same engines")
     measures = {name: _measure(name, same) for name in first.values}

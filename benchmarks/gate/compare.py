@@ -5,39 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
-from .baseline import ORDER, Baseline, BaselineRow, NothingToCompare
-from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, Status, find_runaway
+from conservative.outcome import OK
+
+from ..measures.change import Change, RowName, direction, exact
+from .baseline import ORDER, Allowed, Baseline, BaselineRow, NothingToCompare
+from .results import ENERGY_DRIFT, RUNAWAY, Results, Row, find_runaway
 
 ACCEPT = 'accept with: conservative gate --update "REASON"'
+MISSING = "missing"
 
 
 @dataclass(frozen=True)
-class Violation:
-    """A measure of a scene and method that got worse: its value before and now, and the limit."""
+class Decision:
+    """What the gate decided: violations (changes that are not allowed), notes, and the number of compared rows."""
 
-    measure: str
-    scene: str
-    method: str
-    was: str
-    now: str
-    allowed: str
-
-    @property
-    def finding(self) -> str:
-        """The violation in one line, without the command that accepts it."""
-        limit = f", allowed {self.allowed}" * bool(self.allowed)
-        return f"{self.measure}, {self.scene}, {self.method}: was {self.was}, is {self.now}{limit}"
-
-    def __str__(self) -> str:
-        return f"{self.finding}; {ACCEPT}"
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Violations, notes, and the number of rows that were compared."""
-
-    violations: tuple[Violation, ...]
+    violations: tuple[Change, ...]
     notes: tuple[str, ...]
     rows: int
 
@@ -46,9 +30,16 @@ class Verdict:
         """True if there is no violation."""
         return not self.violations
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """The verdict for JSON."""
+        violations = [change.texts for change in self.violations]
+        return {"passed": self.passed, "violations": violations, "notes": self.notes, "rows": self.rows}
+
     def __str__(self) -> str:
         head = f"gate: {'passed' if self.passed else 'FAILED'}, {self.rows} rows, {len(self.violations)} violations"
-        return "\n".join([head, *map(str, self.violations), *(f"note: {note}" for note in self.notes)])
+        violations = (f"{change.finding}; {ACCEPT}" for change in self.violations)
+        return "\n".join([head, *violations, *(f"note: {note}" for note in self.notes)])
 
     def markdown_text(self) -> str:
         """Return the violations as a table and the notes as a list, for the summary of a workflow."""
@@ -56,13 +47,13 @@ class Verdict:
         lines += [f"{self.rows} rows, {len(self.violations)} violations.", ""]
         if self.violations:
             lines += ["| measure | scene | method | was | is | allowed |", "| --- | --- | --- | --- | --- | --- |"]
-            lines += [f"| {' | '.join(vars(each).values())} |" for each in self.violations]
+            lines += [f"| {' | '.join(change.texts.values())} |" for change in self.violations]
         notes = [f"- {note}" for note in self.notes]
         return "\n".join([*lines, "", *notes]) + "\n"
 
 
-def decide(baseline: Baseline, results: Results) -> Verdict:
-    """Return the verdict on results. An empty baseline is a violation, because everything would pass.
+def decide(baseline: Baseline, results: Results) -> Decision:
+    """Return the decision on results. An empty baseline is a violation, because everything would pass.
 
     Rows that the run left out are not compared. Raise `NothingToCompare` if these are all.
     """
@@ -71,27 +62,26 @@ def decide(baseline: Baseline, results: Results) -> Verdict:
         got = f"none of the {len(left_out)} rows of the baseline, which were not selected"
         raise NothingToCompare("results", got, "a selection with one of them")
     baseline = replace(baseline, rows={id: row for id, row in baseline.rows.items() if id not in left_out})
-    violations = [] if baseline.rows else [Violation("rows", "all", "all", "none", "none", "one or more")]
-    notes = [
-        f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status is Status.PASSED
-    ]
+    violations = [] if baseline.rows else [Change(RowName("all", "all", "rows"), "none", "none", "one or more")]
+    notes = [f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.outcome.ok]
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results)
     for id, row in results.rows.items():  # energy that ran away although the run ended without an error, whatever the baseline
-        if row.status is Status.PASSED and find_runaway(row.values):
+        if row.outcome.ok and find_runaway(row.values):
             before = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
-            values = _write_value(before.value if before else None), _write_value(row.values.get(ENERGY_DRIFT))
-            violations.append(Violation(ENERGY_DRIFT, row.scene or id, row.method or id, *values, f"at most {RUNAWAY:g}"))
+            name = RowName(row.scene or id, row.method or id, ENERGY_DRIFT)
+            value = before.value if before else MISSING
+            violations.append(Change(name, value, row.values.get(ENERGY_DRIFT, MISSING), f"at most {RUNAWAY:g}"))
     notes += _improvements(baseline, results)
     notes += [f"not compared: {len(left_out)} rows of the baseline, which were not selected"] * bool(left_out)
-    return Verdict(tuple(violations), tuple(notes), len(baseline.rows))
+    return Decision(tuple(violations), tuple(notes), len(baseline.rows))
 
 
-def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Violation]:
+def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Change]:
     """Yield the violations of one row; measures only if both definitions are the same."""
 
-    def violation(measure: str, before: object, now: object, allowed: object) -> Violation:
-        return Violation(measure, was.scene or id, was.method or id, str(before), str(now), str(allowed))
+    def violation(measure: str, before: object, now: object, allowed: str) -> Change:
+        return Change(RowName(was.scene or id, was.method or id, measure), before, now, allowed)
 
     row = results.rows.get(id)
     if row is None:
@@ -100,9 +90,9 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Vio
             for other in results.rows.values()
             if other.definition and (other.definition, other.scene, other.method) == (was.definition, was.scene, was.method)
         )
-        yield violation("row", Status.PASSED, next(renamed, "missing"), Status.PASSED)
-    elif row.status is not Status.PASSED:
-        yield violation("row", Status.PASSED, row.status, Status.PASSED)
+        yield violation("row", OK, next(renamed, MISSING), str(OK))
+    elif not row.outcome.ok:
+        yield violation("row", OK, row.outcome, str(OK))
     elif row.definition != was.definition:
         yield violation("definition", was.definition, row.definition, was.definition)
     elif row.engine != was.engine:
@@ -110,15 +100,16 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Vio
     else:
         for name, allowed in was.measures.items():
             value = row.values.get(name, math.nan)
-            passed = value >= allowed.limit if name == ORDER else value <= allowed.limit  # NaN does not pass
-            if not passed:
+            if math.isnan(value) or worsening(name, allowed, value) > 0:
                 side = "at least" if name == ORDER else "at most"
                 limit = f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
-                yield violation(name, f"{allowed.value:.6g}", _write_value(row.values.get(name)), limit)
+                yield violation(name, allowed.value, row.values.get(name, MISSING), limit)
 
 
-def _write_value(value: float | None) -> str:
-    return "missing" if value is None else f"{value:.6g}"
+def worsening(measure: str, allowed: Allowed, value: float) -> int:
+    """Return 1 if a value is worse than allowed, -1 if it improved by as much, otherwise 0."""
+    grown = direction(allowed.range, exact(value))
+    return -grown if measure == ORDER else grown
 
 
 def _improvements(baseline: Baseline, results: Results) -> Iterator[str]:
@@ -128,7 +119,5 @@ def _improvements(baseline: Baseline, results: Results) -> Iterator[str]:
         if row is None or row.definition != was.definition:
             continue
         for name, allowed in was.measures.items():
-            gain = allowed.value - row.values.get(name, math.nan)
-            room = allowed.limit - allowed.value
-            if gain * room > room * room:
+            if worsening(name, allowed, row.values.get(name, math.nan)) < 0:
                 yield f"better: {name}, {was.scene}, {was.method}: was {allowed.value:.6g}, is {row.values[name]:.6g}"

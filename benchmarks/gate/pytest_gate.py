@@ -18,10 +18,11 @@ from typing import Any
 import pytest
 
 from conservative.errors import NotWritten
+from conservative.outcome import Outcome, OutcomeKind
 
 from ..measures.origin import commit, machine_title
 from . import baseline, compare, results
-from .results import Results, Row, Status
+from .results import Results, Row
 
 Made = pytest.Item | pytest.Collector | list[pytest.Item | pytest.Collector] | None
 """Kinds of items that pytest collects from a name in a module."""
@@ -61,7 +62,7 @@ class Gate:
         self.baseline = self.root / config.getoption("conservative_gate_baseline")
         self.folder = self.root / results.FOLDER
         self.rows: dict[str, Row] = {}
-        self.verdict: compare.Verdict | None = None
+        self.verdict: compare.Decision | None = None
         self.nothing = ""
         self.config, self.suite = config, suite
         self.read: set[str] = set()
@@ -93,17 +94,17 @@ class Gate:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        """Record a row for every benchmark; a failure after its timing only changes the status."""
+        """Record a row for every benchmark; a failure after its timing only changes the outcome."""
         report = yield
         if is_benchmark(item):
             id = row_id(item)
             if report.when == "call" or (report.when == "setup" and not report.passed):
                 self.rows[id] = row(item, report)
             elif report.when == "teardown" and not report.passed:
-                self.rows[id] = replace(self.rows[id], status=Status.ERROR)
+                self.rows[id] = replace(self.rows[id], outcome=Outcome(OutcomeKind.FAILED, "in its teardown"))
         return report
 
-    def finish(self) -> compare.Verdict:
+    def finish(self) -> compare.Decision:
         """Write the results to the folder, and return the verdict. Raise `NothingToCompare`."""
         before: baseline.Baseline | baseline.NoBaseline
         try:
@@ -187,13 +188,21 @@ def row(item: pytest.Item, report: pytest.TestReport) -> Row:
         id=row_id(item),
         scene=str(info.get("scene", "")),
         method=str(info.get("method", "")),
-        status=Status.XFAILED if hasattr(report, "wasxfail") else Status(report.outcome),
+        outcome=outcome_of(report),
         engine=str(info.get("engine", "")),
         definition=str(info.get("definition") or source_hash(item)),
         values={name: float(info.get(name, "nan")) for name in spreads},
         spreads=spreads,
         seconds=float(timed.stats.min) if timed else 0.0,
     )
+
+
+def outcome_of(report: pytest.TestReport) -> Outcome:
+    """Return the outcome of a test; one that is expected to fail counts as skipped."""
+    if hasattr(report, "wasxfail"):
+        return Outcome(OutcomeKind.SKIPPED, "expected to fail")
+    kinds = {"passed": OutcomeKind.OK, "failed": OutcomeKind.FAILED, "skipped": OutcomeKind.SKIPPED}
+    return Outcome(kinds[report.outcome])
 
 
 def source_hash(item: pytest.Item) -> str:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 from conservative.errors import BadInput
 from conservative.files import make_folder, read_text, write_text
+from conservative.outcome import Outcome, OutcomeKind
 
 from ..measures.measure import Measure, Value
 
@@ -22,16 +23,6 @@ RUNAWAY = 1.0
 ENERGY_DRIFT = Value(Measure.DRIFT_MAX, RUNAWAY, "energy").key
 
 
-class Status(StrEnum):
-    """Outcome of a benchmark, as pytest names it."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    SKIPPED = "skipped"
-    XFAILED = "xfailed"
-    ERROR = "error"
-
-
 @dataclass(frozen=True)
 class Row:
     """One benchmark.
@@ -40,16 +31,14 @@ class Row:
     ----------
     id, scene, method
         Name of the test with its parameters, and names for readers.
-    status
-        Outcome.
+    outcome
+        Outcome of the run, with the reason why there are no values.
     engine
         Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for the project under test.
     definition
         Hash of scene, method and steps.
     values, spreads
         Measures that must not get worse, and the change of each by round-off alone.
-    reason
-        Reason why there are no values; may be empty.
     seconds
         Shortest time of a call, s, which is not gated; 0 if it was not timed.
     mistake, cause
@@ -59,12 +48,11 @@ class Row:
     id: str
     scene: str
     method: str
-    status: Status
+    outcome: Outcome
     engine: str = ""
     definition: str = ""
     values: Mapping[str, float] = field(default_factory=dict)
     spreads: Mapping[str, float] = field(default_factory=dict)
-    reason: str = ""
     seconds: float = 0.0
     mistake: str = ""
     cause: str = ""
@@ -88,7 +76,8 @@ def find_runaway(values: Mapping[str, float]) -> str:
 
 def write(results: Results, path: Path) -> None:
     """Write results as JSON, with NaN as NaN, and beside them the file for Bencher. Raise `NotWritten` if that fails."""
-    content = {**vars(results), "rows": [vars(row) for row in results.rows.values()]}
+    rows = [{**vars(row), "outcome": vars(row.outcome)} for row in results.rows.values()]
+    content = {**vars(results), "rows": rows}
     make_folder(path.parent, "results")
     write_text(path, json.dumps(content, indent=1) + "\n", "results")
     write_text(path.with_name(HISTORY), json.dumps(to_bencher(results), indent=1) + "\n", "results")
@@ -98,7 +87,7 @@ def to_bencher(results: Results) -> dict[str, dict[str, dict[str, float]]]:
     """Return the rows that passed in Bencher's metric format: accuracy with its spread, and the time as `latency`, ns."""
     found: dict[str, dict[str, dict[str, float]]] = {}
     for row in results.rows.values():
-        if row.status is Status.PASSED:
+        if row.outcome.ok:
             metrics = found[row.id] = {"latency": {"value": 1e9 * row.seconds}} if row.seconds > 0 else {}
             for name, value in row.values.items():
                 spread = row.spreads.get(name, 0.0)
@@ -117,9 +106,13 @@ def read(path: Path) -> Results:
     allowed = "a file of results, which `pytest --benchmark --gate` leaves"
     try:
         content = json.loads(read_text(path))
-        rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
+        rows = [Row(**{**row, "outcome": _outcome(**row["outcome"])}) for row in content["rows"]]
         return Results(content["machine"], {row.id: row for row in rows}, content["commit"], tuple(content["left_out"]))
     except OSError as error:
         raise BadInput("results", f"{path} ({error.strerror})", allowed) from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise BadInput("results", f"{path} ({type(error).__name__}: {error})", allowed) from None
+
+
+def _outcome(kind: str, **details: Any) -> Outcome:
+    return Outcome(OutcomeKind(kind), **details)

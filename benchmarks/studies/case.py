@@ -14,6 +14,7 @@ from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.method_info import Maker
 from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.registry import read_name
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -104,8 +105,9 @@ class Case:
 def names_of(method: Method) -> dict[str, str]:
     """Return the columns with names of a method; see `Measurement`."""
     if isinstance(method, Missing):  # version and settings of a missing engine are unknown
-        family, _, setting = method.name.partition(":")
-        texts = {"label": method.label, "family": family, "engine": family, "version": "", "setting": setting}
+        parts = read_name(method.name)
+        family, setting = f"{parts.base}@{parts.version}" if parts.version else parts.base, parts.settings or ""
+        texts = {"label": method.label, "family": family, "engine": parts.base, "version": "", "setting": setting}
         return {"method": method.name, **texts, "series": series(method), "series_setting": setting}
     try:
         label, maker = method.label, method.maker

@@ -1,4 +1,4 @@
-"""The study of convergence: errors over decreasing step sizes, and the observed order."""
+"""Errors over decreasing step sizes, and the observed order."""
 
 from __future__ import annotations
 

@@ -90,9 +90,8 @@ class Declaration:
 
     @property
     def about(self) -> str:
-        """Description: the first line of its file, without `The study of` and its name."""
-        first = (sys.modules[self.findings.__module__].__doc__ or "").partition("\n")[0]
-        return first.rstrip(".").removeprefix("The study of ").removeprefix(f"{self.name}: ")
+        """Description: the first line of its file."""
+        return (sys.modules[self.findings.__module__].__doc__ or "").partition("\n")[0].rstrip(".")
 
     def plan(self, methods: Sequence[Method], scenes: Sequence[Scene] = (), processes: int = 1, **settings: Any) -> Study:
         """Return the study of methods, with the scenes or else its own; `settings` are fields of `Study`, or of the draw."""

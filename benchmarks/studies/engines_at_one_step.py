@@ -1,4 +1,4 @@
-"""The study of engines at the scene's step size: errors, drifts, flips and the time per step.
+"""Engines at the scene's step size: errors, drifts, flips and the time per step.
 
 Times are measured in the process of each engine, in rounds interleaved across all engines, one engine at a time. A crash or a
 hang affects the rows of one method only.
@@ -23,7 +23,7 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .declaration import Declaration, Named
-from .selection import Missing
+from .selection import Missing, bits_of
 from .speed import MEASURES, time_steps
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -57,9 +57,8 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
     done = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
     method = case.method
     if not isinstance(method, Missing):
-        bits = float(getattr(method, "precision", "f64").removeprefix("f"))
         order = math.nan if method.order is None else float(method.order)
-        properties = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
+        properties = (Value(Measure.PRECISION, float(bits_of(method))), Value(Measure.ORDER_EXPECTED, order))
         outcome = OK if isinstance(done, Success) else done
         yield from case.rows(properties, outcome, AS_INSTALLED if method in method.settings_for("as_installed") else "")
     yield from measure_accuracy(case, done, truth)

@@ -1,4 +1,4 @@
-"""The study of engines over decreasing step sizes or tolerances: errors, observed order, and wall times.
+"""Engines over decreasing step sizes or tolerances: errors, observed order, and wall times.
 
 Impulse-based engines in single precision become less accurate with smaller steps. They have no order.
 """

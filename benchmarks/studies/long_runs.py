@@ -1,4 +1,4 @@
-"""The study of long runs: drift over ten times the scene's duration."""
+"""Long runs: drift over ten times the scene's duration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The study of growth: how energy, momentum and attitude error grow over up to a million turns.
+"""Growth: how energy, momentum and attitude error grow over up to a million turns.
 
 The default setting of each family runs at the scene's step over `TURNS` turns, each run a hundred times as long as the one
 before. A run takes at most `LONGEST` s, and less if the study would take more than `TOTAL` s; the last one is then shorter, so

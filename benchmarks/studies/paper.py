@@ -1,4 +1,4 @@
-"""The study of accuracy at the paper's steps: drifts, errors and work."""
+"""Accuracy at the paper's steps: drifts, errors and work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The study of random bodies: errors and times of our methods and of engines.
+"""Random bodies: errors and times of our methods and of engines.
 
 `conservative.scenes.random_body` describes the distribution of the bodies. Each method has up to 17 settings per body, with the
 same step sizes for every method with a step and the same tolerances for every adaptive method.

@@ -109,6 +109,11 @@ def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
     return methods(names, skip_missing, lambda method: (method,))
 
 
+def bits_of(method: Method) -> int:
+    """Return the bits of the numbers of a method: 64 for double precision, 32 for single."""
+    return {"f64": 64, "f32": 32}[getattr(method, "precision", "f64")]
+
+
 def tolerance_setting(method: Method) -> str | None:
     """Return the name of the setting that determines the accuracy of an adaptive method, or None."""
     if method.order is not None:

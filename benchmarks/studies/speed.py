@@ -1,4 +1,4 @@
-"""The study of speed: wall time of every method at the scene's step, and the time to prepare a run.
+"""Wall time of every method at the scene's step, and the time to prepare a run.
 
 Preparation and first call do not include compilation: a report runs other studies first, in the same process. Preparation is
 then the conversion of the scene.

@@ -1,4 +1,4 @@
-"""The study of stability: the longest step size of each method on the hard cases, and the failure at the next longer one.
+"""The longest step size of each method on the hard cases, and the failure at the next longer one.
 
 A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| the initial rate of the scene, until one fails:
 

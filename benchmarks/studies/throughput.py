@@ -1,4 +1,4 @@
-"""The study of throughput: the time per body in batches, for our methods and for engines with batches.
+"""The time per body in batches, for our methods and for engines with batches.
 
 `conservative.benchmarks.studies.ensembles` draws the bodies: tops and free bodies that all differ, and many starts of one top.
 Each method runs with several step sizes or tolerances and in every way it has: many bodies at once, on one thread and on two,

@@ -1,4 +1,4 @@
-"""The study of work against precision: error and wall time over step sizes, and over tolerances of adaptive methods."""
+"""Work against precision: error and wall time over step sizes, and over tolerances of adaptive methods."""
 
 from __future__ import annotations
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import rotation_about
+from conservative import registry
+from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.scene import Scene
@@ -23,6 +22,7 @@ from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, attempt
 from ..studies.study import FindTruth, remember_truths
 from .description import describe
+from .motion import PROBES, Motion
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
@@ -30,8 +30,6 @@ PAPER = SCENES[:2]
 """Scenes on which orders are fitted."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
-PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
-"""Attitudes at which energies distinguish two potentials."""
 STEPS = 6
 """Number of steps that an observed order is fitted to; high orders need all of theirs, which are short."""
 ROUND_OFF = 1.6
@@ -88,27 +86,8 @@ class Point:
 
     @property
     def definition(self) -> str:
-        """Hash of scene, method and steps: measures of two definitions cannot be compared."""
-        found = describe(self.scene, np.array(PROBES))
-        words = [self.scene.name, self.method.name, *found["invariants"]]
-        # The empty text once described how times were taken. Without it, every definition in every baseline would change.
-        return _hash([words, [_digits(each) for each in arrange(found, self.grid.n_steps)], ""])
-
-
-def define(words: list[str], values: Iterable[object]) -> str:
-    """Return a hash of words, and of numbers but for the last digits, in which two machines differ."""
-    return _hash([words, [_digits(each) for each in values]])
-
-
-def arrange(description: Mapping[str, Any], *more: float) -> list[Any]:
-    """Return the numbers of a description (`describe`), with more numbers beside the duration and the step."""
-    start = [description[each] for each in ("inertia", "R_WB0", "w_WB_B0")]
-    parts = [each for each in description["parts"] if len(each)]
-    return [*start, [*description["ends"], *more], description["energies"], *parts]
-
-
-def _hash(content: object) -> str:
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        """Hash of scene, method and steps."""
+        return Motion(describe(self.scene, np.array(PROBES))).definition(self.scene.name, self.method.name)
 
 
 def points() -> Iterator[Point]:
@@ -127,7 +106,7 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
-    number: Any = {"f64": np.float64, "f32": np.float32}[getattr(point.method, "precision", "f64")]
+    number: Any = np.float32 if selection.bits_of(point.method) == 32 else np.float64
     last_digit = np.array([1.0, -1.0, 1.0]) * float(np.spacing(number(np.abs(scene.w_WB_B0).max())))
     for units in (0, *(NUDGES[1:-1] if few else NUDGES)):
         trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)
@@ -137,8 +116,15 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
     nudged = {name: [each[name] for each in measured] for name in measured[0]}
     least = ROUND_OFF * float(np.finfo(number).eps)
     spreads = {name: max(max(values) - min(values), 0.0 if name in counters else least) for name, values in nudged.items()}
-    order = fit_order(point, few) if point.scene.name.partition(":")[0] in PAPER else {}
+    order = fit_order(point, few) if _is_of_paper(point.scene.name) else {}
     return measured[0] | order, spreads | dict.fromkeys(order, 0.0)
+
+
+def _is_of_paper(scene: str) -> bool:
+    try:
+        return registry.read_name(scene, "scene").base in PAPER
+    except BadInput:  # a scene of a project may have any name
+        return False
 
 
 def fit_order(point: Point, few: bool = False) -> dict[str, float]:
@@ -155,10 +141,3 @@ def fit_order(point: Point, few: bool = False) -> dict[str, float]:
     )
     order = observed_order([grid.dt for grid in grids], np.where(sizes > ROUNDED, sizes, np.nan))
     return {} if order.reason else {Measure.ORDER.text: order.slope}
-
-
-def _digits(values: object) -> list[float]:
-    """Return numbers without the last digits, in which two machines differ."""
-    flat = np.ravel(np.asarray(values, dtype=float))
-    scale = np.abs(flat).max(initial=0.0) or 1.0
-    return [float(f"{value:.9e}") + 0.0 for value in np.round(flat / scale, 10) * float(f"{scale:.10e}")]

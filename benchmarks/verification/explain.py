@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from itertools import chain, combinations, product
 from typing import Any, NamedTuple
 
@@ -220,8 +221,8 @@ def _within_digits(case: Compared, found: Explanation) -> Explanation:
     if found.keys != ("rate of the orbit",):
         return found
     rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
-    text = f"{rate:.17g}".partition("e")[0] if len(repr(rate)) > 18 else repr(rate).partition("e")[0]
-    digits = len(text.replace(".", "").strip("0"))
+    written = Decimal(f"{rate:.17g}" if len(repr(rate)) > 18 else repr(rate))
+    digits = len(written.normalize().as_tuple().digits)
     if abs(found.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
         return found
     return replace(found, sentence=found.sentence + ", which is within the digits of the scene file")

@@ -30,6 +30,7 @@ from conservative.references.worker.client import EngineTimeout, time_limit
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..studies.selection import bits_of
 from . import protocol
 from .compare import Compared, compare_answers
 from .explain import PROGRAM_KINDS, diagnose
@@ -408,7 +409,7 @@ def verify_method(
     `pairs` are names of pairs, by default all.
     """
     subject = subject or method.name
-    single = getattr(method, "precision", "f64") == "f32"
+    single = bits_of(method) == 32
     findings, named, order = list[Finding](), list[Named](), math.nan
     if {"motions", "order", "repeatability"} & set(checks):
         principal = isinstance(method, AdapterMethod)

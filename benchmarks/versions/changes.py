@@ -10,14 +10,12 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
+from functools import partial
 
-from conservative.outcome import Outcome
-
-from ..measures.convergence_order import Order
+from ..measures.change import Change, Range, RowName, direction, exact
 from ..measures.errors import CONSERVED, SMALL
-from .engine import TIME_FACTOR, EngineComparison, Observation, Range, StepTimes, ratio
-from .times import Ratio
+from .engine import TIME_FACTOR, EngineComparison, Observation, StepTimes, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 2.0
 """Orders differ if their difference exceeds the first, and this number of their uncertainties."""
@@ -27,8 +25,8 @@ ROUND_OFF = 1e-9
 """Attitude errors, rad, below this do not differ: they are round-off."""
 
 
-class Aspect(Enum):
-    """The subject of a change."""
+class Aspect(StrEnum):
+    """The measure of a change."""
 
     OUTCOME = "outcome"
     ATTITUDE_ORDER = "order of the attitude"
@@ -38,34 +36,22 @@ class Aspect(Enum):
     TIME = "time of a step"
 
 
-@dataclass(frozen=True)
-class Change:
-    """A conclusion that differs between two versions; for times, `now` is the ratio.
-
-    `quantity` is the invariant of a drift. `lost` is true if the later version lost the end of a run, an order or an invariant.
-    """
-
-    aspect: Aspect
-    was: Outcome | Order | Range
-    now: Outcome | Order | Range | Ratio
-    quantity: str = ""
-    lost: bool = False
-
-
 def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_times: StepTimes) -> tuple[Change, ...]:
     """Return the changes from one version to another, on one scene and with one setting, most important first.
 
     `was_times` and `now_times` are the times of a step (n,), s; empty if not known.
     """
+    row = partial(RowName, now.scene, now.setting)
     if was.outcome.kind is not now.outcome.kind:
-        return (Change(Aspect.OUTCOME, was.outcome, now.outcome, lost=was.outcome.ok),)
+        return (Change(row(Aspect.OUTCOME), was.outcome, now.outcome, lost=was.outcome.ok),)
     if not was.outcome.ok:
         return ()
-    changes = [*_orders(was, now), *_drifts(was, now)]
-    if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
-        changes.append(Change(Aspect.ERROR, was.error, now.error))
-    if (times := ratio(was_times, now_times)).beyond(TIME_FACTOR):
-        changes.append(Change(Aspect.TIME, Range.of(was_times), times))
+    changes, factor = [*_orders(was, now), *_drifts(was, now)], f"within a factor of {FACTOR:g}"
+    if max(was.error.value, now.error.value) > ROUND_OFF and resized(was.error, now.error):
+        changes.append(Change(row(Aspect.ERROR), was.error, now.error, factor, lost=False))
+    if (times := ratio(was_times, now_times)).direction(TIME_FACTOR):
+        limit = f"within a factor of {TIME_FACTOR:g}"
+        changes.append(Change(row(Aspect.TIME), Range.of(was_times), times, limit, lost=False))
     return tuple(changes)
 
 
@@ -74,34 +60,35 @@ def _orders(was: Observation, now: Observation) -> Iterator[Change]:
         (Aspect.ATTITUDE_ORDER, was.attitude_order, now.attitude_order),
         (Aspect.RATES_ORDER, was.rates_order, now.rates_order),
     )
-    grown = direction(was.error, now.error)
+    grown = resized(was.error, now.error)
     for aspect, before, after in pairs:
+        row, margin = RowName(now.scene, now.setting, aspect), ORDER_ERRORS * math.hypot(before.stderr, after.stderr)
         if math.isnan(before.slope) or math.isnan(after.slope):
             # Round-off can decide if an order can be fitted. Such a change counts only if the error changed too.
             if math.isnan(before.slope) != math.isnan(after.slope) and grown:
-                yield Change(aspect, before, after, lost=math.isnan(after.slope) and grown > 0)
-        elif abs(after.slope - before.slope) > max(ORDER_STEP, ORDER_ERRORS * math.hypot(before.stderr, after.stderr)):
-            yield Change(aspect, before, after, lost=after.slope < before.slope)
+                yield Change(row, before, after, lost=math.isnan(after.slope) and grown > 0)
+        elif side := direction(exact(before.slope), exact(after.slope), margin=max(ORDER_STEP, margin)):
+            yield Change(row, before, after, f"within {max(ORDER_STEP, margin):.2g}", lost=side < 0)
 
 
 def _drifts(was: Observation, now: Observation) -> Iterator[Change]:
     for quantity in was.drifts:
         before, after = was.drifts[quantity], now.drifts[quantity]
+        row = RowName(now.scene, now.setting, Aspect.DRIFT, quantity)
         if math.isnan(before.value) or math.isnan(after.value):
             continue
-        limits = CONSERVED, SMALL  # up to which a quantity is conserved (grade 0) or drifts little (1)
-        grade, other = (bisect_left(limits, abs(drift.value)) for drift in (before, after))
-        if grade == other == len(limits):
-            if before.high < 0 < after.low or after.high < 0 < before.low:
-                yield Change(Aspect.DRIFT, before, after, quantity)
-        elif grade != other and direction(before, after):
-            yield Change(Aspect.DRIFT, before, after, quantity, lost=other > grade)
+        limits = CONSERVED, SMALL  # up to which a quantity is conserved (class 0) or drifts little (1)
+        old, new = (bisect_left(limits, abs(drift.value)) for drift in (before, after))
+        if old == new == len(limits):
+            if {direction(exact(0.0), drift) for drift in (before, after)} == {1, -1}:
+                yield Change(row, before, after, "the same sign", lost=False)
+        elif old != new and resized(before, after):
+            yield Change(row, before, after, f"within a factor of {FACTOR:g}", lost=new > old)
 
 
-def direction(was: Range, now: Range) -> int:
+def resized(was: Range, now: Range) -> int:
     """Return 1 if all sizes grew by more than `FACTOR`, -1 if they shrank by as much, else 0."""
-    before, after = was.sizes, now.sizes
-    return int(after[0] > FACTOR * before[1]) - int(before[0] > FACTOR * after[1])
+    return direction(was.size, now.size, FACTOR)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..measures.change import NOTHING, Range
 from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
@@ -50,35 +51,6 @@ NO_STEP = "its accuracy does not depend on dt"
 NO_ORDER = Order()
 
 
-@dataclass(frozen=True)
-class Range:
-    """A value, and its smallest and largest value under changes that should not matter.
-
-    For errors (rad) and drifts (relative) the change is one or two more steps in the run.
-    """
-
-    value: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, values: Iterable[float]) -> Range:
-        """Return the range of values; the first is the measured value, and NaN are ignored."""
-        first, *rest = values
-        known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
-        return cls(first, min(known), max(known))
-
-    @property
-    def sizes(self) -> tuple[float, float]:
-        """Smallest and largest absolute value."""
-        ends = sorted((abs(self.low), abs(self.high)))
-        return (0.0 if self.low < 0 < self.high else ends[0]), ends[1]
-
-
-NOTHING = Range(math.nan, math.nan, math.nan)
-"""The range of a value that could not be measured."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Observation:
     """Measurements of one version of an engine, with one setting, on one scene at the step dt, s.
@@ -90,7 +62,7 @@ class Observation:
     attitude_order, rates_order
         Orders of convergence, over the steps that all versions have.
     error
-        Largest attitude error, rad.
+        Largest attitude error, rad. Its range, and the range of a drift, is of runs with one or two more steps.
     drifts
         Largest relative change of each invariant, by name; signed unless the invariant is a vector.
     """
@@ -259,7 +231,7 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     tried = {version: study.attempt_here(case) for version, case in cases.items()}
     ready = {version: done for version, done in tried.items() if not isinstance(done, Outcome)}
     times = _repeat(study, ready, range(REPEATS))
-    if any(ratio(was, now).beyond(TIME_FACTOR) for was, now in pairwise(times.values())):
+    if any(ratio(was, now).direction(TIME_FACTOR) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))
         return {version: times[version] + again[version] for version in ready}
     return times

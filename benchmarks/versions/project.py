@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import cached_property, partial
 from pathlib import Path
 from time import monotonic
@@ -24,20 +25,22 @@ from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.features import Feature
 from conservative.grid import Grid
 from conservative.method import Role
-from conservative.outcome import Outcome, OutcomeKind
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import Answer
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
-from ..gate.baseline import COUNTS, ORDER, update_baseline
-from ..gate.compare import Verdict, Violation
-from ..gate.results import Results, Row, Status, find_runaway
+from ..gate.baseline import COUNTS, update_baseline
+from ..gate.compare import Decision
+from ..gate.results import Results, Row, find_runaway
+from ..measures.change import Change, RowName
 from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
 from ..suite import description, points
+from ..suite.motion import motion_of
 from . import inside
 from .comparison import Comparison, Line, compare
 from .prices import Price
@@ -45,16 +48,33 @@ from .times import PROCESSES, SLOWER, TimeRow, compare_times
 from .version import Checkout, Version
 
 TIME, MOTION = "time of a step", "another motion"
+OF_ATTITUDE = {measure.text for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.ORDER)}
+"""Measures that mean nothing if the attitude is lost."""
 ATTITUDE = Measure.ATTITUDE_MAX.text
 LOST, OTHER, FAR = 0.1, 1.0, 3.0
 """Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
 than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
+ANOTHER_SCENE = Outcome(OutcomeKind.OK, "the scene is another one")
+"""Outcome of a row that was not measured, because its scene has another definition than in this process."""
 SLOW = 1.0
 """Duration of a run, s, above which a row is measured with fewer points."""
 _ADAPTER, _DESCRIPTION = str(Path(inside.__file__).resolve()), str(Path(description.__file__).resolve())
 
 ProjectLine = Line[Row, TimeRow]
 ProjectComparison = Comparison[Row, TimeRow]
+
+
+class Standing(StrEnum):
+    """The standing of a row of the later version against the earlier one, the worst first."""
+
+    MOTION = "another motion"
+    SLOWER = "slower"
+    WORSE = "worse"
+    PAID = "slower, accepted"
+    FASTER = "faster"
+    NEW = "new"
+    SAME = "same"
+    NOTHING = "not compared"
 
 
 class Explained(NamedTuple):
@@ -105,37 +125,38 @@ class ProjectSide:
 
     def measure(self, scene: str) -> Iterator[tuple[str, Row]]:
         """Yield a row for each setting on a scene; a failure is in its row."""
-        here, rows = define_scene(scene), {}
-        for each in self.settings:
-            row_id = f"{scene} / {each['name']}"
-            rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
+        here, rows = motion_of(scene), {}
+        for setting in self.settings:
+            name, definition = setting["name"], here.definition(scene, setting["name"])
+            rows[name] = Row(f"{scene} / {name}", scene, name, OK, setting["engine"], definition)
         try:
-            there = define_scene(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
+            there = motion_of(scene, partial(self.ask, "describe_scene", file=_DESCRIPTION))
         except IntegrationFailed as failure:
-            yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
+            missing = Outcome(OutcomeKind.MISSING, str(failure.outcome))
+            yield from ((name, replace(row, outcome=missing)) for name, row in rows.items())
             return
         for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
-            if here == there:
+            if here.key == there.key:
                 row = self._measure(scene, setting, row)
-                if row.status is not Status.SKIPPED:
+                if row.outcome.kind is not OutcomeKind.UNSUPPORTED:
                     found = self._find_causes(setting)[not registry.scene(scene).free]
                     row = replace(row, mistake=found.key, cause=found.sentence)
                 yield name, row
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
-                yield name, replace(row, definition=there, reason="another motion")
+                yield name, replace(row, definition=there.definition(scene, name), outcome=ANOTHER_SCENE)
 
     def _measure(self, name: str, setting: Mapping[str, Any], row: Row) -> Row:
         try:
             pair = self.ask("describe_pair", scene=name, method=setting["name"])
             if pair["unsupported"]:
-                return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
+                return replace(row, outcome=Outcome(OutcomeKind.UNSUPPORTED, pair["unsupported"]))
             method = self._remote(setting, name, pair["longest_step"])
             point = points.Point(registry.scene(name), method, self._truths)
             spent = monotonic()
             first = method.solve(point.scene, point.grid)
             spent = monotonic() - spent
             if not first.ok:
-                return replace(row, status=Status.FAILED, reason=str(first.outcome))
+                return replace(row, outcome=first.outcome)
             if self._decides and spent > SLOW:  # the first run may compile
                 spent = monotonic()
                 method.solve(point.scene, point.grid)
@@ -143,7 +164,7 @@ class ProjectSide:
                     self.few.add(row.id)
             return decide_values(row, *points.measure(point, row.id in self.few))
         except IntegrationFailed as failure:
-            return replace(row, status=Status.FAILED, reason=str(failure.outcome))
+            return replace(row, outcome=failure.outcome)
 
     def _remote(self, setting: Mapping[str, Any], scene: str = "", longest: float = math.inf) -> Remote:
         names = setting["name"], setting["label"], setting["order"]
@@ -221,20 +242,12 @@ class Remote(StandIn):
         return Trajectory(scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, failure)
 
 
-def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = description.describe_scene) -> str:
-    """Return the hash of the motion of a registered scene, by default as this process has it, whatever its name is.
-
-    Raise `BadInput` if it does not have the scene.
-    """
-    answer = describe(scene=name, probes=np.array(points.PROBES))
-    return points.define(answer["invariants"], points.arrange(answer))
-
-
 def decide_values(row: Row, values: Mapping[str, float], spreads: Mapping[str, float]) -> Row:
     """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
-    nonsense = [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]
-    if reason := "; ".join(filter(None, [find_runaway(values), *nonsense])):
-        return replace(row, status=Status.FAILED, reason=reason)
+    if nonsense := [f"{name} is {value}" for name, value in values.items() if not math.isfinite(value)]:
+        return replace(row, outcome=Outcome(OutcomeKind.INVALID, "; ".join(nonsense)))
+    if runaway := find_runaway(values):
+        return replace(row, outcome=Outcome(OutcomeKind.NOT_CONSERVED, runaway))
     return replace(row, values=values, spreads=spreads)
 
 
@@ -259,7 +272,7 @@ def compare_projects(
         This process does not have a scene, or neither version has one of the methods, or any.
     """
     for name in scenes:
-        define_scene(name)  # before any work
+        motion_of(name)  # before any work
     truths = remember_truths()
     with (
         closing(ProjectSide(base, methods, truths, explain=explain)) as was,
@@ -273,8 +286,7 @@ def compare_projects(
         good = [
             (line.scene, line.setting)
             for line in made.lines
-            if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
-            and not _moves(*line.results)  # type: ignore[arg-type]  # neither is None
+            if all(row and row.outcome == OK for row in line.results) and not _moves(*line.results)  # type: ignore[arg-type]  # neither is None
         ]
         times = compare_times(was, now, good, processes, tell) if processes else {}
         lines = (replace(line, times=times.get((line.scene, line.setting))) for line in made.lines)
@@ -283,32 +295,33 @@ def compare_projects(
 
 def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]:
     """Return the methods of which no version has a setting."""
-    families = {setting.partition(":")[0] for setting in settings}
-    return [name for name in methods if name.partition(":")[0] not in families]
+    families = {registry.read_name(setting).base for setting in settings}
+    return [name for name in methods if registry.read_name(name, "methods").base not in families]
 
 
-def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Verdict:
-    """Return the verdict on the last step of a comparison: other motions, the gate's on values, and times without a price."""
+def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Decision:
+    """Return the decision on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
-    before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
+    before = {was.id: was for _, was, _ in steps if was is not None and was.outcome.ok}
     both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
     before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
-    verdict = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
+    decision = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
-    others = {(each.scene, each.method) for each in moved.values()}
-    violations = [*moved.values(), *(each for each in verdict.violations if (each.scene, each.method) not in others)]
+    others = {(change.row.scene, change.row.method) for change in moved.values()}
+    kept = (change for change in decision.violations if (change.row.scene, change.row.method) not in others)
+    violations = [*moved.values(), *kept]
     paid, unused = list[str](), set(prices)
     for line in comparison.lines:
         if (time := line.times) and time.failed:
             last, price = time.again or time.first, prices.get(line.setting)
-            if price and not time.reason and last.low <= price.factor:
+            if price and not time.reason and last.direction(price.factor) <= 0:
                 paid.append(f"{line.scene}, {line.setting}: {last.value:.3g} times as long, {price}")
                 unused.discard(line.setting)
                 continue
-            longer = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
             most = f"at most {price.factor if price else 1 + SLOWER:g} times as long"
-            violations.append(Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", longer, most))
+            name = RowName(line.scene, line.setting, TIME)
+            violations.append(Change(name, f"{time.was:.3g} s", time.reason or last, most))
             unused.discard(line.setting)
     paid += [f"{name}: no row needs the longer time, {prices[name]}" for name in sorted(unused)]
     notes = (
@@ -318,7 +331,7 @@ def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingP
         *_same_builds(base, head),
         *_packages(base, head),
     )
-    return Verdict((*violations,), notes, len(comparison.lines))
+    return Decision((*violations,), notes, len(comparison.lines))
 
 
 def error_of(row: Row) -> float:
@@ -328,24 +341,26 @@ def error_of(row: Row) -> float:
 
 def _conserved(row: Row) -> dict[str, float]:
     """Return the values of a row that mean something although its attitude is lost."""
-    return {name: value for name, value in row.values.items() if not name.endswith("error max") and name != ORDER}
+    return {name: value for name, value in row.values.items() if name not in OF_ATTITUDE}
 
 
 def _moves(was: Row, now: Row) -> bool:
     """Return whether a row has another motion than before: by a mistake that is known, or by its attitude."""
-    if Status.SKIPPED in (was.status, now.status) or was.status is Status.ERROR or was.definition != now.definition:
+    if OutcomeKind.UNSUPPORTED in (was.outcome.kind, now.outcome.kind) or was.outcome.kind is OutcomeKind.MISSING:
+        return False
+    if was.definition != now.definition:
         return False
     if now.mistake not in ("", was.mistake):  # also where the motion is lost in both
         return True
-    return was.status is Status.PASSED and error_of(was) <= LOST < OTHER < error_of(now)
+    return was.outcome.ok and error_of(was) <= LOST < OTHER < error_of(now)
 
 
-def _moved(was: Row, now: Row) -> Violation:
-    """Return the violation by another motion, with its cause."""
-    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.reason})"
-    size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.reason})"
+def _moved(was: Row, now: Row) -> Change:
+    """Return the change to another motion, with its cause."""
+    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.outcome})"
+    size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.outcome})"
     cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
-    return Violation(MOTION, now.scene, now.method, before, f"{size}. {cause}", "")
+    return Change(RowName(now.scene, now.method, MOTION), before, f"{size}. {cause}")
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
@@ -354,8 +369,8 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
     for when, row in (("was", was), ("is", now)):
         if row is None:
             yield f"{name}: {when} not there"
-        elif row.status is not Status.SKIPPED and row.reason:
-            yield f"{name}: {when} without values: {row.reason}"
+        elif row.outcome != OK and row.outcome.kind is not OutcomeKind.UNSUPPORTED:
+            yield f"{name}: {when} without values: {row.outcome}"
     if time and time.again and not time.failed:
         yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
     if faster(line) and time:
@@ -368,14 +383,29 @@ def faster(line: ProjectLine) -> bool:
     """Return whether a row is faster than before. A motion that is lost is not."""
     now = line.results[-1]
     lost = now is None or error_of(now) > LOST
-    return line.times is not None and not lost and line.times.first.high < 1 / (1 + SLOWER)
+    return line.times is not None and not lost and line.times.first.direction() < 0
+
+
+def standing_of(line: ProjectLine, violations: Sequence[Change]) -> Standing:
+    """Return the standing of a row, of which `violations` may be some."""
+    measures = [
+        change.row.measure for change in violations if (change.row.scene, change.row.method) == (line.scene, line.setting)
+    ]
+    if measures:
+        return Standing.MOTION if MOTION in measures else Standing.SLOWER if TIME in measures else Standing.WORSE
+    if line.results[0] is None:
+        return Standing.NEW
+    if line.times is None:
+        return Standing.NOTHING
+    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
 
 
 def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) -> Iterator[str]:
     """Yield the notes on settings: mistakes of both versions, or of the earlier one, and scenes that they do not support."""
     scenes: dict[str, list[str]] = {}
     for line, was, now in steps:
-        for text in dict.fromkeys(row.reason for row in (was, now) if row and row.status is Status.SKIPPED):
+        ends = [row.outcome for row in (was, now) if row and row.outcome.kind is OutcomeKind.UNSUPPORTED]
+        for text in dict.fromkeys(outcome.reason for outcome in ends):
             scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
         if was and was.cause:
             still = "in both versions" if now and now.mistake == was.mistake else "not any more"

@@ -7,8 +7,8 @@ Three things besides the code change a time:
   are therefore started repeatedly, data is placed several times in each process, and the faster half of the processes counts.
 * The machine can be slow for seconds. A slower row is therefore measured again.
 
-The interval is a bootstrap of whole processes, in pairs that ran at the same time (Efron and Tibshirani, An Introduction to the
-Bootstrap, 1993, chapter 13); samples of one process contain no information about other processes.
+The interval (`measures.interval`) is over whole processes, in pairs that ran at the same time: samples of one process contain
+no information about other processes.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 from conservative.grid import grid_for
 
+from ..measures.change import Range, direction, exact
+from ..measures.interval import interval
 from ..studies.study import Progress
 from .comparison import TIMING
 
@@ -46,7 +48,6 @@ LONGEST = 0.002
 """Duration of a call, s, above which it has the first steps of the scene only. A shorter one is the scene's motion."""
 MOST_CALLS = 10_000
 """Largest number of calls in a sample."""
-RESAMPLES = 4999
 
 
 class Process(Protocol):
@@ -58,27 +59,27 @@ class Process(Protocol):
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """Time of the later version divided by that of the earlier one: value, interval, and number of processes."""
+class Ratio(Range):
+    """Time of the later version divided by the time of the earlier one, its interval, and the number of processes."""
 
-    value: float
-    low: float
-    high: float
     processes: int
+
+    def direction(self, factor: float = 1 + SLOWER) -> int:
+        """Return 1 if the whole interval is slower by more than a factor, -1 if it is faster, otherwise 0."""
+        return direction(exact(1.0), self, factor)
 
     @property
     def slower(self) -> bool:
         """True if the whole interval is above the limit."""
-        return self.low > 1 + SLOWER
-
-    def beyond(self, factor: float) -> bool:
-        """Return whether the whole interval is above a factor, or below its inverse."""
-        return self.low > factor or self.high < 1 / factor
+        return self.direction() > 0
 
     @property
     def open(self) -> bool:
         """True if the interval contains the limit, so that more processes are needed."""
-        return self.low <= 1 + SLOWER < self.high
+        return not self.slower and self.high > 1 + SLOWER
+
+    def __str__(self) -> str:
+        return f"{self.value:.3f} times as long ({self.low:.3f} to {self.high:.3f})"
 
 
 @dataclass(frozen=True)
@@ -194,29 +195,16 @@ def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int, rounds: int) -
     return shortest[0], shortest[1]
 
 
-def ratio_of(times: Sequence[tuple[float, float]], seed: int = 0) -> Ratio:
+def ratio_of(times: Sequence[tuple[float, float]]) -> Ratio:
     """Return the ratio of times (n, 2), s, of n processes, with its interval; NaN for fewer than two, or without a time."""
-    from scipy.stats import bootstrap
-
     if len(times) < 2 or not np.isfinite(times).all():
         return Ratio(math.nan, math.nan, math.nan, len(times))
-    was, now = np.log(np.array(times)).T
-    interval = bootstrap(
-        (was, now),
-        _difference,
-        n_resamples=RESAMPLES,
-        paired=True,
-        vectorized=True,
-        confidence_level=2 * CONFIDENCE - 1,
-        method="percentile",
-        rng=seed,
-    ).confidence_interval
-    value = float(_difference(was, now))
-    return Ratio(math.exp(value), math.exp(float(interval.low)), math.exp(float(interval.high)), len(times))
+    logs = np.log(np.array(times)).T
+    low, high = interval(logs, 2 * CONFIDENCE - 1, _difference)
+    return Ratio(math.exp(_difference(logs)), math.exp(low), math.exp(high), len(times))
 
 
-def _difference(was: Array, now: Array, axis: int = -1) -> Array:
-    """Return the difference of the mean logarithms of the faster halves."""
-    half = (was.shape[axis] + 1) // 2
-    means = [np.sort(times, axis=axis).take(range(half), axis=axis).mean(axis=axis) for times in (was, now)]
-    return np.asarray(means[1] - means[0])
+def _difference(logs: Array) -> Array:
+    """Return the difference of the means of the faster halves, of logarithms of times (..., 2, n)."""
+    half = (logs.shape[-1] + 1) // 2
+    return np.asarray(np.diff(np.sort(logs)[..., :half].mean(axis=-1))[..., 0])

@@ -47,7 +47,7 @@ class Version:
     def title(self) -> str:
         """Name in tables."""
         head, plus, changes = self.commit.partition("+")
-        return f"{self.name} ({head[:9]}{plus}{changes})" if head and not self.name.startswith(head[:9]) else self.name
+        return f"{self.name} ({head[:9]}{plus}{changes})" if head and self.name[:9] != head[:9] else self.name
 
 
 def install_version(name: str, project: Path, source: Source, requirements: Sequence[str] = ()) -> Version:

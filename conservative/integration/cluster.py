@@ -91,7 +91,9 @@ def start_executor(client: Client) -> Iterator[ClusterExecutor]:
         require_versions(client)
         yield ClusterExecutor(client)
     except (CommClosedError, KilledWorker, CancelledError) as error:
-        allowed = "a cluster that keeps running; blocks written to a path stay there, and resume=True computes the others"
+        allowed = (
+            "a cluster that keeps running; blocks written to a path stay there; resume=True computes the others (--resume)"
+        )
         raise BadInput("client", f"a cluster that was lost ({type(error).__name__}: {error})", allowed) from error
 
 

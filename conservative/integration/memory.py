@@ -55,7 +55,7 @@ def write_memory(label: str, bodies: Batch, grid: Grid) -> Iterator[Memory]:
     n, m, loaded = len(bodies), grid.n_samples, bodies.scene.loaded
     size = STORED_BYTES + LOAD_BYTES * loaded
     if n * m > (most := most_samples() * SAMPLE_BYTES // size):
-        allowed = f"more steps between samples, or a path: {most:.3g} samples of {size} bytes fit in memory"
+        allowed = f"fewer samples or bodies, or a path (--out): {most:.3g} samples of {size} bytes fit in memory"
         raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
     if n * m * size > LARGE:
         warnings.warn(LargeEnsemble(n * m * size, n, m), stacklevel=4)

@@ -65,8 +65,8 @@ from .scene_record import find_scene, list_differences, record_scene
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
 NEW_FOLDER = "a new folder, in a folder that can be written, on a disk with enough space"
-_ROOM = "a disk with enough space; finished blocks stay there, and resume=True computes the others"
-_WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest"
+_ROOM = "a disk with enough space; finished blocks stay there, and resume=True computes the others (--resume)"
+_WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest (--resume)"
 _RESULTS = ("R_WB", "w_WB_B", "drifts", "outcome", "failure")
 _CHECKSUM_BYTES = 4
 _CHECKSUM, _CHECKSUMS = "checksum", "checksums"
@@ -270,7 +270,9 @@ def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
         raise NotWritten("path", place, error, NEW_FOLDER) from None
     record = read_record(place)
     if not resume:
-        raise BadInput("path", f"{str(place)!r}, where an ensemble is", "a new folder, or resume=True to go on with this one")
+        raise BadInput(
+            "path", f"{str(place)!r}, where an ensemble is", "a new folder, or resume=True (--resume), which goes on"
+        )
     return record
 
 

@@ -9,7 +9,7 @@ World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://da
 
 import numpy as np
 
-from .shared import description_of, halves, stepped
+from .shared import LATER, description_of, halves, stepped
 
 ENGINE = {
     "package": "dartpy",
@@ -62,7 +62,7 @@ def prepare(given):
 
     def begin_later():
         begin()
-        world.setTime(1000.0)
+        world.setTime(LATER)
 
     def read():
         return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}

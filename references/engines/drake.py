@@ -28,7 +28,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from .shared import FIELDS, description_of, field_torque, halves, pack_field, write_urdf
+from .shared import FAR_MASS, FIELDS, LATER, description_of, field_torque, halves, pack_field, write_urdf
 
 ENGINE = {
     "package": "drake",
@@ -62,7 +62,7 @@ def prepare(given):
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
     start = _start(drake, plant, body, inner, given)
-    begin = 1000.0 if description_of(given) == "time" else 0.0
+    begin = LATER if description_of(given) == "time" else 0.0
     times = begin + given.steps * given.dt
 
     def run():
@@ -116,7 +116,7 @@ def _build(drake, given):
     builder = drake.DiagramBuilder()
     plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
     if description_of(given) == "world":
-        plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(3.0, 2.0))
+        plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(FAR_MASS, 2.0))
     if description_of(given) == "file":
         drake.Parser(plant).AddModelsFromString(write_urdf(given), "urdf")
         body = plant.GetBodyByName("body")

@@ -30,7 +30,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .shared import FIELDS, compile_torque, description_of, mujoco_moments, pack_field, write_mjcf
+from .shared import FIELDS, LATER, compile_torque, description_of, mujoco_moments, pack_field, write_mjcf
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 ENGINE = {
@@ -264,7 +264,7 @@ def _start(mj, model, data, given):
     if hasattr(given, "p_WB0"):
         data.qpos[:3], data.qvel[:3] = given.p_WB0, given.v_WB0
     if description_of(given) == "time":
-        data.time = 1000.0
+        data.time = LATER
     state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
     mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)
     return state

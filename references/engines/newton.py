@@ -27,7 +27,7 @@ from functools import partial
 
 import numpy as np
 
-from .shared import description_of, halves, record_warp, write_urdf
+from .shared import FAR_MASS, FAR_PLACE, description_of, halves, record_warp, write_urdf
 
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
@@ -111,8 +111,8 @@ def _model(newton, warp, given):
     body = _add_body(builder, warp, given)
     lever = given.R0 @ given.com
     if description_of(given) == "world":
-        far = warp.transform((1000.0, 200.0, 30.0), (0.0, 0.0, 0.0, 1.0))
-        builder.add_body(xform=far, mass=3.0, inertia=warp.mat33(*(3.0 * np.eye(3)).ravel().tolist()))
+        far = warp.transform(FAR_PLACE, (0.0, 0.0, 0.0, 1.0))
+        builder.add_body(xform=far, mass=FAR_MASS, inertia=warp.mat33(*(FAR_MASS * np.eye(3)).ravel().tolist()))
     builder.body_qd[body] = warp.spatial_vector(*np.cross(given.w0_W, lever).tolist(), *given.w0_W.tolist())
     if given.solver == "VBD":
         builder.color()

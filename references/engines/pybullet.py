@@ -21,7 +21,7 @@ from tempfile import NamedTemporaryFile
 
 import numpy as np
 
-from .shared import description_of, sample, write_urdf
+from .shared import FAR_MASS, FAR_PLACE, description_of, sample, write_urdf
 
 ENGINE = {
     "package": "pybullet",
@@ -55,7 +55,7 @@ def prepare(given):
         bullet.setGravity(0, 0, -given.gravity)
         bullet.setPhysicsEngineParameter(fixedTimeStep=given.dt, numSubSteps=0)
         if description_of(given) == "world":
-            bullet.createMultiBody(3.0, -1, -1, [1000, 200, 30])
+            bullet.createMultiBody(FAR_MASS, -1, -1, list(FAR_PLACE))
         ready[:] = [build(bullet, given)]
 
     def run():

@@ -17,7 +17,7 @@ SAPIEN: https://sapien-sim.github.io/docs/
 
 import numpy as np
 
-from .shared import description_of, stepped
+from .shared import FAR_PLACE, description_of, stepped
 
 ENGINE = {
     "package": "sapien",
@@ -67,7 +67,7 @@ def prepare(given):
     if description_of(given) == "world":
         far = sapien.Entity()
         far.add_component(sapien.physx.PhysxRigidDynamicComponent())
-        far.set_pose(sapien.Pose([1000, 200, 30]))
+        far.set_pose(sapien.Pose(list(FAR_PLACE)))
         scene.add_entity(far)
     start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
     drift = given.v0.astype(np.float32)

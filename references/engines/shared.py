@@ -8,6 +8,12 @@ import numpy as np
 FIELDS = ("UniformGravity", "LinearSpring", "PointAttraction", "GravityGradient", "Turning")
 """All fields that the numbers of a run describe."""
 
+FAR_PLACE, FAR_MASS = (1000.0, 200.0, 30.0), 3.0
+"""Position, m, and mass, kg, of the far body in the description "world"."""
+
+LATER = 1000.0
+"""Initial time, s, in the description "time"."""
+
 PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
 """Arrays of a MuJoCo model that depend on the body."""
 
@@ -169,11 +175,9 @@ def write_mjcf(given, option="", shape=""):
         joint = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")) + '<joint type="ball"/>'
     inertia = f"<inertial {attributes}/>"
     inertia = f"<body>{inertia}</body>" if description == "child" else inertia
-    far = (
-        '<body pos="1000 200 30"><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="3 4 5"/></body>'
-        if description == "world"
-        else ""
-    )
+    x, y, z = FAR_PLACE
+    inertial = f'<inertial pos="0 0 0" mass="{FAR_MASS:g}" diaginertia="3 4 5"/>'
+    far = f'<body pos="{x:g} {y:g} {z:g}"><freejoint/>{inertial}</body>' if description == "world" else ""
     return f"""
         <mujoco>
           {option}

@@ -137,7 +137,7 @@ def _judge(options: dict[str, Any]) -> Document:
         before = baseline.read(path)
         verdicts = [decide(before, run) for run in runs]
         failed = [str(each) for each in verdicts if not each.passed]
-        data = {"passed": not failed, "verdicts": [{"passed": each.passed, **vars(each)} for each in verdicts]}
+        data = {"passed": not failed, "verdicts": [each.record for each in verdicts]}
         texts = [Paragraph(str(each)) for each in verdicts]
         return Document("conservative gate", "Results against the baseline", texts, data=data, failures=failed)
     old = baseline.read(path, also_with_times=True) if path.exists() else None

@@ -1,4 +1,4 @@
-"""One model of a document (`model`) and a renderer for each format: Markdown, HTML, JSON, JUnit and the terminal."""
+"""One model of a document (`model`), and a file with a renderer for each format."""
 
 from __future__ import annotations
 

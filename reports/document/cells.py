@@ -58,8 +58,8 @@ def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED
     """
     if math.isnan(value):
         return Cell(DASH, Grade.NONE, value=value)
-    symbol, graded = ("✓", Grade.GOOD) if value <= limits[0] else ("≈", Grade.FAIR) if value <= limits[1] else ("✗", Grade.BAD)
-    return Cell(f"{symbol} {text or bound(value)}", graded, value=value)
+    graded = Grade.GOOD if value <= limits[0] else Grade.FAIR if value <= limits[1] else Grade.BAD
+    return Cell(graded.mark(text or bound(value)), graded, value=value)
 
 
 def grade_ratio(ratio: float, note: str = "", digits: int = 3, interval: tuple[float, float] = (math.nan, math.nan)) -> Cell:
@@ -70,8 +70,8 @@ def grade_ratio(ratio: float, note: str = "", digits: int = 3, interval: tuple[f
     if math.isnan(ratio):
         return Cell(DASH, Grade.NONE, note, value=ratio)
     low, high = ((1 - SPREAD) * ratio, (1 + SPREAD) * ratio) if math.isnan(interval[0]) else interval
-    symbol, graded = ("✓", Grade.GOOD) if low >= 1 else ("✗", Grade.BAD) if high < 1 else ("≈", Grade.FAIR)
-    return Cell(f"{symbol} {ratio_text(ratio, interval, digits)}", graded, note, value=ratio)
+    graded = Grade.GOOD if low >= 1 else Grade.BAD if high < 1 else Grade.FAIR
+    return Cell(graded.mark(ratio_text(ratio, interval, digits)), graded, note, value=ratio)
 
 
 def ratio_text(ratio: float, interval: tuple[float, float], digits: int = 3) -> str:
@@ -88,8 +88,8 @@ def outcome_text(outcome: Outcome) -> str:
 def outcome_cell(outcome: Outcome, reason: bool = False) -> Cell:
     """Return an outcome with a symbol, and with its reason if `reason`."""
     if outcome.ok:
-        return Cell("✓ done", Grade.GOOD)
-    absent, text = outcome.kind in _ABSENT, outcome_text(outcome)
+        return Cell(Grade.GOOD.mark("done"), Grade.GOOD)
+    graded, text = Grade.NONE if outcome.kind in _ABSENT else Grade.BAD, outcome_text(outcome)
     if reason and outcome.reason not in text:
         text += f": {outcome.reason}"
-    return Cell(f"{DASH if absent else '✗'} {text}", Grade.NONE if absent else Grade.BAD)
+    return Cell(graded.mark(text), graded)

@@ -10,17 +10,26 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ..numbers import DASH
+
 if TYPE_CHECKING:
     from conservative.trajectory import Trajectory
 
 
 class Grade(StrEnum):
-    """Grade of a cell. The page shows it as a colour, in addition to a symbol in the text."""
+    """How a cell looks: a colour on the page, and a symbol in the text. Outcomes, verdicts and standings are elsewhere."""
 
     GOOD = "good"
     FAIR = "fair"
     BAD = "bad"
     NONE = "none"
+
+    def mark(self, text: str) -> str:
+        """Return a text with the symbol."""
+        return f"{_SYMBOLS[self]} {text}"
+
+
+_SYMBOLS = {Grade.GOOD: "✓", Grade.FAIR: "≈", Grade.BAD: "✗", Grade.NONE: DASH}
 
 
 @dataclass(frozen=True)

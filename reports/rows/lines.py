@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
@@ -26,11 +27,12 @@ SURE = 0.5
 """Largest standard error of an order in a short table. Above it, the fit does not tell the order from the next one."""
 
 
-def signed_drifts(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the relative drifts of the study of motions: columns scene, method, family, name, t (s), quantity, drift."""
-    rows = samples[samples["study"] == motion.STUDY.name].rename(columns={"value": "drift"})
-    rows = rows[rows["quantity"].str.startswith(motion.SIGNED) & rows["drift"].notna()]  # not every method has balances
-    rows = rows.assign(quantity=rows["quantity"].str.removeprefix(motion.SIGNED), name=_names(rows))
+def signed_drifts(samples: pd.DataFrame, scene: str, invariants: Iterable[str]) -> pd.DataFrame:
+    """Return the relative drifts of the invariants of a scene: columns scene, method, family, name, t (s), quantity, drift."""
+    rows = samples[(samples["study"] == motion.STUDY.name) & (samples["scene"] == scene)].rename(columns={"value": "drift"})
+    names = {motion.SIGNED + name: name for name in invariants}
+    rows = rows[rows["quantity"].isin(names) & rows["drift"].notna()]  # not every method has balances
+    rows = rows.assign(quantity=rows["quantity"].map(names), name=_names(rows))
     return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
 
 

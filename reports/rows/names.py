@@ -30,7 +30,12 @@ _PADDED = re.compile(r"(?<=\de)-0(?=\d)")
 
 def display_name(family: str, version: str, setting: str) -> str:
     """Return the name of a method in tables and pictures: `mujoco 4.0.0 RK4`, with tolerances such as 1e-6 instead of 1e-06."""
-    return " ".join(filter(None, (family, "" if "@" in family else version, _PADDED.sub("-", setting))))
+    return " ".join(filter(None, (family, "" if _has_version(family) else version, _PADDED.sub("-", setting))))
+
+
+@lru_cache(maxsize=256)
+def _has_version(family: str) -> bool:
+    return bool(family and registry.read_name(family).version)
 
 
 def with_names(rows: pd.DataFrame) -> pd.DataFrame:

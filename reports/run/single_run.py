@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -300,18 +300,29 @@ def is_right(summary: dict[str, Any]) -> bool:
     return bool(summary["outcome"].ok and (attitude is None or attitude <= LARGE))
 
 
-def status_of(summary: dict[str, Any]) -> str:
-    """Return the status of a run in words: its outcome, or that it is inaccurate or may be."""
+class Status(NamedTuple):
+    """The status of a run: its outcome, or that it is inaccurate or may be, and in which respect."""
+
+    short: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return self.short + self.detail
+
+
+def status_of(summary: dict[str, Any]) -> Status:
+    """Return the status of a run."""
     if not summary["outcome"].ok:
-        return str(summary["outcome"])
+        return Status(str(summary["outcome"]))
     choice, attitude = summary.get("choice"), attitude_error(summary)
     if attitude is None:
-        return "ok, but its attitude error is not known"
+        return Status("ok", ", but its attitude error is not known")
+    detail = f": the attitude error is {angle(attitude)} rad"
     if not is_right(summary):
-        return f"inaccurate: the attitude error is {angle(attitude)} rad"
+        return Status("inaccurate", detail)
     if choice and not choice["reached"] and not summary["error"].get("attitude", math.inf) <= choice["error"]:
-        return f"less accurate than asked for: the attitude error is {angle(attitude)} rad"
-    return "ok"
+        return Status("less accurate than asked for", detail)
+    return Status("ok")
 
 
 def bounded_grid(scene: Scene, dt: float | None, t_end: float | None) -> Grid:

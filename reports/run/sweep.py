@@ -179,15 +179,10 @@ def run_sweep(sweep: Sweep, step: Step) -> tuple[Ensemble, Summary]:
 
 def _in_options(error: BadInput) -> BadInput:
     """Return an error about an argument as an error about its option."""
-    allowed = error.allowed.replace("resume=True", "--resume")
     argument = _OPTIONS.get(error.argument, error.argument)
-    if argument == "samples":
-        allowed = allowed.replace(
-            "more steps between samples, or a path", "fewer samples or starts, or a folder for them, --out"
-        )
     if isinstance(error, NotWritten):
-        return NotWritten(argument, error.path, error.cause, allowed)
-    return BadInput(argument, error.got, allowed)
+        return NotWritten(argument, error.path, error.cause, error.allowed)
+    return BadInput(argument, error.got, error.allowed)
 
 
 def summarize(sweep: Sweep, ensemble: Ensemble, times: Summary) -> Summary:

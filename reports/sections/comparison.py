@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
 from typing import Any
 
-from conservative.benchmarks.gate.compare import Violation
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
+from conservative.benchmarks.measures.change import Change
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.prices import Price
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectComparison, ProjectLine, decide, faster
+from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, Standing, decide, standing_of
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
 from ..document.cells import DASH, number, numeric
@@ -52,19 +51,6 @@ EXPLANATION = (
 )
 
 
-class Standing(StrEnum):
-    """The result of a row, in the order of the table."""
-
-    MOTION = "another motion"
-    SLOWER = "slower"
-    WORSE = "worse"
-    PAID = "slower, accepted"
-    FASTER = "faster"
-    NEW = "new"
-    SAME = "same"
-    NOTHING = "not compared"
-
-
 _GRADES = {
     **dict.fromkeys((Standing.MOTION, Standing.SLOWER, Standing.WORSE), Grade.BAD),
     **{Standing.PAID: Grade.FAIR, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE},
@@ -76,7 +62,7 @@ def build(
 ) -> Document:
     """Return the document of a comparison; `made` names how and where it was measured, `prices` longer times by method."""
     versions, decided, made = comparison.versions, decide(comparison, prices or {}), made or {}
-    findings = [each.finding for each in decided.violations]
+    findings = [change.finding for change in decided.violations]
     timed = sum(line.times is not None for line in comparison.lines)
     rows, violations = len(comparison.lines), len(findings)
     verdict = (
@@ -85,8 +71,8 @@ def build(
     )
     # A check for each row, and one for each violation that belongs to no row.
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
-    for each in decided.violations:
-        failed.setdefault((each.scene, each.method), []).append(each.finding)
+    for change in decided.violations:
+        failed.setdefault((change.row.scene, change.row.method), []).append(change.finding)
     packages = [(each.title, each.environment.runtime, ", ".join(each.packages)) for each in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
     notes = Items.of(f"note: {note}" for note in decided.notes)
@@ -97,7 +83,7 @@ def build(
             when: {"name": version.name, "commit": version.commit, "packages": version.packages}
             for when, version in zip(("was", "is"), versions, strict=True)
         },
-        "violations": decided.violations,
+        "violations": [change.texts for change in decided.violations],
         "notes": decided.notes,
         "rows": [_record(line) for line in comparison.lines],
     }
@@ -119,11 +105,9 @@ def build(
     )
 
 
-def table(comparison: ProjectComparison, violations: Sequence[Violation]) -> Table:
+def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
     """Return the rows: failed ones first, then those with the largest change of time."""
-    failed = [(each.scene, each.method, each.measure) for each in violations]
-    measures = [[name for *row, name in failed if row == [line.scene, line.setting]] for line in comparison.lines]
-    standings = [(_standing(line, worse), line) for line, worse in zip(comparison.lines, measures, strict=True)]
+    standings = [(standing_of(line, violations), line) for line in comparison.lines]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:
         ratio = _ratio(entry[1])
@@ -134,8 +118,8 @@ def table(comparison: ProjectComparison, violations: Sequence[Violation]) -> Tab
 
 def _row(line: ProjectLine, standing: Standing) -> Row:
     (was, now), time, ratio, graded = line.results, line.times, _ratio(line), _GRADES.get(standing)
-    mark = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}.get(graded or Grade.NONE, "")
-    cells: list[str | Cell] = [line.scene, line.setting, Cell(f"{mark}{standing}", graded)]
+    text = graded.mark(standing) if graded in (Grade.GOOD, Grade.BAD) else standing
+    cells: list[str | Cell] = [line.scene, line.setting, Cell(text, graded)]
     if ratio is None:
         cells += [DASH, DASH]
     else:
@@ -157,22 +141,12 @@ def _ratio(line: ProjectLine) -> Ratio | None:
     return None if ratio is None or math.isnan(ratio.value) else ratio
 
 
-def _standing(line: ProjectLine, failed: Sequence[str]) -> Standing:
-    if failed:
-        return Standing.MOTION if MOTION in failed else Standing.SLOWER if TIME in failed else Standing.WORSE
-    if line.results[0] is None:
-        return Standing.NEW
-    if line.times is None:
-        return Standing.NOTHING
-    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
-
-
 def _record(line: ProjectLine) -> dict[str, Any]:
     record: dict[str, Any] = {"scene": line.scene, "method": line.setting, "was": None, "is": None, "time": None}
     for when, row in zip(("was", "is"), line.results, strict=True):
         if row is not None:
             values = {"values": row.values, "spreads": row.spreads}
-            record[when] = {"status": row.status, "reason": row.reason, "mistake": row.mistake, "cause": row.cause, **values}
+            record[when] = {"outcome": row.outcome, "mistake": row.mistake, "cause": row.cause, **values}
     if (time := line.times) is not None:
         again = {} if time.again is None else {"again": time.again}
         ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}

@@ -35,7 +35,8 @@ def section(measured: Measured, found: Sequence[Result]) -> Section:
 
 def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None = None) -> Figure | None:
     """Return the drift over time on a scene, of all methods or of some next to the exact motion; None without samples."""
-    drifts = _select(measured, of_scene(lines.signed_drifts(measured.samples), scene.name), methods)
+    invariants = [invariant.name for invariant in scene.invariants]
+    drifts = _select(measured, lines.signed_drifts(measured.samples, scene.name, invariants), methods)
     if drifts.empty:
         return None
     picture = figures.signed_drift(drifts)

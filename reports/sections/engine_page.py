@@ -50,10 +50,10 @@ def pages(measured: Measured) -> dict[str, Document]:
     table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
     points = points_over(table, OVER_STEPS)
     scenes = {scene.name: engine_rows(table, scene.name, points) for scene in measured.plan.scenes}
-    labels = dict.fromkeys(row.engine for rows in scenes.values() for row in rows)
+    measured_ones = dict.fromkeys((row.family, row.version) for rows in scenes.values() for row in rows)
     families: dict[str, list[str]] = {}
-    for label in sorted(labels, key=lambda label: version_key(label.partition("==")[2]), reverse=True):
-        families.setdefault(label.partition("==")[0], []).append(label)
+    for family, version in sorted(measured_ones, key=lambda engine: version_key(engine[1]), reverse=True):
+        families.setdefault(family, []).append(version)
     found = dict[str, Document]()
     for family, versions in families.items():
         page = attempt(f"The page of {family}", partial(_page, measured, family, versions, scenes))
@@ -77,53 +77,56 @@ def _badge(verified: Sequence[Verified], version: str) -> str:
 def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
     for scene in measured.plan.scenes:
-        if shown := chosen(scenes[scene.name], newest):
+        if shown := chosen(scenes[scene.name], family, newest):
             facts.append(Item("; ".join(map(_sentence, shown)) + ".", scene.name))
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
-    blocks.append(Section("Since which version", _since(versions, scenes)))
-    found = [each for each in measured.measurements.verified if each.names["engine"].partition("@")[0] == family]
+    blocks.append(Section("Since which version", _since(family, versions, scenes)))
+    found = [each for each in measured.measurements.verified if each.names["engine"] == family]
     if found:
         blocks.append(attempt("The section 'verification'", partial(verified_engines.section, found)))
     blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
-    name = newest.replace("==", " ")
+    name = _title(family, newest)
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
     facts.append(Item(TERMS))
-    return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest.partition("==")[2]))
+    return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest))
+
+
+def _title(family: str, version: str) -> str:
+    return f"{family} {version}".rstrip()
 
 
 def _sentence(row: EngineRow) -> str:
-    name, energy = f"{row.taken or 'run'} ({row.setting or 'default'})", str(row.cells["energy drift"]).lstrip("✓≈✗ ")
+    name, energy = f"{row.taken or 'run'} ({row.setting or 'default'})", row.energy_text
     found = f"attitude error {angle(row.error)} rad, energy drift {energy}"
     return f"{name}: {found if row.outcome.ok else row.outcome}"
 
 
-def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
+def _since(family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
     """Return from which measured version on the errors are those of the newest one, and the errors of all versions."""
     if len(versions) == 1:
-        family, _, version = versions[0].partition("==")
         command = f"`conservative track {family} --last 3` finds the version since which an error changed."
-        return [Paragraph(f"Only {version or 'one version'} was measured here. {command}")]
+        return [Paragraph(f"Only {versions[0] or 'one version'} was measured here. {command}")]
     kinds, items, tables = (AS_INSTALLED, AT_ITS_BEST), list[Item](), list[Block]()
     for scene, rows in scenes.items():
-        every = [chosen(rows, version) for version in versions]
+        every = [chosen(rows, family, version) for version in versions]
         shown = [{kind: row for row in each for kind in kinds if row.taken in (kind, "both")} for each in every]
         for kind in kinds:
             errors = [each[kind].error if kind in each else math.nan for each in shown]
             same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN
             if same[0]:
                 count = (*same, False).index(False)
-                since = f"since {'at least ' * (count == len(errors))}{versions[count - 1].partition('==')[2]}"
+                since = f"since {'at least ' * (count == len(errors))}{versions[count - 1]}"
                 text = f"{kind}: {angle(errors[0])} rad {since}"
                 if count < len(errors):
-                    text += f", {angle(errors[count])} rad in {versions[count].partition('==')[2]}"
+                    text += f", {angle(errors[count])} rad in {versions[count]}"
                 items.append(Item(text, scene))
         body = list[Row]()
         for version, each in zip(versions, shown, strict=True):
             found = [each.get(kind) for kind in kinds]
             cells = [cell for row in found for cell in ((row.setting, row.cells["error, rad"]) if row else (DASH, DASH))]
-            body.append([version.replace("==", " "), *cells])
+            body.append([_title(family, version), *cells])
         header = ["version", *(name for kind in kinds for name in (kind, "error, rad"))]
         tables.append(Table(header, body, f"{scene}: versions"))
     return [Items(items), *tables]
@@ -132,9 +135,10 @@ def _since(versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[
 def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[str]:
     """Return the commands that repeat a page."""
     plan = measured.plan
-    apart = {f"{each.maker}" for each in plan.engines if isinstance(each, EngineMethod)}
-    names = list(dict.fromkeys(each.replace("==", "@") if each in apart else family for each in versions))
-    install = " ".join(name for name in names if "@" in name)
+    apart = {(each.maker.package, each.maker.version) for each in plan.engines if isinstance(each, EngineMethod)}
+    own = [f"{family}@{version}" for version in versions if (family, version) in apart]
+    names = [*own, *([family] if len(own) < len(versions) else [])]
+    install = " ".join(own)
     scenes = shlex.quote(",".join(plan.arguments.get(scene.name, scene.name) for scene in plan.scenes))
     command = f"conservative report --methods reduced --scenes {scenes} --engines {','.join(names)}" + " --quick" * plan.quick
     commands = [command, f"conservative verify {' '.join(names)}"]

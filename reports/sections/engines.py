@@ -70,7 +70,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class EngineRow:
-    """One setting of one engine on one scene: such as `exudyn==1.13.6`, label `exudyn==1.13.6/RK44`, setting `RK44`.
+    """One setting of one engine on one scene: such as family `exudyn`, version `1.13.6` and setting `RK44`.
 
     The outcome is that of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
     `second_time` the wall time, s, of a simulated second at an error of `ERROR`; NaN if not measured or not reached. `series`
@@ -78,7 +78,8 @@ class EngineRow:
     a smaller error. `cells` are those of `COLUMNS` by name, except "taken".
     """
 
-    engine: str
+    family: str
+    version: str
     label: str
     setting: str
     series: str
@@ -87,7 +88,13 @@ class EngineRow:
     error: float
     second_time: float
     cells: Mapping[str, Cell]
+    energy_text: str = DASH
     best: bool = False
+
+    @property
+    def engine(self) -> str:
+        """Engine with version, as in its label."""
+        return "==".join(filter(None, (self.family, self.version)))
 
     @property
     def taken(self) -> str:
@@ -214,7 +221,8 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
         outcome_cell(outcome, reason=True),
     )
     return EngineRow(
-        engine="==".join(filter(None, (first["engine"].partition("@")[0], first["version"]))),
+        family=str(first["engine"]),
+        version=str(first["version"]),
         label=str(first["label"]),
         setting=str(first["setting"]),
         series=series,
@@ -223,6 +231,7 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
         error=error,
         second_time=second_time,
         cells=dict(zip([name for name, _ in COLUMNS[1:]], cells, strict=True)),
+        energy_text=_drift_text(rows, "energy"),
     )
 
 
@@ -232,17 +241,23 @@ def _value(rows: pd.DataFrame, measure: Measure) -> float:
 
 
 def _drift(rows: pd.DataFrame, quantity: str) -> Cell:
-    """Return a graded drift; the direction is given if it is more than small."""
+    """Return a graded drift."""
+    drift = of_measure(rows, Measure.DRIFT_MAX, quantity)
+    return grade(float(drift["value"].iloc[0]) if len(drift) else math.nan, _drift_text(rows, quantity))
+
+
+def _drift_text(rows: pd.DataFrame, quantity: str) -> str:
+    """Return a drift as text, with its direction if it is more than small."""
     drift = of_measure(rows, Measure.DRIFT_MAX, quantity)
     size = float(drift["value"].iloc[0]) if len(drift) else math.nan
-    return grade(size, f"{bound(size)} {drift['detail'].iloc[0]}".rstrip() if size > SMALL else "")
+    return " ".join(filter(None, (bound(size), drift["detail"].iloc[0] if size > SMALL else "")))
 
 
 def _turns(turns: float, expected: float) -> Cell:
     if math.isnan(turns) or math.isnan(expected):
         return Cell(DASH)
-    right = turns == expected
-    return Cell(f"{'✓' if right else '✗'} {turns:.0f} of {expected:.0f}", Grade.GOOD if right else Grade.BAD)
+    graded = Grade.GOOD if turns == expected else Grade.BAD
+    return Cell(graded.mark(f"{turns:.0f} of {expected:.0f}"), graded)
 
 
 def _order(line: pd.DataFrame, expected: float) -> Cell:
@@ -256,7 +271,7 @@ def _order(line: pd.DataFrame, expected: float) -> Cell:
         return numeric(order, f"{DASH} not seen ({expected:.0f})")
     text = f"{order:.2f} ± {_value(line, Measure.ORDER_STDERR):.2f} ({expected:.0f})"
     low = order < expected - FAR_FROM_ORDER
-    return Cell(f"✗ {text}" if low else text, Grade.BAD if low else None, value=order)
+    return Cell(Grade.BAD.mark(text), Grade.BAD, value=order) if low else numeric(order, text)
 
 
 def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
@@ -278,9 +293,9 @@ def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
     return Table(["engine==version/setting", *names], shown, caption, Style.FILTERED)
 
 
-def chosen(rows: Sequence[EngineRow], engine: str) -> list[EngineRow]:
-    """Return the rows of an engine as installed and at its best, one if they are the same; without an error its first row."""
-    mine = [row for row in rows if row.engine == engine]
+def chosen(rows: Sequence[EngineRow], family: str, version: str) -> list[EngineRow]:
+    """Return a version as installed and at its best, one row if they are the same; without an error its first row."""
+    mine = [row for row in rows if (row.family, row.version) == (family, version)]
     installed = [row for row in mine if row.as_installed][:1]
     return [*installed, *(row for row in mine if row.best and row not in installed)] or mine[:1]
 
@@ -296,6 +311,6 @@ def comparison_cells(row: EngineRow, parts: Sequence[str]) -> list[str | Cell]:
 def side_by_side(rows: Sequence[EngineRow], scene: str) -> Table:
     """Return each engine as installed and with its best setting, the most accurate first."""
     parts = ("error, rad", "energy drift", "turns over", "bits")
-    engines = dict.fromkeys(row.engine for row in rows)
-    body = [[engine, *comparison_cells(row, parts)] for engine in engines for row in chosen(rows, engine)]
+    engines = dict.fromkeys((row.family, row.version) for row in rows)
+    body = [[row.engine, *comparison_cells(row, parts)] for engine in engines for row in chosen(rows, *engine)]
     return Table(["engine", "setting", *parts], body, f"{scene}: each engine", Style.FILTERED)

@@ -118,5 +118,5 @@ def _longest(records: list[Record]) -> Cell:
         return outcome_cell(Outcome(OutcomeKind(ends[0]))) if ends else _NOT_RUN
     text = f"{number(max(steps))} rad"
     if ends:
-        return Cell(f"≈ {text}, then {ends[0]}", Grade.FAIR, value=max(steps))
-    return Cell(f"✓ {text} and more", Grade.GOOD, value=max(steps))
+        return Cell(Grade.FAIR.mark(f"{text}, then {ends[0]}"), Grade.FAIR, value=max(steps))
+    return Cell(Grade.GOOD.mark(f"{text} and more"), Grade.GOOD, value=max(steps))

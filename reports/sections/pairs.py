@@ -51,7 +51,7 @@ def _grouped(wrong: Sequence[PairFinding]) -> list[list[PairFinding]]:
     """Return the pairs of one engine and body that differ in the same way, together."""
     groups: dict[tuple[str, str, str], list[PairFinding]] = {}
     for each in wrong:
-        kind = each.detail if each.scale is None else each.pair.partition(" x ")[0]
+        kind = each.detail if each.scale is None else each.quantity
         groups.setdefault((each.subject, each.body, kind), []).append(each)
     return list(groups.values())
 

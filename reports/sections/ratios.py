@@ -68,11 +68,13 @@ def ratio_cell(speed_ratio: SpeedRatio) -> Cell:
     """Return the ratio, or the side that is alone in reaching the error."""
     if speed_ratio.ours and speed_ratio.theirs:
         return grade_ratio(speed_ratio.ratio, digits=2, interval=speed_ratio.interval)
-    return Cell("✗ engine only", Grade.BAD) if speed_ratio.theirs else Cell("✓ ours only", Grade.GOOD)
+    return (
+        Cell(Grade.BAD.mark("engine only"), Grade.BAD) if speed_ratio.theirs else Cell(Grade.GOOD.mark("ours only"), Grade.GOOD)
+    )
 
 
 def _random_cell(ratios: RandomRatios) -> Cell:
     note = f"{ratios.lost} of {len(ratios.speed_ratios)}" if ratios.lost else ""
     if ratios.lost and not ratios.both:
-        return Cell("✗ engine only", Grade.BAD, note)
+        return Cell(Grade.BAD.mark("engine only"), Grade.BAD, note)
     return grade_ratio(ratios.ratio, note, digits=2, interval=ratios.interval)

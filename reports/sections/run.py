@@ -17,7 +17,7 @@ def build(summaries: Sequence[dict[str, Any]]) -> Document:
     """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
     first = next(each for each in summaries if each["outcome"].kind is not OutcomeKind.UNSUPPORTED)
     title = f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s"
-    data = [summary | {"status": status_of(summary)} for summary in summaries]
+    data = [summary | {"status": str(status_of(summary))} for summary in summaries]
     blocks: list[Block] = [Facts(list(_facts(first)))]
     if len(summaries) > 1:
         advice = dict.fromkeys(f"More accurate: {_advice(each['error'])}" for each in summaries if "better" in each["error"])
@@ -29,7 +29,7 @@ def build(summaries: Sequence[dict[str, Any]]) -> Document:
 def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "scene", summary["scene"]
     yield "method", summary["label"]
-    yield "status", status_of(summary)
+    yield "status", str(status_of(summary))
     if choice := summary["choice"]:
         yield "chosen for", f"an attitude error of {choice['error']:g} rad; estimated {angle(choice['estimate'])} rad"
     if "better" in summary["error"]:
@@ -75,7 +75,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
     rows = [
         [
             summary["typed"],
-            status_of(summary) if not summary["outcome"].ok else status_of(summary).partition(":")[0].partition(",")[0],
+            status_of(summary).short,
             *(_cell(summary.get("drift", {}).get(name)) for name in drifts),
             *(_cell(summary["error"].get(name), shown) for name, shown in (("attitude", angle), ("rate", bound))),
             f"{summary['counters']['steps']:,}" if "counters" in summary else DASH,

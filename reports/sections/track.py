@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from conservative.benchmarks.measures.change import Change, Range
 from conservative.benchmarks.measures.convergence_order import Order
-from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
-from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Range, ratio
+from conservative.benchmarks.versions.changes import Aspect, Transition, list_transitions
+from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, ratio
 from conservative.benchmarks.versions.times import Ratio
 from conservative.outcome import Outcome, OutcomeKind
 
@@ -79,7 +80,10 @@ def build(
                 **{"scene": each.now.scene, "setting": each.now.setting, "from": each.was.version, "to": each.now.version},
                 "sentence": changes_text(each),
                 "lost": bool(each.lost),
-                "changes": [{"aspect": c.aspect.value, "quantity": c.quantity, "lost": c.lost} for c in each.changes],
+                "changes": [
+                    {"aspect": c.row.measure, "quantity": c.row.quantity, "allowed": c.allowed, "lost": c.lost}
+                    for c in each.changes
+                ],
             }
             for each in transitions
             if each.changes
@@ -179,7 +183,7 @@ def changes_text(transition: Transition) -> str:
 
 
 def _change_text(change: Change) -> str:
-    name = f"{change.quantity} {change.aspect.value}".strip()
+    name = f"{change.row.quantity} {change.row.measure}".strip()
     match change.was, change.now:
         case Outcome() as was, Outcome() as now:
             return f"{name} {outcome_text(was)} → {now if now.kind is OutcomeKind.CRASHED else outcome_text(now)}"
@@ -189,7 +193,7 @@ def _change_text(change: Change) -> str:
         case Range(), Ratio() as now:
             return f"{name} {_ratio_text(now)} times as long"
         case Range(before), Range(after):
-            drift = change.aspect is Aspect.DRIFT
+            drift = change.row.measure == Aspect.DRIFT
             return f"{name} {' → '.join(map(drift_text if drift else number, (before, after)))}{'' if drift else ' rad'}"
     raise AssertionError(change)
 

@@ -41,6 +41,7 @@ class Result:
     """
 
     method: str
+    family: str
     name: str
     line: str
     ours: bool
@@ -51,11 +52,6 @@ class Result:
     error: float
     order: float
     time: float
-
-    @property
-    def family(self) -> str:
-        """Name of the method without its setting."""
-        return self.method.partition(":")[0]
 
 
 def results(measured: Measured) -> list[Result]:
@@ -73,12 +69,14 @@ def results(measured: Measured) -> list[Result]:
     few = rows["method"].isin(charts) & ((rows["role"] == Role.ENGINE) | rows["family"].isin(families))
     found = []
     for method, run in rows[few | rows["method"].isin([each.name for each in plan.named])].groupby("method", sort=False):
-        name, line, role, dt = run[["name", "line", "role", "dt"]].iloc[0]
+        family, name, line, role, dt = run[["family", "name", "line", "role", "dt"]].iloc[0]
         values = [of_measure(run, Measure.ATTITUDE_MAX)["value"].max()]
         values += [known.get(method, math.nan) for known in (orders, times)]
         pictured, drifts = bool(few[run.index[0]]), largest_drifts(run, scene)
         numbers = map(float, values)
-        found.append(Result(str(method), name, line, role != Role.ENGINE, pictured, dt, outcomes(run)[0], drifts, *numbers))
+        found.append(
+            Result(str(method), family, name, line, role != Role.ENGINE, pictured, dt, outcomes(run)[0], drifts, *numbers)
+        )
     return sorted(found, key=lambda each: (each.ours, math.isnan(each.error), -each.error))
 
 

@@ -142,8 +142,12 @@ def mistakes(findings: Iterable[Finding]) -> Items:
     """Return the wrong cases by what explains them, the explanation of the most cases first."""
     wrong = [each for each in findings if each.verdict is Verdict.WRONG]
     groups = sorted(grouped(wrong, lambda each: (each.check, named_by(each))), key=lambda group: -len(group[1]))
-    items = [Item(explanation(some[0]), f"{check}: {_cases_of(some)}".removesuffix(": "), True) for (check, _), some in groups]
+    items = [Item(explanation(some[0]), _named(check, _cases_of(some)), True) for (check, _), some in groups]
     return Items(items)
+
+
+def _named(name: str, detail: str) -> str:
+    return f"{name}: {detail}" if detail else name
 
 
 def explanation(finding: Finding) -> str:
@@ -200,7 +204,7 @@ def _remarks(findings: Sequence[Finding]) -> Items:
     told = (each for each in findings if each.verdict is Verdict.RIGHT and each.detail and each.check != "order")
     undecided = (each for each in findings if each.verdict is Verdict.UNDECIDED)
     groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
-    return Items([Item(text, f"{check}: {_cases_of(some)}".removesuffix(": ")) for (check, text), some in groups])
+    return Items([Item(text, _named(check, _cases_of(some))) for (check, text), some in groups])
 
 
 def numbers(findings: Sequence[Finding]) -> list[str]:
@@ -237,9 +241,9 @@ def _verdict(verdict: Verdict) -> Cell:
 def _check(subject: str, finding: Finding) -> Check:
     """Return a finding as a test case. A case that is undecided or not tested is skipped, which says why."""
     why = explanation(finding)
-    name = f"{finding.check}: {finding.case}".removesuffix(": ")
+    name = _named(finding.check, finding.case)
     if finding.verdict is Verdict.WRONG:
         return Check(subject, name, failure=why or str(finding.verdict))
     if finding.verdict is Verdict.RIGHT:
         return Check(subject, name, output=why)
-    return Check(subject, name, skipped=f"{finding.verdict}: {why}".removesuffix(": "))
+    return Check(subject, name, skipped=_named(finding.verdict, why))

@@ -103,5 +103,6 @@ def over_steps(engine, setting, errors, order, **fields):
 
 def _row(engine, setting, measure, value, dt, study="engines_over_steps", **fields):
     family, _, version = engine.partition("==")
-    names = {"label": f"{engine}/{setting}", "family": family, "version": version, "setting": setting, "role": "engine"}
+    names = {"family": family, "engine": family.partition("@")[0], "version": version, "setting": setting}
+    names |= {"label": f"{engine}/{setting}", "role": "engine"}
     return rows.row(study, f"{family}@{version}:{setting}", measure, value, dt, scene=SCENE, **names, **fields)

@@ -154,7 +154,7 @@ def test_the_exact_motion_has_one_name_and_methods_without_a_balance_no_line():
         "family": methods,
     }
     more = {"line": ["precise 256 bits", "reduced", "scipy"], "role": ["truth", "ours", "engine"], "value": [0.0, 1e-9, np.nan]}
-    assert lines.signed_drifts(pd.DataFrame(columns | more))["name"].tolist() == ["exact", "reduced"]
+    assert lines.signed_drifts(pd.DataFrame(columns | more), "s", ["energy balance"])["name"].tolist() == ["exact", "reduced"]
 
 
 def test_an_uncertain_fit_has_neither_a_bold_stretch_nor_a_guide():

@@ -10,11 +10,12 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.gate.results import Status
-from conservative.benchmarks.versions.project import decide
+from conservative.benchmarks.versions import project, version
+from conservative.benchmarks.versions.project import Standing, decide
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 from conservative.reports.document import text as text_of
-from conservative.reports.sections.comparison import EXPLANATION, Standing, build, table
+from conservative.reports.sections.comparison import EXPLANATION, build, table
 from conservative.reports.terminal import progress
 
 from ..benchmarks.versions.made_up import comparison, row, timed
@@ -39,7 +40,7 @@ def document(*compared, **others):
 
 
 SLOWER = document(time=timed(SLOW, SLOW))
-FAILED = row("diverged at 1 s", status=Status.FAILED)
+FAILED = row(Outcome(OutcomeKind.DIVERGED))
 STANDINGS = {
     Standing.SAME: answer(),
     Standing.SLOWER: answer(time=timed(SLOW, SLOW)),
@@ -111,15 +112,18 @@ def test_the_page_has_rows_ratios_and_filters():
 # ---------------------------------------------------------------------------------------------------------------- the command
 
 
-gate_module = sys.modules["conservative.reports.cli.gate"]  # its package has the command under the same name
-
-
 @pytest.fixture
 def gate(monkeypatch):
-    """Return exit code and output of the command, where a comparison has ended."""
+    """Return exit code and output of the command; its versions are not installed, and their comparison is `measured`."""
 
-    def run(*arguments, ended=SLOWER):
-        monkeypatch.setattr(gate_module, "_compare", lambda options: ended)
+    def run(*arguments, measured=answer(time=timed(SLOW, SLOW))):  # noqa: B008
+        def compare(base, head, **asked):
+            asked.pop("tell"), asked.pop("explain")
+            run.asked = {"base": base, "head": head, **asked}
+            return measured
+
+        monkeypatch.setattr(version, "install_version", lambda name, project, source, requirements: (name, requirements))
+        monkeypatch.setattr(project, "compare_projects", compare)
         done = CliRunner().invoke(main, ["gate", *map(str, arguments)])
         return done.exit_code, done.output
 
@@ -129,13 +133,18 @@ def gate(monkeypatch):
 def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     files = {name: tmp_path / f"gate.{name}" for name in ("html", "markdown", "junit")}
     options = [text for name, path in files.items() for text in (f"--{name}", path)]
-    code, text = gate("--against", "main", *options)
+    code, text = gate(
+        "--against", "main", "--project", "v2", "--scenes", "brick_flip", "--processes", "3", "--with", "numpy", *options
+    )
+    assert gate.asked == {"base": ("main", ("numpy",)), "head": ("v2", ("numpy",)), "scenes": ["brick_flip"], "processes": 3}
     assert code == 1
-    assert text.splitlines() == [block.text for block in SLOWER.brief[:1]] + [f"  {each}" for each in SLOWER.failures]
-    assert files["markdown"].read_text() == text_of(SLOWER, "markdown")
-    assert files["html"].read_text() == text_of(SLOWER, "html")
-    assert files["junit"].read_text() == text_of(SLOWER, "junit")
-    assert gate("--against", "main", ended=document())[0] == 0
+    assert "gate: FAILED, 1 row, 1 timed, 1 violation" in text
+    assert "time of a step, brick_flip, reduced: was 1e-06 s, is 1.100 times as long" in text
+    assert "| brick_flip | reduced | ✗ slower | 1.100 |" in files["markdown"].read_text()
+    assert "<title>conservative gate" in files["html"].read_text()
+    assert ElementTree.fromstring(files["junit"].read_text()).find("testsuite").get("failures") == "1"
+    assert gate("--against", "main", "--accept-slower", "reduced=1.2x: more digits")[0] == 0
+    assert gate("--against", "main", measured=answer())[0] == 0
 
 
 @pytest.mark.parametrize("options", [("--update", "why"), ("--baseline", "kept.json"), ("results.json",)])
@@ -156,7 +165,7 @@ def test_options_of_two_versions_need_two(gate, options):
 
 def test_junit_has_violations_that_belong_to_no_row():
     nothing = answer(was=None)  # no row of the earlier version has passed: everything would
-    assert [each.measure for each in decide(nothing).violations] == ["rows"]
+    assert [each.row.measure for each in decide(nothing).violations] == ["rows"]
     suite = ElementTree.fromstring(text_of(build(nothing), "junit")).find("testsuite")
     assert suite.get("failures") == "1"
     assert "rows" in suite.find(".//failure").get("message")
@@ -167,8 +176,8 @@ def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_p
     monkeypatch.delitem(sys.modules, "conservative.reports.document.html", raising=False)
     markdown = tmp_path / "gate.md"
     assert gate("--against", "main", "--markdown", markdown)[0] == 1
-    assert gate("--against", "main", "--markdown", markdown, ended=document())[0] == 0
-    code, text = gate("--against", "main", "--html", tmp_path / "page.html", ended=None)
+    assert gate("--against", "main", "--markdown", markdown, measured=answer())[0] == 0
+    code, text = gate("--against", "main", "--html", tmp_path / "page.html", measured=None)
     assert (code, "conservative-rotation[report]" in text) == (2, True)
     assert not (tmp_path / "page.html").exists()
 
@@ -188,7 +197,7 @@ def test_progress_on_a_terminal_without_rich_is_a_line_after_a_while(monkeypatch
 @pytest.mark.parametrize("package", ["uv", "heyoka"])
 def test_a_missing_extra_exits_with_2_before_any_work(gate, monkeypatch, package):
     monkeypatch.setattr("conservative.errors.find_spec", lambda name: None if name == package else name)
-    code, text = gate("--against", "main", ended=None)
+    code, text = gate("--against", "main", measured=None)
     assert (code, package in text) == (2, True)
 
 
@@ -196,7 +205,7 @@ def test_a_missing_extra_exits_with_2_before_any_work(gate, monkeypatch, package
 def test_a_file_of_somebody_else_is_not_replaced(gate, tmp_path, option):
     notes = tmp_path / "notes"
     notes.write_text("mine")
-    code, _ = gate("--against", "main", option, notes, ended=None)
+    code, _ = gate("--against", "main", option, notes, measured=None)
     assert (code, notes.read_text()) == (2, "mine")
     for more in (["--force"], []):  # then its own result of before
         assert gate("--against", "main", option, notes, *more)[0] == 1

@@ -22,7 +22,8 @@ def test_drifts_of_motions_have_their_sign_and_the_name_without_a_tolerance():
     who = {"method": "engine:tol=1e-9", "label": "", "series": "engine", "family": "engine", "setting": "tol=1e-9"}
     common = {"study": "motion", "scene": "made_up", "role": Role.ENGINE, "dt": 0.1, **who}
     found = [Samples(quantity=f"drift of {name}", t=T, value=-T, **common) for name in ("energy", "momentum")]
-    drifts = lines.signed_drifts(with_names(measurement.samples_frame([*found, Samples(quantity="x", t=T, value=T, **common)])))
+    rows = with_names(measurement.samples_frame([*found, Samples(quantity="x", t=T, value=T, **common)]))
+    drifts = lines.signed_drifts(rows, "made_up", ("energy", "momentum"))
     assert drifts.groupby("quantity")["drift"].min().to_dict() == {"energy": -T.max(), "momentum": -T.max()}
     assert set(drifts["name"]) == {"engine"}
 

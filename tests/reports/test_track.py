@@ -105,7 +105,7 @@ def test_json_has_every_figure_and_change():
     assert row["step_times_s"] == list(TIMES)
     (change,) = found["changes"]
     assert (change["from"], change["to"], change["lost"]) == ("1.0", "2.0", True)
-    assert {"aspect": "drift", "quantity": "energy", "lost": True} in change["changes"]
+    assert {"aspect": "drift", "quantity": "energy", "allowed": "within a factor of 3", "lost": True} in change["changes"]
 
 
 def test_missing_measurements_are_null_in_json():

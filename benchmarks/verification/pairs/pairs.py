@@ -5,7 +5,6 @@ Symbols: W is the world, F the axes of the first description, G the axes of the 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -14,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, rotation_about, to_quaternion
-from conservative.body import RigidBody
-from conservative.errors import ImpossibleInertia
+from conservative.body import RigidBody, find_impossible
 from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.engine import principal_axes
@@ -77,12 +75,15 @@ class Description:
         return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
     @property
+    def possible(self) -> bool:
+        """True if a mass distribution has this inertia."""
+        return not find_impossible(np.linalg.eigvalsh(self.inertia))
+
+    @property
     def scene(self) -> Scene:
         """The same motion as a scene. The attitude of a free body does not depend on its mass and its centre."""
         field = UniformGravity(self.mass * self.gravity, self.com) if self.gravity else None
-        with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # of reduced bodies
-            body = RigidBody(self.joint_inertia)
-        return Scene("pair", body, self.R0, self.w0, self.dt * self.n_steps, field)
+        return Scene("pair", RigidBody(self.joint_inertia), self.R0, self.w0, self.dt * self.n_steps, field)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -126,6 +127,10 @@ class Pair:
         True if equal arithmetic gives equal bits. A difference then does not go away with the step.
     variant
         The variant of descriptions that the engine must have; a method of this package has only "frame".
+    place
+        The place of the second description in a batch, from 1, and the number of its bodies, if it runs "beside" others.
+    quantity
+        The quantity that is scaled: length, mass or time.
     scales
         Factors by which the second description is scaled, each tried. In an engine without thresholds, none changes the motion.
     relation
@@ -138,8 +143,10 @@ class Pair:
     second: Callable[..., Description] = lambda one: one
     back: Callable[..., Samples] = lambda samples, *_: samples
     run: str = ""
+    place: tuple[int, int] = (1, 1)
     exact: bool = False
     variant: str = ""
+    quantity: str = ""
     scales: tuple[float, ...] = ()
     relation: str = "Both motions should be equal."
     bodies: tuple[str, ...] = USUAL
@@ -223,8 +230,8 @@ PAIRS = (
     Pair("reset after another motion", run="reset", exact=True),
     Pair("saved and continued", run="continued"),
     Pair("n calls of one step", lambda one: replace(one, every=1), run="thinned"),
-    Pair("body 3 of 7", run="3 of 7"),
-    Pair("body 40 of 64", run="40 of 64"),
+    Pair("body 3 of 7", run="beside", place=(3, 7)),
+    Pair("body 40 of 64", run="beside", place=(40, 64)),
     Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, variant="quaternion"),
     Pair(
         "turned world",
@@ -239,12 +246,12 @@ PAIRS = (
         lambda samples, *_: (MIRROR @ samples[0] @ MIRROR, -samples[1] @ MIRROR),
         relation="The second motion is the mirror image of the first, along the second axis.",
     ),
-    Pair("length x 2^k", _lengths, exact=True, scales=(2.0**-14, 2.0**14), relation=SCALED),
-    Pair("length x 10^k", _lengths, scales=(1e-4, 1e4), relation=SCALED),
-    Pair("mass x 2^k", _masses, exact=True, scales=(2.0**-30, 2.0**30), relation=SCALED),
-    Pair("mass x 10^k", _masses, scales=(1e-9, 1e9), relation=SCALED),
-    Pair("time x 2^k", _times, _same_times, exact=True, scales=(2.0**-14, 2.0**14), relation=SCALED),
-    Pair("time x 10^k", _times, _same_times, scales=(1e-4, 1e4), relation=SCALED),
+    Pair("length x 2^k", _lengths, exact=True, scales=(2.0**-14, 2.0**14), quantity="length", relation=SCALED),
+    Pair("length x 10^k", _lengths, scales=(1e-4, 1e4), quantity="length", relation=SCALED),
+    Pair("mass x 2^k", _masses, exact=True, scales=(2.0**-30, 2.0**30), quantity="mass", relation=SCALED),
+    Pair("mass x 10^k", _masses, scales=(1e-9, 1e9), quantity="mass", relation=SCALED),
+    Pair("time x 2^k", _times, _same_times, exact=True, scales=(2.0**-14, 2.0**14), quantity="time", relation=SCALED),
+    Pair("time x 10^k", _times, _same_times, scales=(1e-4, 1e4), quantity="time", relation=SCALED),
     Pair(
         "another body frame",
         lambda one: replace(reframe(one, OTHER), variant="frame"),

@@ -21,7 +21,8 @@ from conservative.references.samples import to_body_axes
 from conservative.references.worker.calls import python_worker, run_within
 from conservative.references.worker.client import EngineTimeout, Worker, time_limit
 
-from .pairs import Description, Samples
+from ...studies.selection import bits_of
+from .pairs import Description, Pair, Samples
 
 RUN_LIMIT = 60.0
 """Time limit of a run, s, against engines that hang. A run takes 800 steps at most, and may compile. It decides no verdict."""
@@ -51,7 +52,7 @@ class Runner:
 
     def __init__(self, method: Method) -> None:
         self.method, self.adaptive, self._tolerances = method, method.order is None, tuple[str, ...]()
-        self.precision = float(np.finfo("f4" if getattr(method, "precision", "f64") == "f32" else "f8").eps)
+        self.precision = float(np.finfo("f4" if bits_of(method) == 32 else "f8").eps)
         if self.adaptive:
             own = getattr(getattr(method, "data", None), "tolerance", "")
             self._tolerances = tuple(filter(None, (own, "rtol", "tol")))
@@ -238,23 +239,23 @@ def _others(one: Description, n: int) -> list[Description]:
     return [replace(one, w0=one.w0 * f[:3], mass=one.mass * f[3], inertia=one.inertia * f[3]) for f in factors]
 
 
-def run(runner: Runner, first: Description, one: Description, how: str, model: Callable[[], Samples]) -> Samples:
+def run(runner: Runner, first: Description, one: Description, pair: Pair, model: Callable[[], Samples]) -> Samples:
     """Return the samples of a second description, run as a pair asks for it (`Pair.run`); `model` is the model of the first.
 
     Raise `NotAvailable` if the engine cannot.
     """
-    if how == "again":
+    if pair.run == "again":
         return model()
-    if how == "process":
+    if pair.run == "process":
         return runner.apart(one)
-    if how == "reset":
+    if pair.run == "reset":
         with suppress(IntegrationFailed):
             runner.model(_others(one, 1)[0])()
         return model()
-    if how == "thinned":
+    if pair.run == "thinned":
         (R, w), kept = runner.model(one)(), first.grid.steps.astype(int)
         return R[kept], w[kept]
-    if how == "continued":
+    if pair.run == "continued":
         steps = one.n_steps // 2
         if not steps:
             raise NotAvailable("half a step")
@@ -266,8 +267,8 @@ def run(runner: Runner, first: Description, one: Description, how: str, model: C
         rest = one.n_steps - steps
         end = runner.model(replace(one, R0=U @ V, w0=w[-1], n_steps=rest, every=rest))()
         return np.stack([R[0], end[0][-1]]), np.stack([w[0], end[1][-1]])
-    if how:
-        place, count = (int(word) for word in how.split(" of "))
+    if pair.run == "beside":
+        place, count = pair.place
         bodies = _others(one, count)
         bodies[place - 1] = one
         return runner.many(bodies, place - 1)

@@ -99,6 +99,8 @@ class PairFinding(Finding):
     ----------
     body, pair
         Names in `BODIES` and `PAIRS`; `case` has both.
+    quantity
+        The quantity that a pair scales; "" for other pairs.
     relation
         Relation of the two motions, which decides the verdict (`VERDICTS`).
     threshold
@@ -113,6 +115,7 @@ class PairFinding(Finding):
 
     body: str = ""
     pair: str = ""
+    quantity: str = field(default="", repr=False)
     relation: Relation = Relation.NOT_AVAILABLE
     threshold: str = ""
     first: Description | None = field(default=None, repr=False)
@@ -245,7 +248,7 @@ def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) ->
     samples, allowed = first.samples, first.allowed
     lost = not _kept(one, samples) or not _stable(one, samples)
     try:
-        raw = run(engine.runner, one, second, pair.run, first.model)
+        raw = run(engine.runner, one, second, pair, first.model)
     except EngineError:
         raise
     except IntegrationFailed as failure:
@@ -295,6 +298,7 @@ class _Pair:
             detail=detail,
             body=self.body,
             pair=self.pair.name,
+            quantity=self.pair.quantity,
             relation=relation,
             **repeat,  # type: ignore[arg-type]
         )
@@ -350,7 +354,7 @@ class _Pair:
         if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, one)):
             detail = f"the difference of {apart.value:.2g} is a small share of the error of the step, {own:.2g}"
             return self.finding(Relation.NEGLIGIBLE, replace(apart, allowed=OWN_SHARE * own), detail, threshold=threshold)
-        first = _reduce(one, lambda each: wrong(each) and stays(each))
+        first = _reduce(one, pair, scale, lambda each: wrong(each) and stays(each))
         motion = apart.failure or _describe_motion(engine, pair, first, scale)
         return self.wrong(apart, first, motion, threshold)
 
@@ -396,7 +400,7 @@ def _describe_motion(engine: Engine, pair: Pair, one: Description, scale: float 
     """Return how the second description of a reduced pair moves."""
     with suppress(FirstFailed, NotAvailable, IntegrationFailed):
         first, second = engine.first(one), pair.second(one, *_scaled(scale))
-        R, w = pair.back(run(engine.runner, one, second, pair.run, first.model), *_scaled(scale))
+        R, w = pair.back(run(engine.runner, one, second, pair, first.model), *_scaled(scale))
         (R0, w0), after = first.samples, f"{one.n_steps} steps" if one.n_steps > 1 else "one step"
         rates = [np.array2string(each[-1], precision=3, suppress_small=True) for each in (w0, w)]
         if not angle_between(R[0], R[-1]) and angle_between(R0[0], R0[-1]):
@@ -415,7 +419,7 @@ def _threshold(pair: Pair, one: Description, scale: float, wrong: Callable[..., 
         return "in all other units"
     at, up = pair.second(one, math.exp(bad)), scale > 1
     speed = f", a speed of {np.linalg.norm(np.cross(at.w0, at.com)):.2g} m/s" * bool(one.com.any())
-    if pair.name.startswith("time"):
+    if pair.quantity == "time":
         return f"{'below' if up else 'above'} {np.linalg.norm(at.w0):.2g} rad/s{speed}"
     moments = np.diag(at.inertia)
     return f"{'above' if up else 'below'} moments of {moments.min():.2g} to {moments.max():.2g} kg m^2, {at.mass:.2g} kg{speed}"
@@ -430,10 +434,10 @@ SIMPLER: tuple[Callable[[Description], Description], ...] = (
     *(lambda one, axis=axis: replace(one, w0=np.linalg.norm(one.w0) * np.eye(3)[axis]) for axis in range(3)),
     lambda one: replace(one, w0=np.array([float(f"{value:.1g}") for value in one.w0])),
 )
-"""Simplifications of a body and its start, each kept if the pair still differs."""
+"""Simplifications of a body and its start, each kept if the pair still differs and both bodies are possible."""
 
 
-def _reduce(one: Description, wrong: Callable[[Description], bool]) -> Description:
+def _reduce(one: Description, pair: Pair, scale: float | None, wrong: Callable[[Description], bool]) -> Description:
     """Return the simplest body with the fewest steps, to 1 %, that still differs."""
     few, enough = 0, one.n_steps
     while enough - few > max(1, few // 100):
@@ -446,7 +450,7 @@ def _reduce(one: Description, wrong: Callable[[Description], bool]) -> Descripti
         one = replace(one, n_steps=enough, every=enough)
     for simpler in SIMPLER:
         candidate, _ = to_principal(simpler(one))
-        if wrong(candidate):
+        if candidate.possible and pair.second(candidate, *_scaled(scale)).possible and wrong(candidate):
             one = candidate
     return one
 

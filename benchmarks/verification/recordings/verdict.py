@@ -248,7 +248,7 @@ def _cause(found: Explanation, worse: int) -> Cause:
 def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
     """Return what decides the verdict: the errors, what is allowed, and the mistakes with what they leave."""
     allowed = details.show(details.allowed)
-    verb = "are" if " and " in allowed else "is"
+    verb = "are" if all(unit.size for unit in details.units) else "is"
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",

@@ -15,10 +15,11 @@ import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.benchmarks.gate import baseline, compare, results
 from conservative.benchmarks.gate.baseline import Allowed, limit
-from conservative.benchmarks.gate.results import Results, Row, Status
+from conservative.benchmarks.gate.results import Results, Row
 from conservative.benchmarks.suite import points
 from conservative.errors import BadInput
 from conservative.methods import reduced
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.registry import method, scene
 from conservative.reports.cli.main import main
 
@@ -26,15 +27,16 @@ ROW = Row(
     "file.py::test[a]",
     "brick",
     "reduced",
-    Status.PASSED,
+    OK,
     "",
     "hash",
     {"energy drift max": 1e-3, "observed order": 2.0, "iterations": 30.0},
     {"energy drift max": 1e-5, "observed order": 0.001},
 )
+FAILED, SKIPPED = Outcome(OutcomeKind.FAILED), Outcome(OutcomeKind.SKIPPED)
 RUN = Results("here", {ROW.id: ROW}, "abc")
 KEPT = baseline.update_baseline(None, [RUN], "first")
-OTHER = Row("file.py::test[b]", "top", "gauss", Status.PASSED, "heyoka==7", "other", {"rate error max": 1.0})
+OTHER = Row("file.py::test[b]", "top", "gauss", OK, "heyoka==7", "other", {"rate error max": 1.0})
 
 
 def changed(row=ROW, **changes):
@@ -53,7 +55,7 @@ def measured(name, instead=None):
     point = points.Point(BRICK, method(name))
     values, spreads = points.measure(replace(point, method=instead or point.method))
     labels = point.labels
-    return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads)
+    return Row(point.id, BRICK.name, name, OK, labels["engine"], labels["definition"], values, spreads)
 
 
 @cache
@@ -77,7 +79,7 @@ def failures(kept, latest):
     """Return the violations as (measure, method)."""
     verdict = compare.decide(kept, latest)
     assert verdict.passed == (not verdict.violations)
-    return {(each.measure, each.method) for each in verdict.violations}
+    return {(change.row.measure, change.row.method) for change in verdict.violations}
 
 
 @pytest.mark.parametrize(
@@ -133,7 +135,7 @@ def test_rows_that_a_run_left_out_stay():
     accepted = baseline.update_baseline(KEPT, [chosen], "one more")
     assert set(accepted.rows) == {ROW.id, OTHER.id}
     assert accepted.history[-1]["removed"] == []
-    skipped = Results("here", {ROW.id: replace(ROW, status=Status.SKIPPED)}, left_out=(OTHER.id,))
+    skipped = Results("here", {ROW.id: replace(ROW, outcome=SKIPPED)}, left_out=(OTHER.id,))
     assert set(baseline.update_baseline(accepted, [skipped], "not that one").rows) == {OTHER.id}
     assert set(baseline.update_baseline(accepted, [Results("here", {OTHER.id: OTHER})], "it is gone").rows) == {OTHER.id}
 
@@ -158,8 +160,7 @@ def test_runs_that_disagree_are_refused():
 @pytest.mark.parametrize(
     "changes",
     [
-        {"status": Status.FAILED},
-        {"status": Status.ERROR},
+        {"outcome": FAILED},
         {"values": {"rate error max": float("nan")}},
         {"values": {"iterations": float("inf")}},
         {"values": {results.ENERGY_DRIFT: 1.01}},
@@ -168,7 +169,7 @@ def test_runs_that_disagree_are_refused():
 def test_a_failure_cannot_be_accepted(changes):
     with pytest.raises(BadInput):
         baseline.update_baseline(KEPT, [changed(**changes)], "no")
-    assert not baseline.update_baseline(None, [changed(status=Status.SKIPPED)], "why").rows
+    assert not baseline.update_baseline(None, [changed(outcome=SKIPPED)], "why").rows
 
 
 def test_a_baseline_survives_its_file_and_its_hash_is_right(tmp_path):
@@ -219,7 +220,7 @@ def test_accuracy_and_time_go_to_bencher(tmp_path):
     found = json.loads((tmp_path / results.HISTORY).read_text())[ROW.id]
     assert found["latency"] == {"value": pytest.approx(2000)}  # ns
     assert found["energy drift max"] == {"value": 1e-3, "lower_value": 0.00099, "upper_value": 0.00101}
-    assert results.to_bencher(changed(status=Status.FAILED)) == {}
+    assert results.to_bencher(changed(outcome=FAILED)) == {}
 
 
 def test_results_come_back_from_their_file(tmp_path):
@@ -300,14 +301,14 @@ def test_the_definition_changes_with_the_motion_and_the_engine_with_its_version(
 
 
 def test_the_same_results_pass_and_values_at_their_limit():
-    assert compare.decide(KEPT, RUN) == compare.Verdict((), (), 1)
+    assert compare.decide(KEPT, RUN) == compare.Decision((), (), 1)
     assert str(compare.decide(KEPT, RUN)) == "gate: passed, 1 rows, 0 violations"
     assert compare.decide(KEPT, changed(values={"energy drift max": 1e-3 + 5e-5, "observed order": 1.95})).passed
 
 
 def test_a_violation_has_the_value_before_and_now_and_the_limit():
     verdict = compare.decide(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
-    assert [tuple(vars(each).values()) for each in verdict.violations] == [
+    assert [tuple(change.texts.values()) for change in verdict.violations] == [
         ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
         ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
     ]
@@ -321,21 +322,18 @@ TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
 @pytest.mark.parametrize(
     ("latest", "expected"),
     [
-        (replace(RUN, rows={}), ("row", "passed", "missing", "passed")),
-        (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
-        (replace(RUN, rows=TWO_NEW), ("row", "passed", "renamed new", "passed")),
-        *(
-            (changed(status=Status(each)), ("row", "passed", each, "passed"))
-            for each in ("skipped", "failed", "error", "xfailed")
-        ),
+        (replace(RUN, rows={}), ("row", OK, "missing", "ok")),
+        (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", OK, "missing", "ok")),
+        (replace(RUN, rows=TWO_NEW), ("row", OK, "renamed new", "ok")),
+        *((changed(outcome=outcome), ("row", OK, outcome, "ok")) for outcome in (SKIPPED, FAILED)),
         (changed(definition="new"), ("definition", "hash", "new", "hash")),
         (changed(engine="mujoco==9"), ("engine version", "", "mujoco==9", "")),
     ],
 )
 def test_rows_that_cannot_be_compared(latest, expected):
     (each,) = compare.decide(KEPT, latest).violations
-    assert (each.measure, each.was, each.now, each.allowed) == expected
-    assert (each.scene, each.method) == ("brick", "reduced")
+    assert (each.row.measure, each.was, each.now, each.allowed) == expected
+    assert (each.row.scene, each.row.method) == ("brick", "reduced")
 
 
 def test_a_measure_that_is_gone():
@@ -347,8 +345,8 @@ def test_a_measure_that_is_gone():
 def test_a_row_that_is_new_is_a_note_if_it_passed():
     both = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", method="new")})
     assert compare.decide(KEPT, both).notes == ("unbaselined: new",)
-    failed = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", status=Status.FAILED)})
-    assert compare.decide(KEPT, failed) == compare.Verdict((), (), 1)
+    failed = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", outcome=FAILED)})
+    assert compare.decide(KEPT, failed) == compare.Decision((), (), 1)
 
 
 def test_a_baseline_without_rows_is_a_violation():
@@ -360,7 +358,7 @@ def test_a_runaway_is_a_failure_with_any_baseline(drift, failed):
     values = {results.ENERGY_DRIFT: drift}
     row = replace(OTHER, values=values)
     unknown = compare.decide(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
-    assert [each.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
+    assert [each.row.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
     as_before = baseline.BaselineRow(
         "top", "gauss", row.engine, "other", {results.ENERGY_DRIFT: baseline.Allowed(drift, 0, 1, 3e11)}
     )

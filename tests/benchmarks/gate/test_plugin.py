@@ -12,8 +12,9 @@ from click.testing import CliRunner
 
 from conservative.benchmarks import suite
 from conservative.benchmarks.gate import baseline, compare, pytest_gate, pytest_plugin, results
-from conservative.benchmarks.gate.results import Results, Status
+from conservative.benchmarks.gate.results import Results
 from conservative.errors import NotWritten
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 
 from ...environments import PATIENCE
@@ -182,10 +183,10 @@ def test_from_end_to_end(tmp_path, monkeypatch):
     assert code == 1
     report = (tmp_path / "junit.xml").read_text()
     for line in (
-        "row, mine, removed: was passed, is missing",
+        "row, mine, removed: was ok, is missing",
         "is skipped",
         "is failed",
-        "is error",
+        "is failed (in its teardown)",
         "definition, mine, kept",
     ):
         assert line in text
@@ -255,7 +256,8 @@ for words in json.loads(sys.argv[1]):
     if not baseline.PATH.exists():
         baseline.write(baseline.update_baseline(None, [run], "first"), baseline.PATH)
     try:
-        missing = [each.scene for each in compare.decide(baseline.read(baseline.PATH), run).violations if each.now == "missing"]
+        violations = compare.decide(baseline.read(baseline.PATH), run).violations
+        missing = [change.row.scene for change in violations if change.now == "missing"]
     except baseline.NothingToCompare:
         missing = []
     ended[words] = code, sorted(run.rows), sorted(missing)
@@ -343,21 +345,21 @@ def hand_in(gate, item, *reports):
 
 def test_a_row_has_the_values_of_extra_info():
     written = pytest_gate.row(benchmark({**INFO, "spreads": {"error": 1e-12, "gone": 0}}), report())
-    assert (written.id, written.scene, written.method, written.status, written.engine) == (
+    assert (written.id, written.scene, written.method, written.outcome, written.engine) == (
         ID,
         "brick",
         "reduced",
-        Status.PASSED,
+        OK,
         "",
     )
     assert written.values["error"] == 1e-9
     assert written.values["gone"] != written.values["gone"]
     assert written.spreads == {"error": 1e-12, "gone": 0.0}
     named = pytest_gate.row(benchmark({"definition": "mine", "engine": "e==1"}), report(outcome="failed"))
-    assert (named.definition, named.engine, named.status) == ("mine", "e==1", Status.FAILED)
-    assert pytest_gate.row(benchmark(), report(outcome="skipped", wasxfail="why")).status is Status.XFAILED
+    assert (named.definition, named.engine, named.outcome.kind) == ("mine", "e==1", OutcomeKind.FAILED)
+    assert pytest_gate.row(benchmark(), report(outcome="skipped", wasxfail="why")).outcome.kind is OutcomeKind.SKIPPED
     never_ran = pytest_gate.row(benchmark(funcargs={}), report("setup", "skipped"))
-    assert (never_ran.scene, never_ran.values, never_ran.status) == ("", {}, Status.SKIPPED)
+    assert (never_ran.scene, never_ran.values, never_ran.outcome) == ("", {}, Outcome(OutcomeKind.SKIPPED))
 
 
 def test_a_test_without_a_definition_is_defined_by_its_source(request):
@@ -372,14 +374,14 @@ def test_which_reports_leave_a_row(gate):
     hand_in(gate, item, report("setup"))
     assert not gate.rows
     hand_in(gate, item, report(), report("teardown"))
-    assert gate.rows[ID].status is Status.PASSED
+    assert gate.rows[ID].outcome == OK
     hand_in(gate, item, report("teardown", "failed"))
-    assert gate.rows[ID].status is Status.ERROR
+    assert gate.rows[ID].outcome.kind is OutcomeKind.FAILED
     hand_in(gate, benchmark(fixturenames=[], path=Path("other.py")), report())
     hand_in(gate, SimpleNamespace(), report())
     assert len(gate.rows) == 1
     hand_in(gate, benchmark(path=Path("other.py")), report("setup", "failed"))
-    assert gate.rows["other.py::test_x[1]"].status is Status.FAILED
+    assert gate.rows["other.py::test_x[1]"].outcome.kind is OutcomeKind.FAILED
 
 
 def test_the_verdict_and_the_results_are_written(gate, tmp_path, monkeypatch):
@@ -388,7 +390,7 @@ def test_the_verdict_and_the_results_are_written(gate, tmp_path, monkeypatch):
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "step.md"))
     (tmp_path / "step.md").write_text("before\n")
     assert gate.finish() is gate.verdict
-    assert gate.verdict == compare.Verdict((), (), 1)
+    assert gate.verdict == compare.Decision((), (), 1)
     assert results.read(tmp_path / results.FOLDER / results.FILE).rows == gate.rows
     assert (tmp_path / "step.md").read_text() == "before\n" + gate.verdict.markdown_text()
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))
@@ -396,7 +398,7 @@ def test_the_verdict_and_the_results_are_written(gate, tmp_path, monkeypatch):
         gate.finish()
 
 
-@pytest.mark.parametrize(("verdict", "status"), [(compare.Verdict((), (), 1), 0), (compare.Verdict((), (), 1), 1), (None, 3)])
+@pytest.mark.parametrize(("verdict", "status"), [(compare.Decision((), (), 1), 0), (compare.Decision((), (), 1), 1), (None, 3)])
 def test_other_exit_statuses_stay(gate, verdict, status):
     session, gate.verdict = SimpleNamespace(exitstatus=status), verdict
     gate.pytest_sessionfinish(session)

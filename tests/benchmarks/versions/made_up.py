@@ -3,10 +3,11 @@
 import random
 from pathlib import Path
 
-from conservative.benchmarks.gate.results import Row, Status
+from conservative.benchmarks.gate.results import Row
 from conservative.benchmarks.versions.comparison import Comparison, Line
 from conservative.benchmarks.versions.times import Ratio, TimeRow
 from conservative.benchmarks.versions.version import Version
+from conservative.outcome import OK
 from conservative.references.environments.environment import Environment
 from conservative.references.worker.client import EngineCrashed
 
@@ -29,12 +30,11 @@ VALUES = {
 }
 
 
-def row(reason="", method="reduced", **changes):
-    """Return a row with values; `changes` replace some, and a row with a reason has none."""
-    status = changes.pop("status", Status.PASSED)
-    values = {} if reason else VALUES | {name.replace("_", " "): value for name, value in changes.items()}
+def row(outcome=OK, method="reduced", **changes):
+    """Return a row with values; `changes` replace some, and a row with another outcome has none."""
+    values = {} if outcome != OK else VALUES | {name.replace("_", " "): value for name, value in changes.items()}
     spreads = dict.fromkeys(values, 0.0)
-    return Row(f"brick_flip / {method}", "brick_flip", method, status, "", "definition", values, spreads, reason)
+    return Row(f"brick_flip / {method}", "brick_flip", method, outcome, "", "definition", values, spreads)
 
 
 def comparison(*lines, base=BASE, head=HEAD):

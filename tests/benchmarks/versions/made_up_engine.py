@@ -3,9 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
+from conservative.benchmarks.measures.change import Range
 from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.comparison import Comparison, Line
-from conservative.benchmarks.versions.engine import Observation, Range
+from conservative.benchmarks.versions.engine import Observation
 from conservative.benchmarks.versions.version import Version
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.environment import Environment

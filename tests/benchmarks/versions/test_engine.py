@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.benchmarks.measures.change import Range
 from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.line import LinePoint
@@ -14,7 +15,6 @@ from conservative.benchmarks.versions.engine import (
     ERRORS,
     NO_STEP,
     TIME_FACTOR,
-    Range,
     fit_orders,
     plan_versions,
     ratio,
@@ -28,7 +28,8 @@ from .made_up_engine import versions as made_up
 
 
 def changes(was, now, was_times=TIMES, now_times=TIMES):
-    return {(each.aspect, each.quantity): each.lost for each in find_changes(was, now, was_times, now_times)}
+    found = find_changes(was, now, was_times, now_times)
+    return {(change.row.measure, change.row.quantity): change.lost for change in found}
 
 
 # ------------------------------------------------------------------------------------------------------- what is a conclusion
@@ -120,8 +121,8 @@ def test_a_time_differs_if_all_repeats_do():
 def test_a_ratio_has_the_statistic_of_the_gate():
     was, now = (1.0, 2.0, 4.0), (4.0, 2.0, 3.0)
     assert ratio(was, now) == ratio_of(list(zip(was, now, strict=True)))
-    assert not ratio((1.0, 2.0), (1.2, 3.0)).beyond(TIME_FACTOR)
-    assert ratio((1.0, 2.0), (1.4, 3.0)).beyond(TIME_FACTOR)
+    assert not ratio((1.0, 2.0), (1.2, 3.0)).direction(TIME_FACTOR)
+    assert ratio((1.0, 2.0), (1.4, 3.0)).direction(TIME_FACTOR)
 
 
 # ------------------------------------------------------------------------------------------------------------------- orders
@@ -171,7 +172,7 @@ def test_changes_go_from_version_to_version():
 def test_times_belong_to_their_versions():
     slow = tuple(3 * time for time in TIMES)
     result = list_transitions(history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow)))
-    assert [[each.aspect for each in step.changes] for step in result] == [[], [Aspect.TIME]]
+    assert [[change.row.measure for change in step.changes] for step in result] == [[], [Aspect.TIME]]
 
 
 @pytest.mark.parametrize(("versions", "message"), [(["1.0"], "two or more"), ([], "none"), (["1.0", "2.0", "1.0"], "twice")])

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
+from conservative.benchmarks.suite.motion import motion_of
 from conservative.benchmarks.versions import project
 from conservative.benchmarks.versions.prices import Price, read_prices
-from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, define_scene, faster
+from conservative.benchmarks.versions.project import MOTION, TIME, ProjectSide, decide, decide_values, faster
+from conservative.benchmarks.versions.times import Ratio
 from conservative.errors import BadInput
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
 
@@ -18,6 +20,7 @@ from .made_up import HEAD, comparison, row, timed, version
 
 SAME = (1.0, 0.98, 1.02)
 SLOW = (1.1, 1.08, 1.12)
+DIVERGED = Outcome(OutcomeKind.DIVERGED, time=1.0)
 
 
 def compare(was, now, time=None):
@@ -27,7 +30,7 @@ def compare(was, now, time=None):
 def violations(*arguments):
     result = compare(*arguments)
     assert result.passed == (not result.violations)
-    return {each.measure for each in result.violations}
+    return {change.row.measure for change in result.violations}
 
 
 def test_equal_rows_pass_without_notes():
@@ -52,8 +55,8 @@ def test_differences_in_the_last_digits_pass():
 
 def test_a_time_fails_if_it_is_slower_twice():
     (each,) = compare(row(), row(), timed(SLOW, SLOW)).violations
-    assert (each.measure, each.scene, each.method) == (TIME, "brick_flip", "reduced")
-    assert each.now == "1.100 times as long (1.080 to 1.120)"
+    assert each.row == ("brick_flip", "reduced", TIME, "")
+    assert (each.now, str(each.now)) == (Ratio(*SLOW, 7), "1.100 times as long (1.080 to 1.120)")
     assert compare(row(), row(), timed(SLOW, SAME)).notes == (
         "brick_flip, reduced: looked slower (1.100), and was not when measured again (1.000)",
     )
@@ -65,20 +68,20 @@ def test_a_time_that_cannot_be_measured_fails():
 
 
 def test_a_row_that_fails_now_or_is_gone_fails():
-    failed = row("diverged at 1 s", status=Status.FAILED)
+    failed = row(DIVERGED)
     assert violations(row(), failed) == {"row"}
     assert violations(row(), None) == {"row"}
-    assert compare(row(), failed).notes == ("brick_flip, reduced: is without values: diverged at 1 s",)
+    assert compare(row(), failed).notes == ("brick_flip, reduced: is without values: diverged after t = 1 s",)
 
 
 def test_another_motion_is_one_violation_with_its_cause():
     lost = row(attitude_error_max=3.1, rate_error_max=5.0, energy_drift_max=0.5)
     (each,) = compare(row(), replace(lost, mistake="no torque", cause="no torque")).violations
-    assert (each.measure, each.allowed) == (MOTION, "")
+    assert (each.row.measure, each.allowed) == (MOTION, "")
     assert "no torque" in each.finding
     assert violations(row(), lost) == {MOTION}  # without a cause
     assert violations(row(), replace(row(), mistake="late", cause="late")) == {MOTION}  # which the scene does not show
-    failed = replace(row("diverged", status=Status.FAILED), mistake="no torque", cause="no torque")
+    failed = replace(row(DIVERGED), mistake="no torque", cause="no torque")
     assert violations(row(), failed) == {MOTION}
     assert violations(row(), row(attitude_error_max=0.5)) == {"attitude error max"}  # an error may have grown
 
@@ -124,7 +127,7 @@ def test_a_price_that_is_none_is_refused(text, tmp_path):
 
 
 def test_a_scene_that_is_not_supported_is_one_note():
-    skipped = row("only free bodies", status=Status.SKIPPED)
+    skipped = row(Outcome(OutcomeKind.UNSUPPORTED, "only free bodies"))
     result = decide(comparison((row(method="gauss"), row(method="gauss"), None), (skipped, skipped, None)))
     assert result.passed
     assert result.notes == ("reduced: not supported (only free bodies): brick_flip",)
@@ -141,18 +144,18 @@ def test_a_slow_method_is_measured_with_fewer_points():
 
 
 def test_rows_that_are_new_or_failed_before_pass_with_a_note():
-    failed = row("diverged at 1 s", status=Status.FAILED)
+    failed = row(DIVERGED)
     old = row(method="gauss")
     new = decide(comparison((old, old, None), (None, row(), None)))
     assert new.passed
     assert new.notes == ("brick_flip, reduced: was not there",)
     mended = decide(comparison((old, old, None), (failed, row(), None)))
     assert mended.passed
-    assert mended.notes == ("brick_flip, reduced: was without values: diverged at 1 s",)
+    assert mended.notes == ("brick_flip, reduced: was without values: diverged after t = 1 s",)
 
 
 def test_without_a_row_that_passed_there_is_no_verdict():
-    assert violations(row("diverged", status=Status.FAILED), row()) == {"rows"}
+    assert violations(row(DIVERGED), row()) == {"rows"}
     assert violations(None, row()) == {"rows"}
 
 
@@ -166,21 +169,21 @@ def test_differences_between_environments_are_notes():
     )
 
 
-RUNAWAY = "energy drift max is 2.7e+11, more than 1: the run failed"
+RUNAWAY = "not conserved (energy drift max is 2.7e+11, more than 1: the run failed)"
 
 
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
         ("energy drift max", 2.7e11, RUNAWAY),
-        ("energy drift max", math.inf, "energy drift max is inf, more than 1: the run failed; energy drift max is inf"),
-        ("rate error max", math.nan, "rate error max is nan"),
+        ("energy drift max", math.inf, "invalid result (energy drift max is inf)"),
+        ("rate error max", math.nan, "invalid result (rate error max is nan)"),
     ],
 )
 def test_a_runaway_fails_without_an_error(name, value, reason):
     decided = decide_values(row(), {name: value}, {name: 0.0})
-    assert (decided.status, decided.reason) == (Status.FAILED, reason)
-    assert decide_values(row(), {"energy drift max": 0.36}, {"energy drift max": 0.0}).reason == ""
+    assert str(decided.outcome) == reason
+    assert decide_values(row(), {"energy drift max": 0.36}, {"energy drift max": 0.0}).outcome == OK
 
 
 class Answers(ProjectSide):
@@ -199,8 +202,8 @@ class Answers(ProjectSide):
 
 def test_a_scene_that_a_version_does_not_have_is_an_error_of_its_rows():
     ((_, each),) = Answers().measure("brick_flip")
-    assert each.status is Status.ERROR
-    assert "no such thing" in each.reason
+    assert each.outcome.kind is OutcomeKind.MISSING
+    assert "no such thing" in each.outcome.reason
 
 
 def definition(scene):
@@ -220,21 +223,21 @@ def test_a_scene_of_another_motion_is_not_compared():
     brick = scene("brick_flip")
     heavier = definition(brick) | {"inertia": brick.body.inertia * 2}
     ((_, each),) = Answers(describe_scene=heavier).measure("brick_flip")
-    assert each.reason == "another motion"
+    assert each.outcome == project.ANOTHER_SCENE
     assert violations(row(), each) == {"definition"}
     ((_, each),) = Answers(describe_scene=definition(brick) | {"parts": [[0.0, 0.0, 1.0]]}).measure("brick_flip")  # a rotor
-    assert each.reason == "another motion"
+    assert each.outcome == project.ANOTHER_SCENE
 
 
 def test_a_scene_that_a_version_does_not_support_is_skipped():
     pair = {"unsupported": "for tops only", "longest_step": 1.0}
     answers = Answers(describe_scene=definition(scene("brick_flip")), describe_pair=pair)
     ((_, each),) = answers.measure("brick_flip")
-    assert (each.status, each.reason) == (Status.SKIPPED, "for tops only")
+    assert each.outcome == Outcome(OutcomeKind.UNSUPPORTED, "for tops only")
 
 
 def test_fields_that_turn_have_different_definitions():
-    assert define_scene("stable_satellite") != define_scene("unstable_satellite")
+    assert motion_of("stable_satellite").key != motion_of("unstable_satellite").key
 
 
 def test_methods_that_no_version_has_are_named():
