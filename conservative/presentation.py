@@ -19,7 +19,6 @@ from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
-    import xarray
 
 COLUMNS = (
     "t",
@@ -71,28 +70,6 @@ def header(trajectory: Any) -> list[str]:
     """Return the columns with their units, such as `w_WB_B_1 (rad/s)`."""
     units = {name: UNITS.get(name.split("_")[0]) for name in columns(trajectory)}
     return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
-
-
-AXES = {"world": "123", "axis": "123", "part": "wxyz"}
-"""Coordinates of the dimensions of arrays: world axes, body axes and parts of a quaternion."""
-_DIMENSIONS = {"R_WB": ("world", "axis"), "q_WB": ("part",), "w_WB_B": ("axis",), "energy": (), "momentum_W": ("world",)}
-_DIMENSIONS |= {"p_WB": ("world",), "v_WB": ("world",)}
-
-
-def dataset(t: Array, values: dict[str, Array], first: tuple[str, ...] = ("t",), **attributes: str) -> xarray.Dataset:
-    """Return arrays by the names of columns as a dataset, with times t (n,), s, units, and names of the axes.
-
-    Each array has the dimensions `first`, then its own.
-    """
-    import xarray
-
-    variables = {
-        name: ((*first, *_DIMENSIONS[name]), array, {"units": unit} if (unit := UNITS.get(name.split("_")[0])) else {})
-        for name, array in values.items()
-    }
-    used = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & AXES.keys()
-    coordinates = {"t": ("t", t, {"units": "s"}), **{name: list(AXES[name]) for name in sorted(used)}}
-    return xarray.Dataset(variables, coordinates, attributes)
 
 
 def picture(trajectory: Any) -> altair.VConcatChart:

@@ -1,4 +1,4 @@
-"""Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a video.
+"""Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a GIF.
 
 Each panel draws the body as its inertia box, the box of constant density with the same moments, centred at the fixed point. An
 arrow is the angular momentum, relative to its initial size. A rod along one axis of the body leaves a trace.
@@ -16,15 +16,15 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from conservative.errors import BadInput, require_extra
-from conservative.files import write_bytes
+from conservative.errors import require_extra
+from conservative.files import require_ending, write_bytes
 from conservative.trajectory import Trajectory
 
 from .frames import COLOURS, Values, make_panels, speeds
 from .frames import largest_values as largest_values
 from .frames import longest as longest
 
-KINDS = (".html", ".gif", ".mp4", ".png")
+KINDS = (".html", ".gif", ".png")
 """Endings of files that contain an animation, or its last frame."""
 MARK = "Written by conservative watch"
 """Text near the beginning of each such file."""
@@ -45,21 +45,20 @@ class Animation:
     values: Sequence[Values | None] | None = None
 
     def save(self, path: str | Path) -> None:
-        """Write a page (.html), a video (.gif, .mp4), or the last frame (.png); an existing file is replaced.
+        """Write a page (.html), a GIF (.gif), or the last frame (.png); an existing file is replaced.
 
         Raises
         ------
         BadInput
             The name has another ending, or the file cannot be written; or as in `element`.
         MissingExtra
-            A package is not installed: for pages of the extra `report`, for videos and frames of `video`.
+            A package is not installed: for pages of the extra `report`, for GIFs and frames of `video`.
         """
+        require_ending("path", Path(path), KINDS)
         write_bytes(Path(path), self.render(Path(path).suffix), "path")
 
     def render(self, kind: str, progress: Callable[[float], None] = lambda share: None) -> bytes:
-        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the finished share of a video."""
-        if kind not in KINDS:
-            raise BadInput("path", f"a file that ends in {kind!r}", f"one that ends in {', '.join(KINDS)}")
+        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the finished share of a GIF."""
         if kind == ".html":
             motion = element(self.trajectories, self.labels, truth=self.truth, values=self.values)
             name = self.trajectories[0].scene.name

@@ -1,13 +1,10 @@
-"""Animations as .gif and .mp4, and their last frame as .png: the scene of the page, drawn by matplotlib."""
+"""Animations as .gif, and their last frame as .png: the scene of the page, drawn by matplotlib."""
 
 from __future__ import annotations
 
 import io
 import math
-import subprocess
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +15,12 @@ from conservative.errors import require_extra
 from .frames import COLOURS, FACES, Panel, speeds
 
 ARROW, TRACE, OUTLINE, INK = (str(COLOURS[name]) for name in ("arrow", "trace", "outline", "ink"))
-RATES = {".gif": 12.5, ".mp4": 30.0}
+RATE = 12.5
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, BELOW, PIECE, DPI, FINE = 1.92, 0.64, 0.16, 100, 300
-"""Sides of the picture of a panel and of the least text below it, inches: multiples of 16 pixels, a piece, which encoders ask
-for. Pixels per inch of a video, and of a single frame."""
+PAUSE = 2000
+"""Time, ms, for which the last frame of a GIF stays before the motion starts again."""
+SIDE, BELOW, DPI, FINE = 1.92, 0.64, 100, 300
+"""Sides of the picture of a panel and of the least text below it, inches. Pixels per inch of a GIF, and of a single frame."""
 TITLE, LINE = 0.17, 0.117
 """Heights of the title of a panel and of a line of numbers, inches."""
 TILT, TURN = 20.0, 34.4
@@ -35,14 +33,14 @@ _SIDES = [np.flatnonzero(_CORNERS[:, axis] == sign / 2)[[0, 1, 3, 2]] for axis i
 def draw(
     times: Array, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
 ) -> bytes:
-    """Return a video with an ending of `RATES`, at the default speed, or the last frame, .png, with `mark` as its comment.
+    """Return a GIF at the default speed, or the last frame, .png, with `mark` as its comment.
 
     Raises
     ------
     MissingExtra
-        matplotlib, or for .mp4 imageio-ffmpeg, is not installed.
+        matplotlib is not installed.
     """
-    require_extra(f"Writing {kind}", "video", "matplotlib", *["imageio_ffmpeg"] * (kind == ".mp4"))
+    require_extra(f"Writing {kind}", "video")
     if kind == ".png":
         from PIL import Image, PngImagePlugin
 
@@ -51,33 +49,19 @@ def draw(
         (image,) = _images(times, panels, truth, [len(times) - 1], FINE, progress)
         Image.fromarray(image).save(out, "PNG", pnginfo=comment, dpi=(FINE, FINE))
         return out.getvalue()
-    count = max(2, round(times[-1] / speeds(times[-1])[2] * RATES[kind]))
+    from PIL import Image, ImageColor
+
+    count = max(2, round(times[-1] / speeds(times[-1])[2] * RATE))
     shown = np.linspace(0, len(times) - 1, count).round().astype(int).tolist()
     images = _images(times, panels, truth, shown, DPI, progress)
-    if kind == ".gif":
-        from PIL import Image, ImageColor
-
-        inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
-        shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2])  # edges blend into the background
-        palette = Image.new("P", (1, 1))
-        palette.putpalette(shades.ravel().tolist())
-        first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
-        out, options = io.BytesIO(), {"save_all": True, "append_images": rest, "loop": 0, "comment": mark, "optimize": True}
-        first.save(out, "GIF", duration=round(1000 / RATES[kind]), **options)
-        return out.getvalue()
-    import imageio_ffmpeg  # only for its ffmpeg: its own writer leaves pipes open
-
-    with tempfile.TemporaryDirectory() as folder:
-        file, image = Path(folder, "video.mp4"), next(images)
-        form = f"-f rawvideo -pix_fmt rgb24 -s {image.shape[1]}x{image.shape[0]} -r {RATES[kind]} -i -".split()
-        output = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-metadata", f"comment={mark}"]  # the comment comes first
-        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", *form, *output, str(file)]
-        # Ctrl-C is for this process: ffmpeg would print an error and break the pipe. It ends when the pipe is closed.
-        with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as ffmpeg:
-            assert ffmpeg.stdin is not None
-            for each in (image, *images):
-                ffmpeg.stdin.write(each.tobytes())
-        return file.read_bytes()
+    inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
+    shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2])  # edges blend into the background
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(shades.ravel().tolist())
+    first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    out, options = io.BytesIO(), {"save_all": True, "append_images": rest, "loop": 0, "comment": mark, "optimize": True}
+    first.save(out, "GIF", duration=[*[round(1000 / RATE)] * (count - 1), PAUSE], **options)
+    return out.getvalue()
 
 
 def _images(
@@ -88,7 +72,7 @@ def _images(
     from matplotlib.figure import Figure
 
     columns, rows = min(len(panels), 4), math.ceil(len(panels) / 4)
-    below = max(BELOW, PIECE * math.ceil((TITLE + LINE * max(len(panel.sizes) for panel in panels)) / PIECE))
+    below = max(BELOW, TITLE + LINE * max(len(panel.sizes) for panel in panels))
     figure = Figure(figsize=(columns * SIDE, rows * (SIDE + below)), dpi=dpi)
     canvas: Any = FigureCanvasAgg(figure)
     axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
