@@ -10,7 +10,6 @@ from email import message_from_string
 from pathlib import PurePosixPath
 
 import pytest
-import yaml
 from trove_classifiers import classifiers
 
 from conservative.errors import EXTRAS
@@ -171,6 +170,4 @@ def test_the_suite_has_one_name_for_any_path(path):
 
 
 def test_the_citation_is_of_this_version():
-    from conservative.version import VERSION
-
     assert f"\nversion: {VERSION}\n" in (ROOT / "CITATION.cff").read_text()
