@@ -329,7 +329,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "environments": ("uv", "platformdirs", "psutil"),
         "report": ("jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
-        "video": ("matplotlib",),
+        "video": ("PIL",),
         "models": ("pxr", "trimesh", "lxml", "cloudpickle"),
         "cluster": ("distributed", "cloudpickle"),
         "docs": ("sphinx", "myst_nb", "furo", "sphinx_click"),

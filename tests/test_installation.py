@@ -23,6 +23,7 @@ IMPORTED_AS = {
     "vl-convert-python": "vl_convert",
     "pytest-benchmark": "pytest_benchmark",
     "usd-core": "pxr",
+    "pillow": "PIL",
     "myst-nb": "myst_nb",
     "sphinx-click": "sphinx_click",
 }

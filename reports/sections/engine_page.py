@@ -10,7 +10,7 @@ from functools import partial
 
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.references.environments.engine_method import EngineMethod
-from conservative.references.environments.environment import version_key
+from conservative.references.environments.kind import version_key
 from conservative.version import VERSION
 
 from ..document.attempt import attempt
