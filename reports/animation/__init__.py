@@ -1,7 +1,8 @@
 """Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a GIF.
 
-Each panel draws the body as its inertia box, the box of constant density with the same moments, centred at the fixed point. An
-arrow is the angular momentum, relative to its initial size. A rod along one axis of the body leaves a trace.
+Each panel draws the body as the box of constant density with the same moments, centred at the fixed point, and a symmetric top
+as the cone that stands on it. An arrow is the angular momentum, relative to its initial size. A rod along one axis of the body
+leaves a trace.
 `player.js` draws with `vendor/three.js`, which `.ci/three/build` bundles.
 """
 
@@ -20,7 +21,7 @@ from conservative.errors import require_extra
 from conservative.files import require_ending, write_bytes
 from conservative.trajectory import Trajectory
 
-from .frames import COLOURS, Values, make_panels, speeds
+from .frames import COLOURS, Values, legend, make_panels, speeds
 from .frames import largest_values as largest_values
 from .frames import longest as longest
 
@@ -112,16 +113,21 @@ def element(
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)
-    return frame(panels, name, duration, id, data.replace("<", "\\u003c"))  # no end of the script
+    return frame(panels, name, duration, id, data.replace("<", "\\u003c"), legend(panels, truth))  # no end of the script
 
 
-def frame(panels: Sequence[object], name: str, duration: float, id: str, data: str) -> str:
+def frame(
+    panels: Sequence[object], name: str, duration: float, id: str, data: str, legend: Sequence[tuple[str, str]] = ()
+) -> str:
     """Return the HTML of an animation of panels with `label`, `outcome` and names of `sizes`.
 
     `data` is JSON. A script of the page can set the property `content` of the element instead, in the same form, and dispatch
-    an event of that name after each change. A panel with `moments` in place of `q` shows its `L` in principal axes.
+    an event of that name after each change. A panel with `moments` in place of `q` shows its `L` in principal axes. `legend`
+    has colours and texts.
     """
-    return _fill("motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=data)
+    return _fill(
+        "motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=data, legend=legend
+    )
 
 
 def _fill(template: str, **values: object) -> str:

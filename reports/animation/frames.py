@@ -53,7 +53,7 @@ QUARTERS, ROUND = 4, 12
 
 
 class Face(NamedTuple):
-    """A plane part of a surface: its corners (n, 3), counter-clockwise from outside, its colour, and its edges as their numbers."""
+    """A plane part of a surface: corners (n, 3), counter-clockwise from outside, a colour, and edges as numbers of corners."""
 
     corners: Array
     colour: str

@@ -139,7 +139,7 @@ class _Sheet:
 
     def text(self, x: float, y: float, text: str, size: float, bold: bool = False, anchor: str = "la") -> None:
         """Write a text with its upper edge at y."""
-        weight = 0.35 * self.scale if bold else 0
+        weight = 0.1 * self.scale if bold else 0
         place = (x * self.scale, y * self.scale)
         self.pencil.text(place, text, INK, self.font(size), anchor, stroke_width=weight)
 
