@@ -27,7 +27,7 @@ from .environment import RECORD, Environment, close_environment, read_environmen
 from .folders import folder_of_projects, temporary_folder
 from .install import build_wheel, clear_leftovers, drop, import_trouble, make
 from .kind import Distribution, Source
-from .pip import normal_name, resolve_wheel, versions_in
+from .pip import Pip, normal_name, resolve_wheel, versions_in
 
 KEPT = 8
 """Largest number of environments of a project. The least recently used ones are removed."""
@@ -65,8 +65,8 @@ def _make_environment(wheel: Path, requirements: Sequence[str], source: Source) 
             ours = any(re.match(rf"{US}[./]", member) for member in archive.namelist())
         if not ours and PACKAGE not in versions_in(lock.text):
             raise BadInput("against", f"{wheel.name}, without {PACKAGE}", f"a version that needs {PACKAGE}")
-        environment = read_environment(folder)
-        if environment is None or environment.kind.read_lock(folder, key, environment.runtime) != lock:
+        environment, known = read_environment(folder), folder / Pip.lock_file  # older versions wrote another file
+        if environment is None or not known.is_file() or known.read_text(encoding="utf-8") != lock.text:
             environment = make(name, lock, folder, source)
     except BadInput as error:
         raise BadInput("against", error.got, error.allowed) from None

@@ -32,12 +32,12 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         title, picture = "Growth of errors over a million turns", figures.growth(lines)
         panels = vega_embed.embed(picture, ("name",), 220)
         legend = vega_embed.legend(families_of(lines), marks=False)
-        note = f"A level line is bounded.{_why_early(lines, table)}"
+        note = f"A level line is bounded.{why_early(lines, table)}"
         figure = Figure("long_time", title, note, picture, panels, legend, Layout.PANELS)
     return Section("Long times", filled(figure, as_table(table), Paragraph(TERMS, Emphasis.NOTE)), "long-times")
 
 
-def _why_early(lines: pd.DataFrame, table: pd.DataFrame) -> str:
+def why_early(lines: pd.DataFrame, table: pd.DataFrame) -> str:
     """Return why lines end before the others of their scene; empty if none does."""
     here, found = table[(table["study"] == STUDY.name) & (table["outcome"] != OutcomeKind.OK)], list[str]()
     for scene, part in lines.groupby("scene", sort=False):

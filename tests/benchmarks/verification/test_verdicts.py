@@ -13,7 +13,7 @@ from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict as verdicts
 from conservative.benchmarks.verification.recordings.formats.table import CHUNK
 from conservative.benchmarks.verification.recordings.table import Options, Recording, read
-from conservative.benchmarks.verification.recordings.verdict import verify_recording
+from conservative.benchmarks.verification.recordings.verdict import Unit, verify_recording
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
 
@@ -321,3 +321,10 @@ def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_
     moved, rates = free_body(SCENE.body, np.eye(3), W0, np.maximum(T + np.append(0, jitter[1:]), 0))
     assert verdict(T, moved, rates).verdict == "wrong"
     assert verdict(T, moved, rates, error=0.05).verdict == "right"  # measured: an error of 0.006
+
+
+@pytest.mark.parametrize(
+    ("unit", "error", "text"), [(("degrees", 57.3), 2.8, "160 degrees"), (("rad", 1.0), 1.23e-9, "1.2e-9 rad")]
+)
+def test_an_error_is_a_plain_number_with_its_unit(unit, error, text):
+    assert Unit(*unit).show(error) == text
