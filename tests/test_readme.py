@@ -40,8 +40,8 @@ def load(name):
 
 @pytest.fixture
 def copied(tmp_path):
-    """Return a folder with a copy of all pages and badges."""
-    for page in (*pages(), *(ROOT / "reports" / "pictures").glob("badge_*.svg")):
+    """Return a folder with a copy of all pages."""
+    for page in pages():
         copy = tmp_path / "copy" / page.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(page, copy)
@@ -89,7 +89,6 @@ def test_all_pages_are_current():
         ("references/README.md", "| [`drake`]"),
         ("benchmarks/README.md", "| `hard_cases` |"),
         ("reports/README.md", "| `watch` |"),
-        ("reports/pictures/badge_version.svg", "version"),
     ],
 )
 def test_a_page_that_differs_from_the_code_is_found(page, word, copied, check):

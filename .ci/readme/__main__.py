@@ -1,4 +1,4 @@
-"""Write README.md, its badges, and the generated parts of other pages: tables of times, and of what the code declares.
+"""Write README.md, and the generated parts of other pages: tables of times, and of what the code declares.
 
     python .ci/readme                    # write them
     python .ci/readme --check            # exit with 1 if one of them is not current
@@ -89,13 +89,7 @@ def main(root: Path = ROOT) -> None:
     if any(value for name, value in vars(options).items() if name != "check"):
         measure_again(options)
     pages = read_pages(root)
-    badges = {root / PICTURE.parent / name: text for name, text in declared.badges().items()}
-    pages |= {badge: badge.read_text(encoding="utf-8") if badge.exists() else "" for badge in badges}
-    new = (
-        {page: marks.fill(text, PARTS) for page, text in pages.items()}
-        | {root / "README.md": measured.render_readme()}
-        | badges
-    )
+    new = {page: marks.fill(text, PARTS) for page, text in pages.items()} | {root / "README.md": measured.render_readme()}
     changed = [page for page in pages if new[page] != pages[page]]
     missing = {*PARTS} - {name for text in pages.values() for name in marks.names(text)}
     if options.check and (changed or missing):

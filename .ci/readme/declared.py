@@ -17,8 +17,6 @@ from typing import Any
 from code_map import PACKAGES, ROOT, map_of, summary
 from marks import table
 
-from conservative.version import VERSION
-
 GROUPS = ("conservative.methods", "conservative.engines")
 
 
@@ -28,18 +26,6 @@ def entries(group: str) -> Iterator[tuple[str, Any]]:
     for name, place in project["entry-points"][group].items():
         module, _, attribute = place.partition(":")
         yield name, getattr(import_module(module), attribute)
-
-
-def badges() -> dict[str, str]:
-    """Return the badges of README.md by the names of their files."""
-    from conservative.reports.document.badge import badge
-
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    pythons = [
-        line.rpartition(" ")[2] for line in project["classifiers"] if line.startswith("Programming Language :: Python :: 3.")
-    ]
-    values = {"version": VERSION, "python": f"{pythons[0]} to {pythons[-1]}", "licence": project["license"]}
-    return {f"badge_{name}.svg": badge(name, value) for name, value in values.items()}
 
 
 def methods() -> str:

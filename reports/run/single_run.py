@@ -150,12 +150,6 @@ def csv_text(trajectory: Trajectory) -> str:
     return stream.getvalue()
 
 
-def parquet_bytes(trajectory: Trajectory) -> bytes:
-    """Return the samples as a Parquet file."""
-    made: bytes = trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False)
-    return made
-
-
 def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None) -> tuple[Trajectory, Grid]:
     """Return the trajectory of `integrate(error=)` with samples every dt, s, by default the scene's step, and their grid.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH, angle, bound
+from ..document.cells import DASH, angle, bound, number
 from ..document.model import Block, Document, Facts, Items, Table
 from ..run.single_run import is_right, status_of
 
@@ -46,7 +46,7 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "orthonormality", bound(summary["orthonormality"], 3)
     if last := summary["last"]:
         yield f"at t = {last['t']:g} s", ""
-        yield from ((f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1))
+        yield from ((f"R_WB row {i}", _numbers(row)) for i, row in enumerate(last["R_WB"], start=1))
         yield "w_WB_B, rad/s", _numbers(last["w_WB_B"])
 
 
@@ -79,7 +79,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
             *(_cell(summary.get("drift", {}).get(name)) for name in drifts),
             *(_cell(summary["error"].get(name), shown) for name, shown in (("attitude", angle), ("rate", bound))),
             f"{summary['counters']['steps']:,}" if "counters" in summary else DASH,
-            f"{summary['wall_time']:.2g}" if "wall_time" in summary else DASH,
+            number(summary["wall_time"]) if "wall_time" in summary else DASH,
         ]
         for summary in summaries
     ]

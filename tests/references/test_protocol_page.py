@@ -14,7 +14,7 @@ from conservative.references.worker import program
 from conservative.references.worker.client import close_workers
 
 PAGE = (Path(program.__file__).parents[1] / "PROTOCOL.md").read_text(encoding="utf-8")
-SAMPLES = dict(re.findall(r"^```(c|javascript|cpp|rust|csharp|julia)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
+SAMPLES = dict(re.findall(r"^```(c|javascript|cpp|rust|csharp)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
 LANGUAGES = {
     "c": ("gcc -Wall -Wextra -Werror -O2 my_engine.c -o my_engine -lm", "./my_engine"),
     "javascript": ("", "node my_engine.js"),
@@ -51,5 +51,5 @@ def test_a_sample_is_right(language, tmp_path, monkeypatch):
 
 
 def test_samples_are_short():
-    assert {*SAMPLES} == {*LANGUAGES, "julia"}
+    assert {*SAMPLES} == {*LANGUAGES}
     assert max(text.count("\n") for text in SAMPLES.values()) <= 40

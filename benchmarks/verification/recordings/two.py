@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
+from conservative.presentation import number
 from conservative.scene import Scene
 
 from ..compare import Compared, differ
@@ -116,7 +117,7 @@ def verify_two(
 
 def _reason(a: Verification, b: Verification, found: Difference) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    size = "" if found.missing else f"{found.error[found.worse]:.2g} {UNITS[found.worse]}"
+    size = "" if found.missing else f"{number(found.error[found.worse])} {UNITS[found.worse]}"
     both = (a.verdict, b.verdict)
     (one,), (other,) = a.findings, b.findings
     if both == (Verdict.RIGHT, Verdict.RIGHT):

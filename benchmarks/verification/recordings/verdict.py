@@ -13,6 +13,7 @@ from conservative.attitude import Array
 from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
 from conservative.invariants import find_energy, kinetic_energy, sizes
+from conservative.presentation import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -41,7 +42,7 @@ class Unit(NamedTuple):
 
     def show(self, error: float) -> str:
         """Return an error as a number with its unit."""
-        return f"{error * self.size:.2g} {self.name}"
+        return f"{number(error * self.size)} {self.name}"
 
 
 @dataclass(frozen=True)
@@ -266,10 +267,10 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
 
 
 def _single_rows(found: Comparison) -> Explanation:
-    number, at, size = found.outliers[0]
+    row, at, size = found.outliers[0]
     unit = UNITS[int(np.argmax(found.worst.max(axis=1)))]
-    text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
-    values = {"row": float(number), "time": at, "error": size}
+    text = f"Single rows are off, the first of them row {row:,} at {at:g} s, by {number(size)} {unit}; the others agree"
+    values = {"row": float(row), "time": at, "error": size}
     return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
 
