@@ -48,7 +48,7 @@ class Rows:
 
     def __init__(self):
         self.program = importlib.import_module("measured")
-        self.measure = importlib.import_module("measure")
+        self.measure = importlib.import_module("rows")
         self.value, self.version, self.date = self.program.read_values()
 
     def ratios(self, *place):
@@ -178,14 +178,14 @@ def typed(rows):
 
 
 def once(rows):
-    assert importlib.import_module("price_program").TOL == 1e-9
+    assert importlib.import_module("price").TOL == 1e-9
     first = [rows.value["price", side, "first run of another body"] for side in ("conservative", "heyoka")]
     return [1e-6, Near(1e3 * first[0]), 1e-9, Near(1e3 * first[1])]
 
 
 def fastest_on(scene, durations):
     def check(rows):
-        found = map(float, re.findall(rf"{scene}:t_end=(\d+)", rows.measure.TIMES[1]))
+        found = map(float, re.findall(rf"{scene}:t_end=(\d+)", rows.measure.LONGER))
         assert [registry.scene(scene).t_end, *found] == pytest.approx(durations, rel=0.01)
         sides = [(scene, name) for name in ("ours", "closed form")]
         return [*durations, *(each for side in sides for each in (rows.ratios, rows.slower)[rows.loses(*side)](*side))]
@@ -337,7 +337,7 @@ FEW = ("kovalevskaya_top", "sprung_body", "lagrange_top", "brick_flip", "tumblin
     "name", [pytest.param(each, marks=() if each in FEW else pytest.mark.slow) for each in registry.list_scenes()]
 )
 def test_the_methods_that_are_chosen_conserve(name):
-    method, drift = importlib.import_module("measure").chosen_drift(name)
+    method, drift = importlib.import_module("rows").chosen_drift(name)
     (limit, _), rows = chosen(Rows()), Rows()
     assert drift <= 1e-13, method  # measured 3.1e-14 for the integral of Kovalevskaya's top, and at most 5.7e-15 elsewhere
     assert limit <= 1e-13

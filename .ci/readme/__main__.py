@@ -2,8 +2,8 @@
 
     python .ci/readme                 # write them
     python .ci/readme --check         # exit with 1 if one of them is not current
-    python .ci/readme --from FOLDER   # first replace rows of measured.csv, and the picture, from folders of studies and a report
-    python .ci/readme --chosen        # first measure the drifts of the methods that `integrate(scene, error=1e-6)` chooses
+    python .ci/readme --from FOLDER   # first replace rows of measured.csv and the picture, from folders of studies
+    python .ci/readme --chosen        # first measure the drifts of chosen methods
     python .ci/readme --price         # first measure runs in new processes
 
 CONTRIBUTING.md has the commands that make the folders. What is not measured again keeps its rows.
@@ -51,7 +51,7 @@ def measure_again(folder: Path | None, chosen: bool, price: bool) -> None:
     if price:
         import price as program
 
-        new += program.price_rows(program.measure_all())
+        new += program.price_rows()
     every = rows.replaced(read_csv(measured.ROWS), new)
     with measured.ROWS.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, rows.COLUMNS, restval="", lineterminator="\n")

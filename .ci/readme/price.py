@@ -1,21 +1,18 @@
-"""What a run to an attitude error costs in a new process, with imports, search and compilation, on random bodies of all fields.
+"""What a run to 1e-6 rad costs in a new process, with imports, search and compilation, on random bodies of all fields.
 
-Ours is `integrate(scene, error=1e-6)`, also with an empty cache of compiled kernels. heyoka is built with base vectors and the
-numbers of a body as parameters, at a tolerance with which its errors on these bodies are below 1e-6 rad. NumPy and this project's
-text of heyoka's equations are imported before the clock starts. This file is also the program that runs in each process.
+Ours is `integrate(scene, error=1e-6)`, with a full cache of compiled kernels. heyoka is built with base vectors and the numbers
+of a body as parameters, at a tolerance with which its errors on these bodies are below 1e-6 rad. NumPy and this project's text
+of heyoka's equations are imported before the clock starts. `python price.py SIDE FIELD INDEX` runs one side and prints JSON.
 """
 
 from __future__ import annotations
 
 import datetime
 import json
-import os
 import statistics
 import subprocess
 import sys
-from collections import defaultdict
 from collections.abc import Callable, Iterator
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
@@ -25,107 +22,95 @@ ERROR, TOL = 1e-6, 1e-9
 """Target of `integrate`, rad, and tolerance of heyoka."""
 OTHERS = range(2, 12)
 """Indices of further bodies of a field, each of which is run once: the time of another body is the median."""
-OURS, EMPTY, HEYOKA = "conservative", "conservative, empty cache", "heyoka"
 QUANTITIES = {"once": "one run", "other": "first run of another body", "error": "largest error"}
-Prepare = Callable[[Any], Callable[[], Any]]
-"""Prepares the first run of a scene, which returns its final attitude (3, 3) or a function that computes it."""
+Run = Callable[[], Callable[[], Any]]
+"""Runs a scene and returns a function for its final attitude (3, 3), whose conversion is not timed."""
 
 
-def ours() -> Prepare:
-    """Return how `integrate` runs a scene."""
+def ours() -> Callable[[Any], Run]:
+    """Return a function that prepares the run of a scene by this package."""
     import conservative as cv
 
-    return lambda scene: lambda: cv.integrate(scene, error=ERROR).R_WB[-1]
-
-
-def heyoka(formulations: Any, to_body_axes: Any) -> Prepare:
-    """Return how heyoka runs a scene; bodies share the compiled code of their field."""
-    import heyoka as hy
-
-    compiled: dict[Any, Any] = {}
-
-    def prepare(scene: Any) -> Callable[[], Any]:
-        problem = formulations.base_vectors(scene)
-        if problem.form not in compiled:
-            compiled[problem.form] = hy.taylor_adaptive(problem.form.build(), [0.0] * 9, tol=TOL, fast_math=True)
-        integrator = compiled[problem.form]
-
-        def run() -> Any:
-            integrator.pars[:], integrator.state[:], integrator.time = problem.parameters, problem.start, 0.0
-            integrator.propagate_until(scene.t_end)
-            states = integrator.state.copy()[None, None]
-            return lambda: to_body_axes(
-                np.array([scene.t_end]), formulations.gather([problem])(states), problem.axes.R_BF[None]
-            )[0]
+    def prepare(scene: Any) -> Run:
+        def run() -> Callable[[], Any]:
+            trajectory = cv.integrate(scene, error=ERROR)
+            return lambda: trajectory.R_WB[-1]
 
         return run
 
     return prepare
 
 
-def equations() -> tuple[Any, Any]:
-    """Import this project's text of heyoka's equations, which is not heyoka's time."""
-    from conservative.references.heyoka_equations import formulations
-    from conservative.references.samples import to_body_axes
+def heyoka(formulations: Any, to_body_axes: Any) -> Callable[[Any], Run]:
+    """Return a function that prepares the run of a scene by heyoka; bodies share the compiled code of their field."""
+    import heyoka as hy
 
-    return formulations, to_body_axes
+    compiled: dict[Any, Any] = {}
 
+    def prepare(scene: Any) -> Run:
+        problem = formulations.base_vectors(scene)
+        if problem.form not in compiled:
+            compiled[problem.form] = hy.taylor_adaptive(problem.form.build(), [0.0] * 9, tol=TOL, fast_math=True)
+        integrator = compiled[problem.form]
 
-def timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the wall time of a call, s, and its result."""
-    begin = perf_counter()
-    result = work()
-    return perf_counter() - begin, result
+        def run() -> Callable[[], Any]:
+            integrator.pars[:], integrator.state[:], integrator.time = problem.parameters, problem.start, 0.0
+            integrator.propagate_until(scene.t_end)
+            state, t = integrator.state.copy()[None, None], np.array([scene.t_end])
+            return lambda: to_body_axes(t, formulations.gather([problem])(state), problem.axes.R_BF[None])[0]
+
+        return run
+
+    return prepare
 
 
 def program(side: str, field: str, index: str) -> None:
     """Print the time of the first run since before the import, the time of a run of another body, and the error."""
-    texts = () if side == OURS else equations()
+    if side == "heyoka":
+        from conservative.references.heyoka_equations import formulations
+        from conservative.references.samples import to_body_axes
     begin = perf_counter()
-    prepare = heyoka(*texts) if texts else ours()
+    prepare = heyoka(formulations, to_body_axes) if side == "heyoka" else ours()
     from conservative.scenes.random_body import random_body
 
     scene = random_body(field, index=int(index))
     final = prepare(scene)()
-    once = perf_counter() - begin
-    other = statistics.median(timed(prepare(random_body(field, index=each)))[0] for each in OTHERS)
+    times, runs = [perf_counter() - begin], [prepare(random_body(field, index=each)) for each in OTHERS]
+    for run in runs:
+        begin = perf_counter()
+        run()
+        times.append(perf_counter() - begin)
     from conservative.attitude import angle_between
     from conservative.grid import Grid
     from conservative.references.truth import reference
 
     truth = reference(scene, Grid(scene.t_end, 1)).trajectory.R_WB[-1]
-    error = float(angle_between(truth, np.reshape(final() if callable(final) else final, (3, 3))))
-    print(json.dumps({"once": once, "other": other, "error": error}))
+    error = float(angle_between(truth, np.reshape(final(), (3, 3))))
+    print(json.dumps({"once": times[0], "other": statistics.median(times[1:]), "error": error}))
 
 
-def measure(side: str, field: str, index: int, cache: str) -> dict[str, float]:
-    """Return the times, s, and the error, rad, of one side in a process with a folder for compiled kernels."""
-    command = [sys.executable, "-P", __file__, HEYOKA if side == HEYOKA else OURS, field, str(index)]
-    variables = {**os.environ, "NUMBA_CACHE_DIR": cache}
-    done = subprocess.run(command, env=variables, timeout=300, check=True, capture_output=True, text=True)
-    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
-    return found
+def measure(side: str, field: str, index: int) -> dict[str, float]:
+    """Return the times, s, and the error, rad, of one side in a new process."""
+    command = [sys.executable, "-P", __file__, side, field, str(index)]
+    done = subprocess.run(command, timeout=300, check=True, capture_output=True, text=True)
+    result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return result
 
 
-def measure_all() -> dict[str, list[dict[str, float]]]:
-    """Return the results of each side on two bodies of each field; the first run of a field has an empty cache."""
+def price_rows(bodies: tuple[int, ...] = (0, 1), fields: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
+    """Yield the medians of the times and the largest error of each side, as rows of measured.csv."""
     from conservative.scenes.random_body import FIELDS
 
-    found: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for field in FIELDS:
-        with TemporaryDirectory() as cache:
-            for side, index in ((EMPTY, 0), (OURS, 0), (OURS, 1), (HEYOKA, 0), (HEYOKA, 1)):
-                found[side].append(measure(side, field, index, cache))
-    return found
-
-
-def price_rows(found: dict[str, list[dict[str, float]]]) -> Iterator[dict[str, Any]]:
-    """Yield the medians of the times and the largest error of each side, as rows of measured.csv."""
     common = {"scene": "price", "command": "python .ci/readme --price", "date": datetime.date.today().isoformat()}
-    for side, bodies in found.items():
+    for side in ("conservative", "heyoka"):
+        results = []
+        for field in fields or FIELDS:
+            measure(side, field, bodies[0])  # fills the cache
+            results += [measure(side, field, index) for index in bodies]
         for key, quantity in QUANTITIES.items():
             pick, unit = (max, "rad") if key == "error" else (statistics.median, "s")
-            yield common | {"name": side, "quantity": quantity, "unit": unit, "value": pick([body[key] for body in bodies])}
+            value = pick([result[key] for result in results])
+            yield common | {"name": side, "quantity": quantity, "unit": unit, "value": value}
 
 
 if __name__ == "__main__":
