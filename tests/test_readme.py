@@ -297,5 +297,5 @@ def test_the_page_follows_the_counts_and_intervals(of_bodies):
     text = " ".join(program.render_readme().split())
     assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
     assert "Of these 22 cases, heyoka is faster beyond the interval" in text
-    assert "in none; 11 are open" in text
+    assert "in none; 11 are undecided" in text
     assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-3 | 1.39")
