@@ -12,6 +12,7 @@ import price
 sys.path.pop(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("side", "limit"), [("heyoka", price.ERROR / 10), ("conservative", price.ERROR)])
 def test_a_side_reaches_the_error(side, limit):
     found = price.measure(side, "gravity", 0)

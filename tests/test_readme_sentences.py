@@ -139,9 +139,10 @@ def turned(rows):
 def python(rows):
     allowed = SpecifierSet(metadata.metadata("conservative-rotation")["Requires-Python"])
     assert [minor for minor in range(30) if allowed.contains(f"3.{minor}")] == [11, 12, 13, 14]
-    size = sum({key[0]: size for key, size in installed("conservative-rotation", {"all"}, {}).items()}.values())
-    assert 1.4e9 < size < 2e9  # measured 1.69e9 with Python 3.11
-    return [3.11, 3.14, 1.7]
+    extras = {"report", "engines", "environments"}
+    size = sum({key[0]: size for key, size in installed("conservative-rotation", extras, {}).items()}.values())
+    assert 1e9 < size < 1.6e9  # measured 1.25e9 with Python 3.11, and 1.47e9 on the disk with compiled files
+    return [3.11, 3.14, 1.5]
 
 
 def at_the_steps(rows):
