@@ -232,7 +232,7 @@ def cited(rows):
 
 FIRST = "first run of another body"
 CLAIMS = {
-    "Its default methods keep every conserved quantity": chosen,
+    "The methods that it chooses for a target error keep": chosen,
     r"\* `x` is the integrator of Krenk and Nielsen": lambda rows: [cv.Reduced().order],
     "In 6 s the attitude error of MuJoCo's default": lambda rows: [BRICK.t_end, *moving(rows, "MuJoCo, default", "PyBullet")],
     "The error of the paper's map stays within": lambda rows: moving(rows, "reduced"),
