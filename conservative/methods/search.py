@@ -37,7 +37,8 @@ from .projected import Projected
 from .trials import Trials, convergence_factor, parts_for
 from .units import bound_rate
 
-Setting, Tried = TypeVar("Setting"), TypeVar("Tried")
+Setting = TypeVar("Setting")
+Tried = TypeVar("Tried")
 SAFETY = 0.5
 """Share of the requested error that steps have to reach."""
 ATTEMPTS = 24
