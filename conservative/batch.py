@@ -97,6 +97,33 @@ class Batch:
         return principal_axes(self.inertia)
 
     @cached_property
+    def body_momenta(self) -> Array:
+        """Initial momenta (n, 3), kg m^2/s, body axes, without the momentum of a rotor."""
+        if self.inertia is None:
+            return self.w_WB_B0 @ self.scene.body.inertia
+        return np.asarray(np.sum(self.inertia * self.w_WB_B0[:, None], axis=2))  # ten times as fast as small products
+
+    @property
+    def momenta(self) -> Array:
+        """Initial momenta (n, 3), kg m^2/s, body axes, with the momentum of a rotor."""
+        h = self.scene.body.rotor_momentum
+        return self.body_momenta if h is None else self.body_momenta + h
+
+    @cached_property
+    def kinetic_energies(self) -> Array:
+        """Initial kinetic energies (n,), J, without the constant one of a rotor."""
+        return np.asarray(np.einsum("ni,ni->n", self.body_momenta, self.w_WB_B0) / 2)
+
+    @property
+    def energies(self) -> Array:
+        """Sums of all energies (n,), J, as `Scene.energies`, in a new array."""
+        if self.scene.loaded:
+            return np.array([self.take(i).energies for i in range(len(self))])
+        if self.scene.potential is None:
+            return self.kinetic_energies.copy()
+        return self.kinetic_energies + (self.varied.scales() if self.parameters else self.scene.potential.scale())
+
+    @cached_property
     def symmetry_axes_B(self) -> Array:
         """Unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan without one.
 

@@ -14,7 +14,6 @@ import numpy as np
 from .attitude import Array
 from .batch import Batch
 from .deferred_imports import kernels
-from .flight import rotation_only
 from .grid import Grid
 from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, sizes
 from .potentials.field import lengths
@@ -67,8 +66,8 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
     """
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
-    L_B, kinetic, rotor = momenta_of(bodies), kinetic_energies(bodies), scene.body.rotor_momentum
-    scale = energy_scales(bodies)
+    L_B, kinetic, rotor = bodies.momenta, bodies.kinetic_energies, scene.body.rotor_momentum
+    scale = bodies.energies
     scale[scale == 0] = 1.0
     largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
     momentum = lengths(L_B)
@@ -104,7 +103,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
     """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
-    return (ORTHONORMALITY, *(each.name for each in rotation_only(bodies.scene).invariants))
+    return (ORTHONORMALITY, *(each.name for each in bodies.scene.rotation_only.invariants))
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -115,7 +114,7 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]
-    for each in rotation_only(scene).invariants:
+    for each in scene.rotation_only.invariants:
         if each in scene.extra_invariants:
             start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
             values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
@@ -126,30 +125,6 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
         else:
             columns.append(measured[:, 2 if each.unit == MOMENTUM_UNIT else 1])
     return np.stack(columns, axis=1)
-
-
-def momenta_of(bodies: Batch, rotor: bool = True) -> Array:
-    """Return the initial momenta (n, 3), kg m^2/s, body axes, with or without that of the rotor."""
-    h = bodies.scene.body.rotor_momentum
-    if bodies.inertia is None:
-        L_B = bodies.w_WB_B0 @ bodies.scene.body.inertia
-    else:
-        L_B = np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
-    return L_B if h is None or not rotor else L_B + h
-
-
-def kinetic_energies(bodies: Batch) -> Array:
-    """Return the initial kinetic energies (n,), J, without the constant one of a rotor."""
-    return np.asarray(np.einsum("ni,ni->n", momenta_of(bodies, rotor=False), bodies.w_WB_B0) / 2)
-
-
-def energy_scales(bodies: Batch) -> Array:
-    """Return the sums of all energies (n,), J, as `Scene.energies`."""
-    if bodies.scene.loaded:
-        return np.array([bodies.take(i).energies for i in range(len(bodies))])
-    if bodies.scene.potential is None:
-        return kinetic_energies(bodies)
-    return kinetic_energies(bodies) + (bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale())
 
 
 def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
 from .outcome import Outcome, OutcomeKind
 from .posix import unstoppable
@@ -54,6 +54,31 @@ class BadInput(_Error, ValueError):
     def __init__(self, argument: str, got: object, allowed: str) -> None:
         self.argument, self.got, self.allowed = argument, got, allowed
         super().__init__(f"{shorten(argument)}: got {shorten(got)}; expected {shorten(allowed)}")
+
+
+REMOVED: Mapping[str, str] = MappingProxyType(
+    {
+        ".mp4": "write a .gif, and convert it: ffmpeg -i FILE.gif FILE.mp4",
+        ".pdf": "write an .svg, and convert it: rsvg-convert --format pdf FILE.svg",
+        ".parquet": "CSV: pandas.read_parquet(FILE).to_csv(NEW, index=False)",
+        ".gz": "the unpacked file: gunzip FILE",
+        **dict.fromkeys((".a", ".aem"), "its rows as CSV, below a line of names, such as time q_x q_y q_z q_w"),
+        "run --parquet": "Write CSV with --csv FILE, and convert it: pandas.read_csv(FILE).to_parquet(NEW)",
+        "study --latex": "Use --csv, or --markdown and a converter such as pandoc",
+        "to_xarray": "to_pandas(), which returns the same samples as a table",
+    }
+)
+"""What is gone since the last release, and what to use instead: endings of files, options, and attributes."""
+
+
+class RemovedAttribute:
+    """An attribute that is gone. An error says what to use instead."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: object, owner: type) -> NoReturn:
+        raise AttributeError(f"{owner.__name__}.{self.name} is gone. Use {REMOVED[self.name]}")
 
 
 class Unsupported(BadInput):
@@ -304,9 +329,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "environments": ("uv", "platformdirs", "psutil"),
         "report": ("jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
-        "parquet": ("pyarrow",),
-        "xarray": ("xarray",),
-        "video": ("matplotlib", "imageio_ffmpeg"),
+        "video": ("PIL",),
         "models": ("pxr", "trimesh", "lxml", "cloudpickle"),
         "cluster": ("distributed", "cloudpickle"),
         "docs": ("sphinx", "myst_nb", "furo", "sphinx_click"),

@@ -16,13 +16,13 @@ import re
 import shutil
 import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from .errors import NotWritten
+from .errors import REMOVED, BadInput, NotWritten
 from .posix import NO_LOCK, lock, release
 
 _AGE = 7 * 86400.0
@@ -60,6 +60,13 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
         left = memoryview(content)
         while left:
             left = left[raw.write(left) :]
+
+
+def require_ending(argument: str, path: Path, endings: Iterable[str]) -> None:
+    """Raise `BadInput` for the name of a file with another ending. For a format that is gone, it says what to do instead."""
+    if path.suffix not in endings:
+        instead = f". Instead of {path.suffix}: {REMOVED[path.suffix]}" if path.suffix in REMOVED else ""
+        raise BadInput(argument, repr(str(path)), f"a file that ends in {', '.join(endings)}{instead}")
 
 
 def open_file(path: Path) -> BinaryIO:

@@ -11,7 +11,7 @@ Source: any mechanics textbook, such as Goldstein, Classical Mechanics, sections
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,9 +24,6 @@ from .features import Feature, Features
 from .invariants import MOMENTUM_UNIT, InvariantInTime
 from .potentials.uniform_gravity import UniformGravity
 from .shapes import MassDistribution
-
-AnyScene = TypeVar("AnyScene", bound=Any)
-"""A `Scene`, whose file imports this one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +106,6 @@ class Flight:
             InvariantInTime("momentum about the origin", MOMENTUM_UNIT, spin + m * speed * reach or 1.0, angular),
             InvariantInTime("total energy", "J", whole or 1.0, energy),
         )
-
-
-def rotation_only(scene: AnyScene) -> AnyScene:
-    """Return the scene without free flight: the rotation about the centre of mass."""
-    return scene if scene.flight is None else scene.rename(scene.name, flight=None)
 
 
 def read_flight(body: object, potential: object, p_WB0: ArrayLike | None, v_WB0: ArrayLike | None) -> tuple[RigidBody, Flight]:

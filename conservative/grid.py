@@ -25,6 +25,8 @@ USUAL_MEMORY = 4 * 2**30
 ROUNDING = 2.0**-50
 """Times that differ by less than this share are equal: rounding of two times and of their quotient makes up to 1.5 * 2^-52."""
 
+_DURATION = "a finite duration above 0, s"
+
 
 @dataclass(frozen=True, init=False)
 class Grid:
@@ -88,13 +90,20 @@ class Grid:
         return 1 + -(-self.n_steps // self.every)
 
 
-def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: object = 1) -> Grid:
+def grid_for(scene: Scene, dt: object = None, t_end: object = None, sample_every: object = 1) -> Grid:
     """Return the checked grid of a run of steps dt up to t_end, both in s; the duration is by default the scene's.
+
+    The step is by default the scene's, at most the duration, and a part of it if there are functions of time.
 
     Raise `BadInput` if dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1
     or more, the samples would not fit in memory, or the table of a load ends before the last step.
     """
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    if dt is None:
+        end = read_end(scene, t_end)
+        dt = min(scene.dt, end)
+        dt = end / count_steps(end, dt) if scene.asks_time else dt
+    else:
+        end = scene.t_end if t_end is None else positive_number("t_end", t_end, _DURATION)
     if type(dt) is float and SMALLEST <= dt <= end:
         step = dt
     else:
@@ -110,6 +119,14 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
     return _recall_grid(dt=step, n_steps=n_steps, every=every)
+
+
+def read_end(scene: Scene, t_end: object) -> float:
+    """Return the duration of a run, s; the scene's if t_end is None."""
+    end = scene.t_end if t_end is None else positive_number("t_end", t_end, _DURATION)
+    for load in scene.loads:
+        load.require_times(end)
+    return end
 
 
 def count_steps(t_end: float, dt: float) -> int:

@@ -21,6 +21,8 @@ MOMENTUM_UNIT = "kg m^2/s"
 AXIAL_MOMENTUM = "axial momentum"
 JACOBI_INTEGRAL = "Jacobi integral"
 """Name of the invariant that replaces the energy in a turning field."""
+MOMENTA = MOMENTUM, VERTICAL_MOMENTUM, FIELD_MOMENTUM = "momentum", "vertical momentum", "momentum along the field's axis"
+"""Names of what a field conserves of the momentum in the world: all without a field, or the component along its axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +122,9 @@ def invariants_of(
     # A scene that starts at rest has no momentum. The momentum that gravity can produce is the scale instead.
     scale = float(np.linalg.norm(body.momentum(w_WB_B0))) or math.sqrt(float(body.moments.max()) * energy_scale)
     if potential is None:
-        conserved.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
+        conserved.append(Invariant(MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
-        name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
+        name = VERTICAL_MOMENTUM if isinstance(potential, UniformGravity) else FIELD_MOMENTUM
         conserved.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
     if axis is not None:
         conserved.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))

@@ -60,16 +60,25 @@ def _leave_alone(prepare_many: Callable[[Any, Any, Grid], Any]) -> Callable[[Any
 
 
 class Method(ABC):
-    """An integration method: a frozen dataclass, defined in one file and registered by one entry point.
+    """An integration method, ours or an engine. These nine sentences are its contract:
 
-    Subclasses must define `family`, `role`, `order` and `prepare`; everything else has a default.
+    1. A method is a frozen dataclass, registered by one entry point with the name `family`; its fields are its settings, which
+       have defaults, and its constructor raises `BadInput` for a wrong value.
+    2. `role` is its role in comparisons, `order` its order of convergence in dt, None if the accuracy does not depend on dt.
+    3. `supports` has the features of scenes that it supports, and `unsupported` returns a reason that depends on numbers: no
+       other scene reaches `prepare` and `prepare_many`.
+    4. `prepare(scene, grid)` does all work that is needed once, compiles, raises `BadInput` for a step that is too long, and
+       returns a function without arguments, the run, which is what studies time.
+    5. A run starts from the initial state in each call and depends on nothing but scene, grid and settings; runs of separate
+       calls of `prepare` can execute in parallel threads, the same run cannot.
+    6. A run returns a `Trajectory` of the scene with all samples of the grid, the first of which is the initial state, in body
+       axes and SI units, with `label`; attitudes are as computed, without orthonormalization.
+    7. A run that fails raises nothing: it returns the samples before the failure, with `failure`.
+    8. Invariants in `conserves` stay within `bounds` at all samples, as does orthonormality: `check` rejects other runs.
+    9. `prepare_many(bodies, grid)` is optional; the numbers of a body then do not depend on the bodies beside it.
 
-    Attributes
-    ----------
-    family, role
-        Name of its entry point, and its role: ours, engine or truth.
-    method_info
-        Settings for tables and benchmarks, place in the automatic choice, colour; every entry has a default.
+    Required are `family`, `role`, `order` and `prepare`. `method_info` declares settings for tables and benchmarks, the place
+    in the automatic choice and the colour, and each entry has a default.
     """
 
     family: ClassVar[str]
@@ -170,20 +179,15 @@ class Method(ABC):
 
     @abstractmethod
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Convert the scene, compile, and return a function without arguments that makes a run and returns the trajectory.
+        """Return the run of a scene on a grid: sentences 4 to 7 of the contract.
 
-        Work that is needed once per scene belongs here and not in the run, which is timed. The run is not checked; use
-        `check(scene, grid, run())`. Every override raises `Unsupported` for a scene that is not supported.
-
-        It can be called repeatedly and starts from the initial state each time. Runs of separate
-        calls of `prepare` can execute in parallel threads; the same run cannot. It can have an attribute `own_loop`, a
-        function that integrates and does not convert the samples.
+        It is not checked; use `check(scene, grid, run())`. Every override raises `Unsupported` for a scene that is not
+        supported. The run can have an attribute `own_loop`, a function that integrates and does not convert the samples.
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:
         """Return the run of a `Batch`, which returns a `Block`; None if bodies have to run one by one.
 
-        Runs of separate calls can execute in parallel threads. The numbers of a body do not depend on other bodies and runs.
         Overrides are not asked for scenes with loads, or with features that the method does not support.
         """
         return None
@@ -230,7 +234,7 @@ class Method(ABC):
         BadInput
             A setting is unknown or has a wrong value.
         """
-        return call_with_settings(cls, f"method {cls.family}", settings)
+        return call_with_settings(cls, f"method {cls.family}", settings, cls.method_info.removed)
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
         """Return the trajectory with step size dt to t_end, s, whatever its outcome. `integrate` raises exceptions instead.

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from enum import StrEnum
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from .check import describe, real_number, set_fields
@@ -114,6 +115,8 @@ class MethodInfo:
     supports
         The features of scenes that the method supports (`conservative.features`); default: fields that depend on the attitude
         only. If a scene has others, `Method.unsupported` says so. Methods of the rotation alone also take free flight.
+    removed
+        Settings of earlier versions, and for the error message what a name has instead.
     """
 
     variants: tuple[str, ...] = ("",)
@@ -133,6 +136,7 @@ class MethodInfo:
     kernel: str = ""
     structure: Callable[[Any], Structure | None] = lambda method: None
     supports: Features = FIELDS
+    removed: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         set_fields(self, supports=read_features("supports", self.supports))
@@ -181,11 +185,14 @@ def settings_text(value: Any) -> str:
     return ",".join(setting_texts(value).values())
 
 
-def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
+def call_with_settings(
+    target: Callable[..., T], argument: str, text: str, removed: Mapping[str, str] = MappingProxyType({})
+) -> T:
     """Return the result of a function or class for settings such as "RK4,threads=2".
 
-    Items without a key are assigned to the parameters in their order. `argument` is the name of the target in messages. Raise
-    `BadInput` if a setting is unknown or has a wrong value.
+    Items without a key are assigned to the parameters in their order. `argument` is the name of the target in messages, and
+    `removed` has what to do instead of settings of earlier versions. Raise `BadInput` if a setting is unknown or has a wrong
+    value.
     """
     settings = [item.strip() for item in text.split(",") if item.strip()]
     defaults, arguments = _defaults(target), {}
@@ -194,6 +201,8 @@ def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
         name, equals, setting = item.partition("=")
         if not equals:
             name, setting = names[position] if position < len(names) else item, item
+        if name in removed:
+            raise BadInput(argument, describe(item), removed[name])
         if name not in defaults:
             raise BadInput(argument, describe(item), f"settings {nearest(name, names)}" if names else "no settings")
         value, default = _read_value(setting), defaults[name]

@@ -19,7 +19,6 @@ from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
-    import xarray
 
 COLUMNS = (
     "t",
@@ -45,6 +44,8 @@ TIME_UNITS = (("days", 86400.0), ("h", 3600.0), ("s", 1.0))
 """Units of time axes by their length, s. A unit is used from a duration of two on."""
 
 _WIDTH, _HEIGHT = 480, 160
+DASH = "–"
+"""In place of a number that was not measured."""
 
 
 def rounded_up(value: float, digits: int) -> float:
@@ -53,6 +54,20 @@ def rounded_up(value: float, digits: int) -> float:
         return value
     # Of the 15 digits that a double has for certain, so that 0.1 and 100 * 0.07 = 7.000000000000001 stay 0.1 and 7.
     return float(Context(digits, ROUND_UP).create_decimal(Decimal(f"{value:.15g}")))
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Return a number to `digits` significant digits, a dash for NaN."""
+    if math.isnan(value):
+        return DASH
+    plain = value == 0 or 0.01 <= abs(value) < 1e6
+    return f"{float(f'{value:.{digits}g}'):,g}" if plain else short_power(f"{value:.{digits - 1}e}")
+
+
+def short_power(text: str) -> str:
+    """Return a number with a short exponent: `1e-3` for `1e-03`."""
+    mantissa, _, exponent = text.partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else text
 
 
 def samples(trajectory: Any) -> Array:
@@ -71,28 +86,6 @@ def header(trajectory: Any) -> list[str]:
     """Return the columns with their units, such as `w_WB_B_1 (rad/s)`."""
     units = {name: UNITS.get(name.split("_")[0]) for name in columns(trajectory)}
     return [f"{name} ({unit})" if unit else name for name, unit in units.items()]
-
-
-AXES = {"world": "123", "axis": "123", "part": "wxyz"}
-"""Coordinates of the dimensions of arrays: world axes, body axes and parts of a quaternion."""
-_DIMENSIONS = {"R_WB": ("world", "axis"), "q_WB": ("part",), "w_WB_B": ("axis",), "energy": (), "momentum_W": ("world",)}
-_DIMENSIONS |= {"p_WB": ("world",), "v_WB": ("world",)}
-
-
-def dataset(t: Array, values: dict[str, Array], first: tuple[str, ...] = ("t",), **attributes: str) -> xarray.Dataset:
-    """Return arrays by the names of columns as a dataset, with times t (n,), s, units, and names of the axes.
-
-    Each array has the dimensions `first`, then its own.
-    """
-    import xarray
-
-    variables = {
-        name: ((*first, *_DIMENSIONS[name]), array, {"units": unit} if (unit := UNITS.get(name.split("_")[0])) else {})
-        for name, array in values.items()
-    }
-    used = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & AXES.keys()
-    coordinates = {"t": ("t", t, {"units": "s"}), **{name: list(AXES[name]) for name in sorted(used)}}
-    return xarray.Dataset(variables, coordinates, attributes)
 
 
 def picture(trajectory: Any) -> altair.VConcatChart:

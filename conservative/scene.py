@@ -232,6 +232,11 @@ class Scene(PickledByFields):
         return fresh
 
     @property
+    def rotation_only(self) -> Scene:
+        """The scene without free flight: the rotation about the centre of mass."""
+        return self if self.flight is None else self.rename(self.name, flight=None)
+
+    @property
     def free(self) -> bool:
         """True if neither a potential nor a torque, damping or motor acts."""
         return self.potential is None and not self.loaded

@@ -14,7 +14,7 @@ from . import invariants, presentation
 from .attitude import Array, angle_between, orthonormality, to_quaternion
 from .check import describe, has_masked
 from .deferred_imports import PACKAGES, load_entry
-from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, nearest, require_extra
+from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, RemovedAttribute, nearest, require_extra
 from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
@@ -25,7 +25,6 @@ from .scene import Scene
 if TYPE_CHECKING:
     import altair
     import pandas
-    import xarray
 
 
 class StepControl(NamedTuple):
@@ -183,18 +182,7 @@ class Trajectory:
         frame.attrs = {"scene": self.scene.name, "method": self.label, "outcome": str(self.outcome)}
         return frame
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return a dataset of R_WB, q_WB, w_WB_B, energy and momentum_W, and in free flight p_WB and v_WB; units as above.
-
-        Raises
-        ------
-        MissingExtra
-            xarray, of the extra `xarray`, is not installed.
-        """
-        require_extra("Trajectory.to_xarray", "xarray", "xarray")
-        state = {"R_WB": self.R_WB, "q_WB": self.quaternion_wxyz, "w_WB_B": self.w_WB_B}
-        values = state | {"energy": self.energy, "momentum_W": self.momentum_W} | dict(zip(("p_WB", "v_WB"), self.place))  # noqa: B905
-        return presentation.dataset(self.t, values, scene=self.scene.name, method=self.label, outcome=str(self.outcome))
+    to_xarray = RemovedAttribute()
 
     def plot(self) -> altair.VConcatChart:
         """Return a chart of the body rates and of the drift of every invariant over time.
@@ -211,7 +199,7 @@ class Trajectory:
     def animate(self, *others: Trajectory, labels: Sequence[str] | None = None, truth: Trajectory | None = None) -> Any:
         """Return an animation of this motion, and of others beside it on the same clock (`conservative.reports.animation`).
 
-        A notebook shows it. Its method `save(path)` writes a page (.html), or with the extra `video` a .gif or .mp4.
+        A notebook shows it. Its method `save(path)` writes a page (.html), or with the extra `video` a .gif or .png.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
             try:
                 from .sections.report import build  # here, as altair takes a second to import
 
-                document = render(build(plan, measurements, source), folder, plan.png, plan.latex)
+                document = render(build(plan, measurements, source), folder, plan.png)
             except NotWritten:
                 raise
             except Exception as error:  # the folder has the measurements
@@ -71,22 +71,24 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     return replace(document, failures=[*document.failures, *failed])
 
 
-def render(document: Document, folder: Path, png: bool, latex: bool = False) -> Document:
-    """Write report.md with its pictures, the page, the pages next to it, and, if `latex`, the tables in report.tex.
+def render(document: Document, folder: Path, png: bool) -> Document:
+    """Write report.md with its pictures, the page, the pages next to it, and the table for a paper, report.tex.
 
     Return the document as it was written, in which the parts that could not be made are sentences.
     """
-    from .document import latex as tables
+    from .document import latex
 
     draw = draw_into(folder, png)
     document = write_page(document, draw, folder / "index.html", folder / "report.md")
-    if latex:
-        document = write_text(document, folder / "report.tex", tables.render)
+    if (table := document.for_paper) is not None:
+        made = attempt("The file 'report.tex'", lambda: latex.table(table), AGAIN)
+        if isinstance(made, Paragraph):
+            document = replace(document, blocks=[*document.blocks, made])
+        else:
+            files.write_text(folder / "report.tex", made, "out")
     pages = dict[str, Document]()
     for name, page in document.pages.items():
         pages[name] = write_page(page, draw, folder / f"{name}.html", folder / f"{name}.md")
-        if page.badge:
-            files.write_text(folder / f"{name}.svg", page.badge, "out")
     return replace(document, pages=pages)
 
 
@@ -138,7 +140,7 @@ def with_pictures(document: Document, draw: Callable[[Figure], str], then: str =
 
 
 def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:
-    """Return a function that draws a figure as SVG and PDF, and as PNG if `png`, and returns the name of the SVG.
+    """Return a function that draws a figure as SVG, and as PNG if `png`, and returns the name of the SVG.
 
     Files in the folder with another content than such a picture are not replaced.
     """
@@ -151,17 +153,17 @@ def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:
         """Return whether another figure has the name, also on a disk that takes a name in capitals for the same, or a user."""
         if names.get(name.casefold(), figure.name) != figure.name:
             return True
-        svg, others = folder / f"{name}.svg", [folder / f"{name}{kind}" for kind in (".pdf", ".png")]
+        svg = folder / f"{name}.svg"
         if svg.exists():
             return not svg.read_text(encoding="utf-8", errors="replace").startswith(SVG_MARK)
-        return any(each.exists() for each in others)
+        return svg.with_suffix(".png").exists()
 
     def draw(figure: Figure) -> str:
         name = files.safe_name(figure.name)
         while is_taken(name, figure):
             name += "_"
         names[name.casefold()] = figure.name
-        for kind in (".svg", ".pdf", *[".png"] * png):
+        for kind in (".svg", *[".png"] * png):
             files.write_bytes(folder / f"{name}{kind}", picture_file(figure.picture, kind), "out")
         return f"{name}.svg"
 

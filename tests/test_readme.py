@@ -40,8 +40,8 @@ def load(name):
 
 @pytest.fixture
 def copied(tmp_path):
-    """Return a folder with a copy of all pages and badges."""
-    for page in (*pages(), *(ROOT / "reports" / "pictures").glob("badge_*.svg")):
+    """Return a folder with a copy of all pages."""
+    for page in pages():
         copy = tmp_path / "copy" / page.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(page, copy)
@@ -65,7 +65,7 @@ def check(monkeypatch):
 
 def parts(page):
     """Return the generated parts of a page by name."""
-    return {match[2]: match[3] for match in load("marks").PART.finditer(page.read_text(encoding="utf-8"))}
+    return {match[2]: match[3] for match in load("pages").PART.finditer(page.read_text(encoding="utf-8"))}
 
 
 def edit(page, old, new):
@@ -84,12 +84,11 @@ def test_all_pages_are_current():
     [
         ("conservative/reference.md", "| `Gauss("),
         ("conservative/reference.md", "✓"),
-        ("conservative/reference.md", "| `check.py`"),
-        ("conservative/extending.md", "| `usual_dt` |"),
         ("references/README.md", "| [`drake`]"),
-        ("benchmarks/README.md", "| `hard_cases` |"),
-        ("reports/README.md", "| `watch` |"),
-        ("reports/pictures/badge_version.svg", "version"),
+        ("references/motions/README.md", "| rotor | `rotor`"),
+        ("references/model_files/measured.md", "| mujoco 4.0.0 | 71"),
+        ("reports/documentation/mistakes.md", "| test files |"),
+        ("benchmarks/published.md", "| all | 58"),
     ],
 )
 def test_a_page_that_differs_from_the_code_is_found(page, word, copied, check):
@@ -142,9 +141,9 @@ def test_the_fastest_setting_of_a_family_and_the_ratio_have_the_times_of_all_pro
             for process, noise in enumerate((1.0, 1.21)):
                 spent = time * (noise if role == "ours" else 1.0)
                 rows.append(row("work_precision", name, "time per simulated second", spent, **common, process=process))
-    measure = load("measure")
+    measure = load("rows")
     timed = measure.points(measure.with_names(measurement.frame(rows)))
-    found = {(each["name"], each["quantity"]): each["value"] for each in measure._time_rows(timed, "brick_flip")}
+    found = {(each["name"], each["quantity"]): each["value"] for each in measure.readme_rows(timed, "brick_flip")}
     assert found["heyoka", "time"] == pytest.approx(20)
     assert found["ours", "time"] == pytest.approx(1.1 * 1e6 * (1e-7 * 2e-5) ** 0.5)  # between its points; the mean of processes
     assert found["SciPy", "time"] == float("inf")
@@ -161,7 +160,7 @@ def test_the_picture_has_the_chosen_methods_of_the_top(tmp_path):
             rows.append(row("work_precision", name, "attitude error max", error, **common))
             rows.append(row("work_precision", name, "time per simulated second", 1e-6 / dt, **common))
     measurement.frame(rows).to_csv(tmp_path / "measurements.csv", index=False)
-    load("measure").draw(tmp_path, tmp_path / "picture.svg")
+    load("rows").draw(tmp_path, tmp_path / "picture.svg")
     picture = (tmp_path / "picture.svg").read_text(encoding="utf-8")
     assert [name in picture for name in ("taylor", "mujoco", "gauss")] == [True, True, False]
 
@@ -182,7 +181,7 @@ def study(bodies, processes=5):
 
 def test_random_bodies_have_ratios_intervals_and_counts_at_all_errors():
     table = study([(1e-6, 2e-6), (1e-6, 8e-6), (1e-6, 1.04e-6), (3e-6, 1e-6), (None, 1e-6)])
-    found = {(row["scene"], row["quantity"]): row["value"] for row in load("measure")._random(table)}
+    found = {(row["scene"], row["quantity"]): row["value"] for row in load("rows").body_rows(table)}
     ratios = {scene: value for (scene, quantity), value in found.items() if quantity == "heyoka's time over ours"}
     assert len(ratios) == 11
     slower = np.prod([1 + 0.02 * process for process in range(5)]) ** 0.2
@@ -208,68 +207,68 @@ def study_of_times(study, scene, measures, factor=1):
     return rows
 
 
-def test_the_tables_of_benchmarks_are_made_of_their_studies(copied, tmp_path, monkeypatch):
-    """The other rows stay; a side without a time has no column; a row has the duration of its motion in its name.
+def test_rows_of_studies_replace_earlier_ones(copied, tmp_path, monkeypatch):
+    """The other rows stay; a row has the duration of its motion in its name.
 
     README's ratio is the mean over durations, with the processes of two runs.
     """
     measured = load("measured")
-    rows = study_of_times("work_precision", "brick_flip", ("",)) + study_of_times(
-        "work_precision", "brick_flip:t_end=24", ("",), 4
-    )
-    for name, found in {
-        "times": rows,
-        "each": study_of_times("each_step", "brick_flip:t_end=24", (", each step kept", "")),
-    }.items():
+    short = study_of_times("work_precision", "brick_flip", ("",))
+    longer = study_of_times("work_precision", "brick_flip:t_end=24", ("",), 4)
+    each = study_of_times("each_step", "brick_flip:t_end=24", (", each step kept", ""))
+    for name, found in {"times": short, "times_again": short, "longer": longer, "each_step": each}.items():
         (tmp_path / name).mkdir()
         measurement.frame(found).to_csv(tmp_path / name / "study.csv", index=False)
     shutil.copyfile(measured.ROWS, tmp_path / "measured.csv")
     monkeypatch.setattr(measured, "ROWS", tmp_path / "measured.csv")
-    page = copied / "benchmarks" / "README.md"
-    before = parts(page)
-    folders = [str(tmp_path / "times")] * 2
-    monkeypatch.setattr(sys, "argv", ["readme", "--times", *folders, "--each-step", str(tmp_path / "each")])
+    before, *_ = measured.read_values()
+    monkeypatch.setattr(sys, "argv", ["readme", "--from", str(tmp_path)])
     load("__main__").main(copied)
-    tables = parts(page)
-    assert {name for name in tables if tables[name] != before[name]} == {"three scenes"}
-    header, _, *lines = tables["three scenes"].splitlines()
-    assert header.startswith("| scene | error, rad | our general integrators | heyoka 7.13.2 | heyoka / general |")
-    assert re.match(r"\| brick_flip 6 s \| 1e-3 \| \*\*2\*\* \| 3 \| 1\.47 \(1\.4\d to 1\.[45]\d\) \|", lines[0])
-    (longer,) = [line for line in lines if line.startswith("| brick_flip 24 s | 1e-6 |")]
-    assert "| 5.88 (" in longer  # 4 * 1.47
-    (own,) = [line for line in lines if "without the conversion" in line]
-    assert re.search(r"\| – \| 1\.5 \| 0\.735 \(", own)
-    mean, low, high = measured.interval(measured.read_values()[0], "brick_flip", "ours")
+    after, *_ = measured.read_values()
+    rewritten = {key for key in after if after[key] != before.get(key)}
+    assert all("brick_flip" in scene or "lagrange_top" in scene for scene, *_ in rewritten)
+    assert {key for key in before if key[1] in ("random bodies", "typed tolerance", "price", "reduced")} <= set(after)
+    general = lambda place: measured.interval(after, place, measured.GENERAL)  # noqa: E731
+    assert general("brick_flip 6 s, 1e-3") == pytest.approx([1.47, 1.44, 1.5], rel=0.02)
+    assert general("brick_flip 24 s, 1e-6")[0] == pytest.approx(4 * 1.4708, rel=1e-3)
+    own = "brick_flip 24 s, 1e-6, without the conversion of an engine's states"
+    assert general(own)[0] == pytest.approx(1.4708 / 2, rel=1e-3)
+    mean, low, high = measured.interval(after, "brick_flip", "ours")
     assert mean == pytest.approx(2 * 1.4708, rel=1e-3)
     assert low < mean / 1.9 < mean * 1.9 < high  # two durations that differ by a factor of 4
+    assert "| heyoka 7.13.2 | < 1e-15" in (copied / "README.md").read_text(encoding="utf-8")
 
 
-def test_a_closed_form_is_not_in_bold_however_fast(tmp_path, monkeypatch):
-    program = load("measured")
-    with program.ROWS.open(encoding="utf-8", newline="") as file:
-        rows = [each | {"value": "1e-9"} if each["name"] == program.CLOSED else each for each in csv.DictReader(file)]
-    with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
-    header, _, *lines = program.render_scenes().partition("\n\n")[0].splitlines()
-    column = header.split(" | ").index(program.CLOSED)
-    lines = [line.split(" | ") for line in lines if "without the conversion" not in line]
-    assert {line[column] for line in lines if line[column] != "–"} == {"1e-09"}
-    assert all(sum(cell.startswith("**") for cell in line) == 1 for line in lines)
+def test_typed_tolerances_are_compared_on_the_first_bodies_of_a_study():
+    rows = []
+    for body, ratio in ((0, 2.0), (1, 8.0), (10, 100.0)):  # the last one is not among the first ten
+        place = {"scene": f"random_body:index={body}", "field": "spring", "seed": 1, "body": body}
+        for name, role, time, error in (
+            ("taylor:tolerance=1e-06", "ours", 1.0, 1e-7),
+            ("heyoka:tol=1e-06,frame=lean", "engine", ratio, 2e-7),
+        ):
+            common = place | {"role": role}
+            rows.append(row("random", name, "attitude error max", error * (1 + body), **common))
+            times = (row("random", name, "time per simulated second", time, **common, process=each) for each in range(3))
+            rows.extend(times)
+    found = {(each["scene"], each["quantity"]): each["value"] for each in load("rows").typed_rows(measurement.frame(rows))}
+    for place in ("spring 1e-06", "all fields 1e-06"):
+        assert found[place, "heyoka's time over ours"] == pytest.approx(4)
+        assert [found[place, f"heyoka's time over ours, {end}"] for end in ("smallest", "largest")] == pytest.approx([2, 8])
+    assert found["all fields 1e-06", "heyoka, largest error"] == pytest.approx(4e-7)
+    assert found["all fields 1e-06", "ours, median error"] == pytest.approx(1.5e-7)
 
 
 @pytest.fixture
 def of_bodies(tmp_path, monkeypatch):
     """Return a function that replaces the rows of random bodies by those of a study, and returns the program."""
-    program, measure = load("measured"), load("measure")
+    program, measure = load("measured"), load("rows")
 
     def replace_rows(bodies):
         texts = dict.fromkeys(measure.COLUMNS, "")
         with program.ROWS.open(encoding="utf-8", newline="") as file:
             rows = [each for each in csv.DictReader(file) if each["name"] != "random bodies"]
-        rows += [texts | each for each in measure._random(study(bodies))]
+        rows += [texts | each for each in measure.body_rows(study(bodies))]
         with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, measure.COLUMNS)
             writer.writeheader()
@@ -285,12 +284,12 @@ def of_bodies(tmp_path, monkeypatch):
 )
 def test_the_counts_of_cases_add_up(bodies, of_bodies):
     program = of_bodies(bodies)
-    for text in (program.render_readme(), program.render_bodies()):
-        (sentence,) = re.findall(r"Of these 22\s.*?\.(?=\n)", text, re.DOTALL)
-        assert ("neither side" in sentence) == (bodies[1] == (None, None))
-    cases, *counts = (int(number) for number in re.findall(r"\d+", sentence))
-    assert cases == sum(counts) == 22
-    assert counts == {None: [11, 0, 0, 11], 1e-6: [11, 0, 11], 3e-6: [11, 11, 0]}[bodies[1][0]]
+    (sentence,) = re.findall(r"Of these 22\s.*?\.(?=\n)", program.render_readme(), re.DOTALL)
+    assert ("neither side" in sentence) == (bodies[1] == (None, None))
+    values, *_ = program.read_values()
+    counts = [int(values["all fields", program.BODIES, f"cases {which}"]) for which in ("won", "lost", "open")]
+    assert counts == {None: [11, 0, 0], 1e-6: [11, 0, 11], 3e-6: [11, 11, 0]}[bodies[1][0]]
+    assert sum(counts) + program.count_unreached(values) == 22
 
 
 def test_the_page_follows_the_counts_and_intervals(of_bodies):
@@ -298,19 +297,5 @@ def test_the_page_follows_the_counts_and_intervals(of_bodies):
     text = " ".join(program.render_readme().split())
     assert re.search(r"by factors of 1\.4 \([\d.]+ to [\d.]+\) to 1\.4 \(", text)
     assert "Of these 22 cases, heyoka is faster beyond the interval" in text
-    assert "in none; 11 are open" in text
-    assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")
-
-
-def test_the_scripts_of_the_table_of_calls_end_in_the_states_of_the_timed_runs(monkeypatch):
-    calls = load("calls")
-    found = calls.measure_calls(rounds=1)
-    rows = {(each["name"], each["quantity"]): each["value"] for each in calls.call_rows(found)}
-    assert len(rows) == 3 * len(calls.CALLS)
-    for name in calls.CALLS:
-        timed, script = rows[name, "timed call"], rows[name, "shortest script"]
-        assert rows[name, "ratio"] == pytest.approx(timed / script)
-        assert min(timed, script) > 0.2  # us
-    monkeypatch.setattr(calls, "STEP", 0.02)  # of the scripts only
-    with pytest.raises(AssertionError, match="Mismatched"):
-        calls.measure_calls(rounds=1)
+    assert "in none; 11 are undecided" in text
+    assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-3 | 1.39")

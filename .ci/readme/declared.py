@@ -1,10 +1,9 @@
-"""Tables of what the code declares: methods, the features that each supports, engines, studies and commands."""
+"""Tables of what the code declares: methods, the features that each supports, engines, and exact motions."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-import json
 import os
 import re
 import tomllib
@@ -14,10 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from code_map import PACKAGES, ROOT, map_of, summary
-from marks import table
-
-from conservative.version import VERSION
+from pages import ROOT, summary, table
 
 GROUPS = ("conservative.methods", "conservative.engines")
 
@@ -28,18 +24,6 @@ def entries(group: str) -> Iterator[tuple[str, Any]]:
     for name, place in project["entry-points"][group].items():
         module, _, attribute = place.partition(":")
         yield name, getattr(import_module(module), attribute)
-
-
-def badges() -> dict[str, str]:
-    """Return the badges of README.md by the names of their files."""
-    from conservative.reports.document.badge import badge
-
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    pythons = [
-        line.rpartition(" ")[2] for line in project["classifiers"] if line.startswith("Programming Language :: Python :: 3.")
-    ]
-    values = {"version": VERSION, "python": f"{pythons[0]} to {pythons[-1]}", "licence": project["license"]}
-    return {f"badge_{name}.svg": badge(name, value) for name, value in values.items()}
 
 
 def methods() -> str:
@@ -98,23 +82,6 @@ def support() -> str:
     return table(header, lines) + f"\n{'; '.join(words)}.\n"
 
 
-def method_info() -> str:
-    """Return the entries of `MethodInfo` with their defaults, from its docstring."""
-    from conservative.method_info import MethodInfo
-
-    attributes = inspect.cleandoc(MethodInfo.__doc__ or "").partition("Attributes\n----------\n")[2]
-    meanings = re.findall(r"^(\w+)\n((?:    .*\n?)+)", attributes, re.MULTILINE)
-    defaults = {each.name: each.default for each in dataclasses.fields(MethodInfo)}
-    return table(
-        ["entry", "default", "meaning"],
-        [[f"`{name}`", _default(defaults.pop(name)), " ".join(text.split())] for name, text in meanings],
-    ) + "".join(f"| `{name}` | | |\n" for name in defaults)
-
-
-def _default(value: object) -> str:
-    return f"`{value!r}`" if value is None or isinstance(value, (bool, str, tuple, float)) else ""
-
-
 def engines(group: str, page: Path) -> str:
     """Return a row for each engine of a group of entry points, with links from a page."""
     return table(
@@ -158,84 +125,23 @@ def _quoted(kind: Any, name: str) -> list[str]:
     return re.findall(r'"(\w+)"', entry[1]) if entry and isinstance(getattr(kind, name), str) else []
 
 
-def studies() -> str:
-    """Return a row for each study, from its declaration."""
-    from conservative.benchmarks.studies.declaration import Extent, Named
-    from conservative.benchmarks.studies.studies import STUDIES
-
-    extents = {Extent.EVERY: "every", Extent.FULL: "full", Extent.LONG: "full, not quick"}
-    rows = []
-    for name, each in STUDIES.items():
-        report = extents[each.extent] + ", if it draws bodies" * bool(each.draw) + ", if no scene is named" * bool(each.scenes)
-        report = "full, " * (each.extent > Extent.EVERY) + "with `--engines`" if each.named is Named.ONLY else report
-        rows.append([f"`{name}`", each.about[0].upper() + each.about[1:], report, "yes" if each.timed else ""])
-    return table(["study", "what it measures", "in reports", "measures times"], rows)
-
-
-def commands() -> str:
-    """Return a row for each command, with the sentence about exit codes of its help."""
-    from conservative.reports.cli.main import main
-
-    rows = []
-    for name, command in main.commands.items():
-        below = {f"{name} {each}": command.commands[each] for each in getattr(command, "commands", ())}
-        for words, each in {name: command, **below}.items():
-            sentences = re.split(r"(?<=\.) ", " ".join((each.help or "").split()))
-            codes = [sentence for sentence in sentences if "exit code" in sentence]
-            rows.append([f"`{words}`", each.get_short_help_str(200), " ".join(codes)])
-    return table(["command", "purpose", "exit code"], rows)
-
-
-def kept_motions() -> list[dict[str, Any]]:
-    """Return the motions of references/motions, in the order of the catalogue."""
+def motions() -> str:
+    """Return a row for the motions with the same features."""
+    from conservative.benchmarks.verification.motions import files
     from conservative.benchmarks.verification.motions.motion import load
 
-    folder = ROOT / "references" / "motions"
-    return [json.loads((folder / f"{motion.name}.json").read_text(encoding="utf-8")) for motion in load()]
-
-
-def motions() -> str:
-    """Return a row for each motion."""
-    rows = [
-        [f"`{each['name']}`", each["about"], ", ".join(each["features"]), f"{each['tolerance'][0]['steps'] * len(each['t'])}"]
-        for each in kept_motions()
-    ]
-    return table(["motion", "what it is", "features", "steps of 0.1 rad"], rows)
-
-
-def _factor(x: float) -> str:
-    return "allowed" if x < 1 else f"{x:.0f}" if x < 1000 else f"{x:.0e}".replace("+0", "").replace("+", "")
-
-
-def _over(order: int, motion: dict[str, Any], known: dict[str, Any]) -> float:
-    """Return the largest error of a mistake over its tolerance at |w| h = 0.01."""
-    (allowed,) = (each for each in motion["tolerance"] if (each["order"], each["angle"]) == (order, 0.01))
-    return max(known[name] / allowed[name] for name in ("attitude", "rates", "energy", "momentum"))
-
-
-def mistakes() -> str:
-    """Return a row for each mistake that motions catch."""
-    from conservative.benchmarks.verification.motions.signatures import names
-
-    rows, kept = [], kept_motions()
-    for name, sentence in names().items():
-        rows_of = [(motion, each) for motion in kept for each in motion["catches"] if each["mistake"] == name]
-        if rows_of:
-            best = [max(_over(order, *each) for each in rows_of) for order in (1, 2, 4)]
-            rows.append([name, sentence, str(len(rows_of)), *map(_factor, best)])
-    return table(["mistake", "what the program does", "motions", "order 1", "order 2", "order 4"], rows)
+    names: dict[str, list[str]] = {}
+    for motion in load():
+        features = ", ".join(files.read(motion.name)["features"]) or "free rotation"
+        names.setdefault(features, []).append(f"`{motion.name}`")
+    return table(["needs", "motions"], [[features, ", ".join(motions)] for features, motions in names.items()])
 
 
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,
-    "method info": method_info,
     "engines": partial(engines, GROUPS[0], ROOT / "references" / "README.md"),
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
-    "studies": studies,
-    "commands": commands,
     "motions": motions,
-    "mistakes of motions": mistakes,
-    **{f"code of {room}": partial(map_of, ROOT / room) for room in PACKAGES},
 }
 """Tables by the name of their mark."""

@@ -1,81 +1,117 @@
-"""The rows of the table of prices: what a run to an attitude error costs in a new process, with imports, search, compilation.
+"""What a run to 1e-6 rad costs in a new process, with imports, search and compilation, on random bodies of all fields.
 
-The scenes are random bodies, two in each field. Ours is `integrate(scene, error=1e-6)`, and then the chosen method and step
-size; heyoka is built and run with a tolerance that is safe for this error (see `price_program`). Further runs of a body start
-with other rates, one after the other. The error of the final attitude is measured for both.
-
-On the first body of each field ours also runs with an empty cache of compiled kernels, as right after the installation. The
-other runs have a full one, as all later processes. heyoka has no cache.
+Ours is `integrate(scene, error=1e-6)`, with a full cache of compiled kernels. heyoka is built with base vectors and the numbers
+of a body as parameters, at a tolerance with which its errors on these bodies are below 1e-6 rad. NumPy and this project's text
+of heyoka's equations are imported before the clock starts. `python price.py SIDE FIELD INDEX` runs one side and prints JSON.
 """
 
 from __future__ import annotations
 
 import datetime
 import json
-import os
 import statistics
 import subprocess
 import sys
-from collections import defaultdict
-from collections.abc import Iterator
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable, Iterator
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-import price_program  # beside this file
 
-from conservative import registry
-from conservative.attitude import angle_between
-from conservative.grid import Grid
-from conservative.references.truth import reference
-from conservative.scene import Scene
-from conservative.scenes.random_body import FIELDS
-
-OURS, EMPTY, HEYOKA = "conservative", "conservative, empty cache", "heyoka"
-COLUMNS = {"once": "one run", "thousand": f"{price_program.RUNS:,} runs", "other": "first run of another body"}
-"""Names of the times, s, by those of the program."""
-LIMIT = 300.0
-"""Largest wall time of a process, s."""
-COMMAND = "python .ci/readme --price"
+ERROR, TOL = 1e-6, 1e-9
+"""Target of `integrate`, rad, and tolerance of heyoka."""
+OTHERS = range(2, 12)
+"""Indices of further bodies of a field, each of which is run once: the time of another body is the median."""
+QUANTITIES = {"once": "one run", "other": "first run of another body", "error": "largest error"}
+Run = Callable[[], Callable[[], Any]]
+"""Runs a scene and returns a function for its final attitude (3, 3), whose conversion is not timed."""
 
 
-def pairs() -> list[tuple[Scene, Scene]]:
-    """Return two random bodies in each field."""
-    names = [[f"random_body:field={field},index={index}" for index in (0, 1)] for field in FIELDS]
-    return [(registry.scene(first).rename(first), registry.scene(second).rename(second)) for first, second in names]
+def ours() -> Callable[[Any], Run]:
+    """Return a function that prepares the run of a scene by this package."""
+    import conservative as cv
+
+    def prepare(scene: Any) -> Run:
+        def run() -> Callable[[], Any]:
+            trajectory = cv.integrate(scene, error=ERROR)
+            return lambda: trajectory.R_WB[-1]
+
+        return run
+
+    return prepare
 
 
-def measure_pairs() -> dict[str, list[dict[str, float]]]:
-    """Return the times and errors of each side on all bodies; of two in a field, each is the other body of the other one."""
-    found: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for pair in pairs():
-        with TemporaryDirectory() as cache:
-            for scene, other in (pair, pair[::-1]):
-                for side in [EMPTY] * (scene is pair[0]) + [OURS, HEYOKA]:
-                    found[side].append(measure_side(side, scene, other, cache))
-    return found
+def heyoka(formulations: Any, to_body_axes: Any) -> Callable[[Any], Run]:
+    """Return a function that prepares the run of a scene by heyoka; bodies share the compiled code of their field."""
+    import heyoka as hy
+
+    compiled: dict[Any, Any] = {}
+
+    def prepare(scene: Any) -> Run:
+        problem = formulations.base_vectors(scene)
+        if problem.form not in compiled:
+            compiled[problem.form] = hy.taylor_adaptive(problem.form.build(), [0.0] * 9, tol=TOL, fast_math=True)
+        integrator = compiled[problem.form]
+
+        def run() -> Callable[[], Any]:
+            integrator.pars[:], integrator.state[:], integrator.time = problem.parameters, problem.start, 0.0
+            integrator.propagate_until(scene.t_end)
+            state, t = integrator.state.copy()[None, None], np.array([scene.t_end])
+            return lambda: to_body_axes(t, formulations.gather([problem])(state), problem.axes.R_BF[None])[0]
+
+        return run
+
+    return prepare
 
 
-def measure_side(side: str, scene: Scene, other: Scene, cache: str) -> dict[str, float]:
-    """Return times, s, and the error, rad, of one side on a scene, in a process with a folder for compiled kernels."""
-    program = "heyoka" if side == HEYOKA else "ours"
-    command = [sys.executable, "-P", str(Path(price_program.__file__)), program, scene.name, other.name]
-    variables = {**os.environ, "NUMBA_CACHE_DIR": cache}
-    done = subprocess.run(command, env=variables, timeout=LIMIT, check=True, capture_output=True, text=True)
-    times = json.loads(done.stdout.splitlines()[-1])
+def program(side: str, field: str, index: str) -> None:
+    """Print the time of the first run since before the import, the time of a run of another body, and the error."""
+    if side == "heyoka":
+        from conservative.references.heyoka_equations import formulations
+        from conservative.references.samples import to_body_axes
+    begin = perf_counter()
+    prepare = heyoka(formulations, to_body_axes) if side == "heyoka" else ours()
+    from conservative.scenes.random_body import random_body
+
+    scene = random_body(field, index=int(index))
+    final = prepare(scene)()
+    times, runs = [perf_counter() - begin], [prepare(random_body(field, index=each)) for each in OTHERS]
+    for run in runs:
+        begin = perf_counter()
+        run()
+        times.append(perf_counter() - begin)
+    from conservative.attitude import angle_between
+    from conservative.grid import Grid
+    from conservative.references.truth import reference
+
     truth = reference(scene, Grid(scene.t_end, 1)).trajectory.R_WB[-1]
-    error = float(angle_between(truth, np.reshape(times["final"], (3, 3))))
-    return {**{name: times[name] for name in COLUMNS}, "error": error}
+    error = float(angle_between(truth, np.reshape(final(), (3, 3))))
+    print(json.dumps({"once": times[0], "other": statistics.median(times[1:]), "error": error}))
 
 
-def price_rows(found: dict[str, list[dict[str, float]]]) -> Iterator[dict[str, Any]]:
-    """Yield the medians of the times and the largest error of each side."""
-    today = datetime.date.today().isoformat()
-    common = {"scene": "price", "method": "", "version": "", "command": COMMAND, "date": today}
-    for side, bodies in found.items():
-        for name, quantity in COLUMNS.items():
-            value = statistics.median(each[name] for each in bodies)
-            yield common | {"name": side, "quantity": quantity, "unit": "s", "value": value}
-        worst = max(each["error"] for each in bodies)
-        yield common | {"name": side, "quantity": "largest error", "unit": "rad", "value": worst}
+def measure(side: str, field: str, index: int) -> dict[str, float]:
+    """Return the times, s, and the error, rad, of one side in a new process."""
+    command = [sys.executable, "-P", __file__, side, field, str(index)]
+    done = subprocess.run(command, timeout=300, check=True, capture_output=True, text=True)
+    result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return result
+
+
+def price_rows(bodies: tuple[int, ...] = (0, 1), fields: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
+    """Yield the medians of the times and the largest error of each side, as rows of measured.csv."""
+    from conservative.scenes.random_body import FIELDS
+
+    common = {"scene": "price", "command": "python .ci/readme --price", "date": datetime.date.today().isoformat()}
+    for side in ("conservative", "heyoka"):
+        results = []
+        for field in fields or FIELDS:
+            measure(side, field, bodies[0])  # fills the cache
+            results += [measure(side, field, index) for index in bodies]
+        for key, quantity in QUANTITIES.items():
+            pick, unit = (max, "rad") if key == "error" else (statistics.median, "s")
+            value = pick([result[key] for result in results])
+            yield common | {"name": side, "quantity": quantity, "unit": unit, "value": value}
+
+
+if __name__ == "__main__":
+    program(*sys.argv[1:])

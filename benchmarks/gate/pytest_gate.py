@@ -179,7 +179,7 @@ def is_benchmark(item: object) -> bool:
 
 
 def row(item: pytest.Item, report: pytest.TestReport) -> Row:
-    """Return the row of a benchmark, from its `extra_info`: see benchmarks/README.md, Benchmarks of your own, for the keys."""
+    """Return the row of a benchmark, from its `extra_info`: see benchmarks/README.md, Benchmarks, for the keys."""
     benchmark = getattr(item, "funcargs", {}).get("benchmark")
     timed = getattr(benchmark, "stats", None)  # None with --benchmark-disable
     info: dict[str, Any] = benchmark.extra_info if benchmark else {}

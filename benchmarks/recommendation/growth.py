@@ -10,6 +10,7 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.invariants import sizes
 from conservative.methods.trials import ASYMPTOTIC
+from conservative.presentation import number
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope
@@ -113,7 +114,7 @@ class ErrorLaw:
             return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
         steady, growing = self.linear * duration, self.quadratic * duration**2
         kind = "linearly" if growing <= 0.1 * steady else "quadratically" if steady <= 0.1 * growing else "as a t + b t^2"
-        times = f", times {self.excess:.2g} as the motion amplifies errors" if self.excess > FASTER_THAN_LINEAR else ""
+        times = f", times {number(self.excess)} as the motion amplifies errors" if self.excess > FASTER_THAN_LINEAR else ""
         return f"{run} (grew as t^{self.exponent:.1f}), extrapolated {kind} to {duration:g} s{times}"
 
 

@@ -26,7 +26,7 @@ from conservative.errors import BadInput, nearest
 from conservative.grid import Grid
 from conservative.method import Method, Role
 from conservative.methods.automatic import ATTEMPTS
-from conservative.methods.search import candidates, step_factor, stops_falling
+from conservative.methods.search import candidates, refine_until, step_factor, stops_falling
 from conservative.methods.trials import ASYMPTOTIC
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.scene import Scene
@@ -311,18 +311,25 @@ def _tolerance_between(conditions: Conditions, best: Probe, coarser: float) -> t
 def _refine_until(conditions: Conditions, probes: list[Probe], expect: Callable[[Probe], float], long: bool) -> list[Probe]:
     """Return probes with finer and finer settings until `expect` returns an error within the target, rad."""
     next_setting = _shorten_step if tolerance_setting(probes[0].method) is None else _tighten_tolerance
-    while len(probes) < ATTEMPTS and expect(probes[-1]) > conditions.target:
-        if _at_round_off(probes) or probes[-1].outcome.kind is OutcomeKind.TIMEOUT:  # finer runs would take even longer
-            break
-        finer = next_setting(conditions, probes, expect(probes[-1]))
-        if finer is None:
-            break
-        probes.append(conditions.probe(*finer, long, tuple(probes)))
-    return probes
+
+    def finer(tried: list[Probe]) -> tuple[Method, float, float] | None:
+        if tried[-1].outcome.kind is OutcomeKind.TIMEOUT:  # finer runs would take even longer
+            return None
+        return next_setting(conditions, tried, expect(tried[-1]))
+
+    def attempt(setting: tuple[Method, float, float]) -> Probe:
+        return conditions.probe(*setting, long, tuple(probes))
+
+    return refine_until(probes, finer, attempt, lambda probe: expect(probe) <= conditions.target, _falling_error, ATTEMPTS)
 
 
 def _at_round_off(probes: Sequence[Probe]) -> bool:
-    return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
+    return stops_falling([_falling_error(probe) for probe in probes])
+
+
+def _falling_error(probe: Probe) -> float:
+    """Return the expected error, rad; inf if it is saturated, so that it shows nothing."""
+    return probe.expected if probe.expected < ASYMPTOTIC else math.inf
 
 
 def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:

@@ -13,6 +13,7 @@ from conservative.errors import BadInput, PotentialFailed, TorqueFailed
 from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.presentation import number
 from conservative.references.truth import Disagreement, Truth, Unsolvable, reference
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -173,7 +174,7 @@ class Study:
                 if costs[case] <= left:
                     left -= costs[case]
                 else:
-                    skipped[case] = too_long(costs[case], f"the {left:.2g} s left for slow runs")
+                    skipped[case] = too_long(costs[case], f"the {number(left)} s left for slow runs")
         return skipped
 
     def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
@@ -200,7 +201,7 @@ def without_truth(failure: Disagreement) -> Outcome:
 
 def too_long(cost: float, limit: str) -> Outcome:
     """Return the outcome of a run that is not made, because it would take `cost` s, and its limit in words."""
-    text = f"would take about {float(f'{cost:.2g}'):,g} s, more than {limit}; raise --time-limit"
+    text = f"would take about {number(cost)} s, more than {limit}; raise --time-limit"
     return Outcome(OutcomeKind.SKIPPED, text)
 
 

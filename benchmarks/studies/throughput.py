@@ -31,6 +31,7 @@ from conservative.errors import BadInput, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.presentation import number
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene
@@ -268,7 +269,7 @@ def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
     """Return the outcome of a skipped run if a call with `size` bodies would take longer than `limit`, s."""
     for what, seconds, most in (("a call", point.spent, limit), ("preparing a call", point.prepare, PREPARATION * limit)):
         if size > 1 and seconds * size > most:
-            return Outcome(OutcomeKind.SKIPPED, f"{what} would take {seconds * size:.2g} s; --time-limit raises that")
+            return Outcome(OutcomeKind.SKIPPED, f"{what} would take {number(seconds * size)} s; --time-limit raises that")
     return None
 
 

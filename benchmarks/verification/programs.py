@@ -22,6 +22,7 @@ from conservative.attitude import Array, to_quaternion
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method
+from conservative.presentation import number
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.engine_method import EngineMethod
@@ -348,7 +349,7 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
 
 
 def _above(ratio: float) -> str:
-    return f"{100 * (ratio - 1):.0f} % above" if ratio < 2 else f"{ratio:.2g} times"
+    return f"{100 * (ratio - 1):.0f} % above" if ratio < 2 else f"{number(ratio)} times"
 
 
 def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> dict[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 from conservative.attitude import rotation_about
 from conservative.body import RigidBody
 from conservative.grid import Grid
+from conservative.presentation import number
 from conservative.references.engine import principal_axes
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import worker_of
@@ -94,7 +95,7 @@ def _measure(worker: Worker, run: int) -> tuple[str, str]:
         calls, start = 4 * calls, perf_counter()
         seconds = float(worker.ask("time", run=run, calls=calls)["seconds"])
         wall = perf_counter() - start
-    text = f"{seconds:.2g} s for {calls} runs of {GRID.n_steps} steps, and {wall:.2g} s with the exchange"
+    text = f"{number(seconds)} s for {calls} runs of {GRID.n_steps} steps, and {number(wall)} s with the exchange"
     if wall < PACE:
         return "`time` has to make `calls` runs", text
     if seconds > wall:

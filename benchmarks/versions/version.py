@@ -15,7 +15,7 @@ from pathlib import Path
 from conservative.errors import BadInput
 from conservative.programs import project_file, read_programs
 from conservative.references.environments.environment import Environment
-from conservative.references.environments.lock import Source
+from conservative.references.environments.kind import Source
 from conservative.references.environments.projects import build_project, environment_of, keep_wheel
 from conservative.references.worker.calls import python_worker
 from conservative.references.worker.client import Worker

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import Array, to_quaternion
+from ..attitude import Array
 from ..batch import Batch
 from ..check import choice as require_choice
 from ..drifts import arrange_drifts, drifts_of, list_drifts
-from ..errors import IntegrationFailed, require_extra
+from ..errors import IntegrationFailed, RemovedAttribute, require_extra
 from ..grid import Grid
 from ..outcome import OK, Choice, Counters, Outcome
-from ..presentation import columns, dataset, html_table, rounded_up
+from ..presentation import columns, html_table, rounded_up
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -29,7 +29,6 @@ from .store import Store, open_store, write_store
 if TYPE_CHECKING:
     import altair
     import pandas
-    import xarray
 
 MOST_LISTED = 5
 """Largest number of failed bodies in a text."""
@@ -127,23 +126,7 @@ class Ensemble:
         frame.attrs = {"scene": self.bodies.scene.name, "method": self.label}
         return frame
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return a dataset with R_WB, q_WB and w_WB_B of each body and time, nan after a failure, and outcomes and drifts.
-
-        Raises
-        ------
-        MissingExtra
-            xarray, of the extra `xarray`, is not installed.
-        """
-        require_extra("Ensemble.to_xarray", "xarray", "xarray")
-        R_WB, w_WB_B = np.asarray(self.R_WB), np.asarray(self.w_WB_B)
-        q_WB = np.full((*R_WB.shape[:2], 4), np.nan)
-        reached = np.isfinite(R_WB).all(axis=(2, 3))
-        q_WB[reached] = to_quaternion(R_WB[reached])
-        values = {"R_WB": R_WB, "q_WB": q_WB, "w_WB_B": w_WB_B}
-        found = dataset(self.t, values, ("body", "t"), scene=self.bodies.scene.name, method=self.label)
-        drifts = {f"drift of {name}": ("body", each) for name, each in self.drifts.items()}
-        return found.assign(drifts | {"outcome": ("body", np.array([str(self.outcome(i)) for i in range(len(self))]))})
+    to_xarray = RemovedAttribute()
 
     def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
         """Return a chart of the directions of a body axis at start and end, the spread of attitudes over time, and the drifts.

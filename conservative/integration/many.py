@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ..batch import Batch
 from ..check import describe, positive_integer
 from ..errors import BadInput
-from ..flight import rotation_only
 from ..grid import grid_for
 from ..method import Method
 from ..outcome import ChoiceForMany, ProgressOfMany
@@ -22,7 +21,7 @@ from .blocks import list_blocks, run_blocks, start_workers
 from .ensemble import Ensemble, ensemble_of_one, read_ensemble
 from .inputs import read_bodies
 from .memory import Memory, write_memory
-from .one import ROD, interrupt_of, read_error, read_method, read_step, read_target, require_support, warn_of_steps
+from .one import ROD, interrupt_of, read_error, read_method, read_target, require_support, warn_of_steps
 from .shared_choice import choose_for_all, pick_hardest, require_steps
 from .store import open_store, write_store
 
@@ -116,7 +115,7 @@ def integrate_many(
     if resume and (unknown := scene.identity.unknown):
         got = f"True, for the scene {scene.name!r} with {unknown}"
         raise BadInput("resume", got, f"False: {_COMPARED}")
-    flight, scene = scene.flight, rotation_only(scene)
+    flight, scene = scene.flight, scene.rotation_only
     _check_options(threads, progress, path, resume)
     only_scene = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(Batch.of) if only_scene else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
@@ -126,7 +125,7 @@ def integrate_many(
     try:
         if error is None:
             chosen = read_method(method, bodies.first)
-            grid = grid_for(bodies.first, read_step(bodies.first, dt, t_end), t_end, sample_every)
+            grid = grid_for(bodies.first, dt, t_end, sample_every)
             require_support(chosen, bodies.first)
             warn_of_steps(bodies.first, chosen, grid, _find_rod(bodies))
             if len(bodies) > 1:  # the run of a single body raises the error itself

@@ -12,7 +12,7 @@ from .. import registry
 from ..attitude import Array
 from ..check import choice, describe, positive_integer, positive_number
 from ..errors import BadInput, LoadNotResolved, RotationNotResolved, Unsupported
-from ..grid import MOST_STEPS, Grid, count_steps, grid_for
+from ..grid import MOST_STEPS, Grid, grid_for, read_end
 from ..method import Method, Role
 from ..methods.automatic import integrate_to_error
 from ..methods.between import SampleTimes, grid_before, read_times, sample_between
@@ -35,38 +35,31 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
-def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = None) -> None:
-    """Warn if steps are too long for a load or for the rotation of a rod, by default of the scene; see `integrate`."""
-    warn_of_loads(scene, method, grid)
-    _warn_of_rods(rod or scene, method, grid.dt)
-
-
-def warn_of_loads(scene: Scene, method: Method, grid: Grid) -> None:
-    """Warn if fixed steps are too long for a function of time or a table; adaptive methods are told the longest step."""
-    if not scene.loads or method.order is None:
-        return
-    end = grid.n_steps * grid.dt
-    found = scene.smoothness(grid.last)
-    if grid.dt > found.step and end < scene.t_end:  # it may be smooth as long as the run is
-        found = examine(scene.loads, end)
-    if grid.dt > found.step:
-        warnings.warn(LoadNotResolved(grid.dt, 0.0 if found.noise else found.step, found.interval), stacklevel=4)
-    for load in scene.loads:
-        if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
-            warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=4)
-
-
 ROD, RESOLVED = 100.0, 0.5
 """Ratio of principal moments above which a body is a rod, and the longest step in radians of its fastest rotation."""
 
 
-def _warn_of_rods(scene: Scene, method: Method, dt: float) -> None:
-    """Warn if fixed steps, s, are too long for the rotation of a rod about its axis that the errors of a method can produce."""
-    if scene.body.condition <= ROD or method.order is None or method.role not in (Role.OURS, Role.BASELINE):
+def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = None) -> None:
+    """Warn if fixed steps are too long for a function of time, a table, or the rotation of a rod, by default of the scene.
+
+    See `integrate`. Adaptive methods get no warning: they are told the longest step.
+    """
+    if method.order is None:
         return
-    rate = scene.derive(bound_rate)
-    if dt * rate > RESOLVED and method.follows_fastest(scene):
-        warnings.warn(RotationNotResolved(method.name, dt, rate, RESOLVED / rate), stacklevel=4)
+    if scene.loads:
+        end, found = grid.n_steps * grid.dt, scene.smoothness(grid.last)
+        if grid.dt > found.step and end < scene.t_end:  # it may be smooth as long as the run is
+            found = examine(scene.loads, end)
+        if grid.dt > found.step:
+            warnings.warn(LoadNotResolved(grid.dt, 0.0 if found.noise else found.step, found.interval), stacklevel=3)
+        for load in scene.loads:
+            if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
+                warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=3)
+    rod = rod or scene  # the errors of a method can produce a rotation about its axis
+    if rod.body.condition > ROD and method.role in (Role.OURS, Role.BASELINE):
+        rate = rod.derive(bound_rate)
+        if grid.dt * rate > RESOLVED and method.follows_fastest(rod):
+            warnings.warn(RotationNotResolved(method.name, grid.dt, rate, RESOLVED / rate), stacklevel=3)
 
 
 _REDUCED = Reduced()
@@ -172,7 +165,7 @@ def integrate(
             trajectory = integrate_to_error(scene, error, end, samples, progress)
         else:
             method = read_method(method, scene)
-            grid = grid_for(scene, read_step(scene, dt, t_end), t_end, sample_every if at is None else MOST_STEPS)
+            grid = grid_for(scene, dt, t_end, sample_every if at is None else MOST_STEPS)
             require_support(method, scene)
             warn_of_steps(scene, method, grid)
             if at is None:
@@ -198,23 +191,6 @@ def interrupt_of(failure: SystemError) -> BaseException:
 def read_error(error: float | None, method: object, dt: object) -> float | None:
     """Return the target for the attitude error, rad: `TARGET` if neither an error nor a method nor a step is given."""
     return TARGET if error is None and method is None and dt is None else error
-
-
-def read_step(scene: Scene, dt: float | None, t_end: float | None) -> float:
-    """Return the step, s: by default the scene's, at most the duration, and a part of it if there are functions of time."""
-    if dt is not None:
-        return dt
-    end = read_end(scene, t_end)
-    step = min(scene.dt, end)
-    return end / count_steps(end, step) if scene.asks_time else step
-
-
-def read_end(scene: Scene, t_end: float | None) -> float:
-    """Return the duration of a run, s; the scene's if t_end is None."""
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    for load in scene.loads:
-        load.require_times(end)
-    return end
 
 
 def read_target(

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import unit_vector
-from ..presentation import LEAST_DRAWN, time_unit
+from ..presentation import LEAST_DRAWN, short_power, time_unit
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
@@ -138,9 +138,9 @@ def _rings(extent: float) -> list[Any]:
     lines = pd.DataFrame({"x": x.ravel(), "y": y.ravel(), "order": order.ravel(), "ring": ring.ravel()})
     apart = np.append(np.diff(radii) > 0.15 * extent, True)[: len(radii)]
     angles, radii = angles[apart], radii[apart]
-    labels = pd.DataFrame({"x": 0 * radii, "y": radii, "label": [f"{angle:g}°" for angle in angles]})
+    labels = pd.DataFrame({"x": 0 * radii, "y": radii, "label": [f"{short_power(f'{angle:g}')}°" for angle in angles]})
     halo, text = ({"stroke": "white", "strokeWidth": 3}, {"color": "#404040"})
     return [
         alt.Chart(lines).mark_line(color="#7F7F7F", strokeWidth=0.7).encode(order="order:Q", detail="ring:N"),
-        *(alt.Chart(labels).mark_text(dy=-5, fontSize=10, **look).encode(text="label:N") for look in (halo, text)),
+        *(alt.Chart(labels).mark_text(dy=8, fontSize=10, **look).encode(text="label:N") for look in (halo, text)),
     ]

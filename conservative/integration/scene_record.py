@@ -18,7 +18,6 @@ import numpy as np
 
 from ..check import build_unchecked, describe, read_only
 from ..errors import BadInput, SceneNotCompared
-from ..flight import rotation_only
 from ..identity import fields_of_motion, identify
 from ..scene import Scene
 
@@ -50,7 +49,7 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     if not record["fields"]["extra_invariants"]["tuple"]:
         scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
     if "flight" not in record["fields"]:  # as earlier versions wrote it
-        scene = rotation_only(scene)
+        scene = scene.rotation_only
     given = record_scene(scene)
     stored = json.loads(json.dumps(record))
     if unknown := list(_adopt(stored, given)):

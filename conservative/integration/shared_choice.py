@@ -19,7 +19,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..batch import Batch
-from ..drifts import energy_scales
 from ..errors import AccuracyNotReached, BadInput
 from ..grid import Grid
 from ..method import Method
@@ -83,7 +82,7 @@ def pick(bodies: Batch) -> list[int]:
 
 def pick_hardest(bodies: Batch) -> list[int]:
     """Return the numbers of the bodies whose energy allows the fastest rotation, the fastest first."""
-    rates = np.sqrt(energy_scales(bodies)) / np.sqrt(bodies.principal[0].min(axis=1))
+    rates = np.sqrt(bodies.energies) / np.sqrt(bodies.principal[0].min(axis=1))
     fastest = np.argpartition(-rates, min(HARDEST, len(rates) - 1))[:HARDEST]
     return fastest[np.argsort(-rates[fastest], kind="stable")].tolist()
 

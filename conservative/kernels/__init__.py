@@ -1,13 +1,17 @@
 """Compiled kernels. Importing this package imports numba; `import conservative` alone does not.
 
-`protocol` says what a kernel that takes steps is given and what it returns. `compiler` contains all that relies on internals of
-numba and llvmlite.
+`protocol` says what a kernel that takes steps is given and what it returns. `compiler` contains numbers with one float per
+body, and the recurrences of series.
 
 Numba compares cached code with the file of the outermost function only, so an edit to an inner kernel would run stale code. A
 digest is therefore stored next to the cached code, in `__pycache__` or in the folder NUMBA_CACHE_DIR. It is made from all files
 of this folder and its subfolders, of `conservative.potentials`, and of `conservative.arithmetic`. If the files have another
 digest at the time of import, all cached code of this folder is deleted. Fields of other packages are not part of the digest.
 After an edit of one, clear the cache.
+
+Processes that share a cache compile each kernel once: the first one holds a lock, and the others wait for its code. Code is
+also written under a lock. Otherwise, two processes that compile a function for different types can choose the same free file,
+and numba then finds the code of one under the types of the other.
 
 With NUMBA_DISABLE_JIT=1 nothing is compiled and all kernels run as plain Python, a thousand times slower, for a debugger or a
 coverage report. Results then differ by round-off, as products are not fused with sums, and a division by zero raises.
@@ -16,20 +20,25 @@ coverage report. Results then differ by round-off, as products are not fused wit
 from __future__ import annotations
 
 import hashlib
+import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.compiler_lock import global_compiler_lock
 
 from ..errors import NotWritten
 from ..files import write_text
+from ..posix import NO_LOCK, lock, release
 from .compiler import COMPILED as COMPILED
-from .compiler.parts import SMALL as SMALL
-from .compiler.parts import kernel as kernel
-from .compiler.parts import small as small
+from .compiler import SMALL as SMALL
+from .compiler import kernel as kernel
+from .compiler import small as small
 
 
 @cache  # once
@@ -52,17 +61,51 @@ CACHED = COMPILED and _can_cache()
 """True if compiled code is stored for the next process."""
 
 
+@contextmanager
+def _alone(place: Path) -> Iterator[None]:
+    """Wait until no other process is in a block with this file, which exists during the block only.
+
+    Where files cannot be locked nobody waits.
+    """
+    try:
+        place.touch()
+        while (handle := lock(place)) is None:
+            time.sleep(0.01)
+            place.touch()  # the other process removes it
+    except OSError:
+        handle = NO_LOCK
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            place.unlink()
+        release(handle)
+
+
 def _compile(function: Any, **options: Any) -> Any:
     compiled = njit(function, cache=CACHED, error_model="numpy", **options)
     if CACHED:
-        compiled._cache.save_overload = partial(_save, compiled._cache.save_overload)
+        folder = Path(compiled.stats.cache_path)
+        constants = [cell.cell_contents for cell in function.__closure__ or ()]
+        name = f"{function.__module__}.{function.__qualname__} {constants}"
+        compiled.compile = partial(_compile_once, compiled.compile, folder, name)
+        compiled._cache.save_overload = partial(_save, compiled._cache.save_overload, folder)
     return compiled
 
 
-def _save(save: Any, *code: Any) -> None:
+def _compile_once(compile_or_load: Any, folder: Path, name: str, types: Any) -> Any:
+    """Compile a function for these types, or load its code if this or another process has stored it."""
+    key = hashlib.sha256(f"{name} {types}".encode()).hexdigest()[:16]
+    # A thread that compiles can need the code of another function: without numba's lock first, two threads would wait for ever.
+    with global_compiler_lock, _alone(folder / f"{key}.lock"):
+        return compile_or_load(types)
+
+
+def _save(save: Any, folder: Path, *code: Any) -> None:
     """Store compiled code. Without room for it, as on a full disk, this process goes on with a warning."""
     try:
-        save(*code)
+        with _alone(folder / "index.lock"):
+            save(*code)
     except OSError as error:
         _warn(error.strerror)
 

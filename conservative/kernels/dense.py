@@ -96,7 +96,7 @@ def find_turn(spin, t, further):
     return (cos * further[0] - sin * further[1], sin * further[0] + cos * further[1]) if further else (cos, sin)
 
 
-@partial(kernel, forceinline=True, ahead=True)
+@partial(kernel, forceinline=True)
 def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
     """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
 

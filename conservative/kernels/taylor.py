@@ -318,7 +318,7 @@ def quaternion(g, a):
 
 
 # Optimised twice: once alone, steps of a free body take 1.05 times and those in a turning field 1.06 times as long.
-@partial(kernel, forceinline=True, ahead=True)
+@partial(kernel, forceinline=True)
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step that cannot be projected fails; the size is the relative defect that remains."""
     field, left = model.field, model.left

@@ -34,8 +34,8 @@ from .search import (
     even_grid,
     fallback,
     find_cheapest,
+    refine_until,
     step_factor,
-    stops_falling,
 )
 from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
 
@@ -80,12 +80,39 @@ def integrate_to_error(
     return replace(trajectory, choice=choice)
 
 
+Estimating = Callable[[Method, Grid], Estimate]
+"""The estimate of a run, including its sensitivity."""
+
+
 class Attempt(NamedTuple):
     """A run over the whole duration, and its estimate."""
 
     method: Method
     grid: Grid
     estimate: Estimate
+
+    def share(self, error: float) -> float:
+        """Return the share of an error, rad, that the steps may have: none of them reduces the effect of rounding the scene."""
+        noise = self.estimate.noise
+        return error - noise if noise < error else noise
+
+    def settles(self, error: float) -> bool:
+        """Return whether the run reaches an error, rad, or rounding prevents that any run does."""
+        return self.estimate.error <= self.share(error) or self.estimate.noise >= ASYMPTOTIC
+
+
+Finer = Callable[[list[Attempt]], tuple[Method, Grid] | None]
+
+
+def _refine(first: tuple[Method, Grid], finer: Finer, error: float, estimate: Estimating, most: int) -> list[Attempt]:
+    """Return runs with finer and finer settings until the estimated error is at most `error`, rad, or they do not help."""
+
+    def attempt(setting: tuple[Method, Grid]) -> Attempt:
+        return Attempt(*setting, estimate(*setting))
+
+    return refine_until(
+        [attempt(first)], finer, attempt, lambda each: each.settles(error), lambda each: each.estimate.total, most
+    )
 
 
 def best_of(tried: Sequence[Attempt]) -> Attempt:
@@ -105,11 +132,11 @@ def reach(
     error: float,
     t_end: float,
     samples: SampleTimes,
-    estimate: Callable[[Method, Grid], Estimate],
+    estimate: Estimating,
 ) -> list[Attempt]:
     """Return the runs that were tried for an error, rad, up to t_end, s: with a method, from a step dt, s, on.
 
-    `estimate` returns the estimate of a run, including its sensitivity. Raise `BadInput` if the first step makes more steps or
+    Raise `BadInput` if the first step makes more steps or
     samples than are possible.
     """
     tried: list[Attempt] = []
@@ -139,63 +166,45 @@ def sampling_grid(t_end: float, samples: SampleTimes) -> Grid:
     return Grid(samples.spacing, n, min(samples.every, n))
 
 
-def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Callable[[Method, Grid], Estimate]) -> list[Attempt]:
+def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Estimating) -> list[Attempt]:
     """Cut the tolerance of a method until the estimated error is at most `error`, rad, or smaller ones do not help."""
-    tried: list[Attempt] = []
-    spent = 0.0
-    while True:
-        run = estimate(method, grid)
-        tried.append(Attempt(method, grid, run))
-        spent += run.work
-        within = error - run.noise if run.noise < error else run.noise
-        if run.error <= within or run.noise >= ASYMPTOTIC or len(tried) == TOLERANCES:
-            return tried
-        if run.failed or spent > 2 * MOST_TRIES * work_of_try(method):
-            return tried
-        if stops_falling([each.estimate.total for each in tried]):
-            return tried
-        if len(tried) > 1 and math.isinf(run.error):
-            return tried
-        assert method.tolerance is not None
-        factor = min(0.3, max(1e-5, within / run.error / 4)) if math.isfinite(run.error) else 1e-2
-        if method.tolerance <= LEAST_TOLERANCE:
-            return tried
-        method = Projected(tolerance=max(LEAST_TOLERANCE, factor * method.tolerance))
+
+    def finer(tried: list[Attempt]) -> tuple[Method, Grid] | None:
+        last = tried[-1]
+        assert isinstance(last.method, Projected)
+        assert last.method.tolerance is not None
+        if last.estimate.failed or sum(each.estimate.work for each in tried) > 2 * MOST_TRIES * work_of_try(last.method):
+            return None
+        if last.method.tolerance <= LEAST_TOLERANCE or (len(tried) > 1 and math.isinf(last.estimate.error)):
+            return None
+        factor = 1e-2
+        if math.isfinite(last.estimate.error):
+            factor = min(0.3, max(1e-5, last.share(error) / last.estimate.error / 4))
+        return Projected(tolerance=max(LEAST_TOLERANCE, factor * last.method.tolerance)), grid
+
+    return _refine((method, grid), finer, error, estimate, TOLERANCES)
 
 
 def cut_step(
-    method: Method,
-    dt: float,
-    error: float,
-    grid_with: Callable[[float], Grid],
-    estimate: Callable[[Method, Grid], Estimate],
-    most: int = MOST_STEPS,
+    method: Method, dt: float, error: float, grid_with: Callable[[float], Grid], estimate: Estimating, most: int = MOST_STEPS
 ) -> list[Attempt]:
     """Cut a step dt, s, until the estimated error is at most `error`, rad, or shorter steps do not help.
 
-    `grid_with` returns the grid of the whole run for a step, s, and `estimate` the estimate of a run, including its
-    sensitivity. Runs of more than `most` steps follow only runs that show the order of the method. Raise `BadInput` if the
-    first step makes more steps or samples than are possible.
+    `grid_with` returns the grid of the whole run for a step, s. Runs of more than `most` steps follow only runs that show the
+    order of the method. Raise `BadInput` if the first step makes more steps or samples than are possible.
     """
-    grid = grid_with(dt)
-    tried: list[Attempt] = []
-    while True:
-        run = estimate(method, grid)
-        tried.append(Attempt(method, grid, run))
-        rounding = run.noise
-        within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
-        if run.error <= within or rounding >= ASYMPTOTIC or len(tried) == ATTEMPTS:
-            return tried
-        if run.rough is not None:  # an adaptive method is faster
-            return tried
-        if stops_falling([each.estimate.total for each in tried]):
-            return tried
+
+    def finer(tried: list[Attempt]) -> tuple[Method, Grid] | None:
+        last = tried[-1]
+        if last.estimate.rough is not None:  # an adaptive method is faster
+            return None
         try:
-            grid = grid_with(grid.dt * step_factor(run.error, within, method))
+            grid = grid_with(last.grid.dt * step_factor(last.estimate.error, last.share(error), method))
         except BadInput:  # too many steps or samples: the best run so far is the result
-            return tried
-        if grid.n_steps > most and not run.ordered:
-            return tried
+            return None
+        return None if grid.n_steps > most and not last.estimate.ordered else (method, grid)
+
+    return _refine((method, grid_with(dt)), finer, error, estimate, ATTEMPTS)
 
 
 def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Grid:

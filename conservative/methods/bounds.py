@@ -22,20 +22,21 @@ UNIT_QUATERNIONS = 1e-13
 """Bound on the orthonormality error of matrices that are computed from unit quaternions."""
 
 
-def within_round_off(method: Method, scene: Scene, grid: Grid) -> Bounds:
-    """Return the bounds of a method without a tolerance, as its `bounds`."""
-    return bounds_of(scene, grid)
-
-
-def bounds_of(
-    scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS, n_steps: int | None = None
+def within_round_off(
+    method: Method | None,
+    scene: Scene,
+    grid: Grid,
+    tol: float = 0.0,
+    orthonormality: float | None = UNIT_QUATERNIONS,
+    n_steps: int | None = None,
 ) -> Bounds:
-    """Return the bounds of a run whose solver may leave a relative error `tol` in a step.
+    """Return the bounds of a run, as `Method.bounds`. Its solver may leave a relative error `tol` in a step.
 
     If `orthonormality` is None, it has the same bound as the invariants. `n_steps` is by default the number of steps of the
     grid, including those that break points add.
     """
-    n_steps = count_most_steps(scene, grid) if n_steps is None else n_steps
+    if n_steps is None:
+        n_steps = count_most_steps(grid, scene.smoothness(grid.last).breaks) if scene.loads else grid.n_steps
     rounding = ROUNDING * EPSILON * (10 + n_steps) * scene.body.condition
     drift = min(LOOSEST, rounding + SOLVER * tol * n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)

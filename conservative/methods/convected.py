@@ -15,11 +15,12 @@ from ..deferred_imports import kernels
 from ..errors import NotConverged
 from ..features import ROTATION
 from ..grid import Grid
+from ..invariants import MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .units import in_own_units
 
 MAX_ITERATIONS = 20
@@ -48,7 +49,7 @@ class Convected(Method):
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
     order = 2
-    conserves = frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
+    conserves = frozenset({"energy", *MOMENTA})
     method_info: ClassVar[MethodInfo] = MethodInfo(
         pictures=("",),
         colour="sky",
@@ -60,7 +61,7 @@ class Convected(Method):
         positive_number("tol", self.tol)
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid, self.tol, None)
+        return within_round_off(self, scene, grid, self.tol, None)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

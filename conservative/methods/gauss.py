@@ -89,8 +89,7 @@ class Gauss(Method):
 
     bounds = within_round_off
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return frame_unsupported(self.frame, scene)
+    unsupported = frame_unsupported
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -50,7 +50,6 @@ from ..scene import Scene
 from .bounds import within_round_off
 from .columns import find_unit_of_time, find_units_of_moments, in_gravity_or_free, moments_of_gravity, take_pieces, turn_samples
 from .many import Block, RunMany
-from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start, slow_axes, spin_rate, start_along
 from .run_kernel import prepare_run
 from .units import bound_rate, in_own_units
@@ -91,7 +90,7 @@ class Lame(Method):
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
+        return "body and field symmetric about one axis" if scene.symmetry_axis_B is None else None
 
     def longest_step(self, scene: Scene) -> float:
         return MOST_RADIANS / bound_rate(scene)

@@ -11,7 +11,7 @@ Klein and Sommerfeld, Theorie des Kreisels, call it the spherical top.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,8 +31,8 @@ def resolve_frame(frame: Frame, scene: Scene) -> Resolved:
     return "body" if spherical or scene.symmetry_axis_B is None else "non_spinning"
 
 
-def frame_unsupported(frame: Frame, scene: Scene) -> str | None:
-    """Return why the scene cannot be integrated in `frame`, None if it can."""
-    if frame == "non_spinning" and scene.symmetry_axis_B is None:
+def frame_unsupported(method: Any, scene: Scene) -> str | None:
+    """Return why the scene cannot be integrated in the `frame` of a method, None if it can: as its `unsupported`."""
+    if method.frame == "non_spinning" and scene.symmetry_axis_B is None:
         return "frame non_spinning needs body and field symmetric about one axis"
     return None

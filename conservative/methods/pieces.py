@@ -18,7 +18,6 @@ import numpy as np
 
 from ..attitude import Array
 from ..grid import ROUNDING, Grid
-from ..scene import Scene
 
 MOST_PARTS = 64
 """Largest number of steps into which a part of a step is divided."""
@@ -78,11 +77,9 @@ def count_parts(grid: Grid, inside: int) -> int:
     return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # fewer than four times the steps
 
 
-def count_most_steps(scene: Scene, grid: Grid) -> int:
-    """Return the largest number of steps that a run can take: the steps of the grid, and two parts for each break point."""
-    if not scene.loads:
-        return grid.n_steps
-    inside = count_inside(grid, scene.smoothness(grid.last).breaks)
+def count_most_steps(grid: Grid, breaks: Array) -> int:
+    """Return the largest number of steps that a run can take: the steps of the grid, and two parts for each break point, s."""
+    inside = count_inside(grid, breaks)
     return grid.n_steps + 2 * inside * count_parts(grid, inside)
 
 

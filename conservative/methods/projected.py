@@ -20,7 +20,7 @@ from ..potentials.turning import Turning
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory, cut_at_failure
 from .adaptive import MOST_TRIES, run_adaptively, trajectory_of, walk
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
@@ -83,7 +83,7 @@ class Projected(Method):
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         # A try has three steps. Long motions can take more, but round-off grows with the root of their number only.
-        return bounds_of(scene, grid, n_steps=None if self.tolerance is None else grid.n_steps + 3 * MOST_TRIES)
+        return within_round_off(self, scene, grid, n_steps=None if self.tolerance is None else grid.n_steps + 3 * MOST_TRIES)
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None

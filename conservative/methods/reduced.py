@@ -10,18 +10,17 @@ import numpy as np
 
 from ..attitude import to_quaternion
 from ..batch import Batch
-from ..check import choice, positive_number
+from ..check import choice
 from ..deferred_imports import kernels
 from ..features import LOADS, ROTATION, Feature
 from ..grid import Grid
-from ..invariants import with_balances
+from ..invariants import MOMENTA, with_balances
 from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.field import into_axes
 from ..scene import Scene
-from ..trajectory import Bounds
-from .bounds import bounds_of
-from .coefficients.compositions import BEST, OUTSIDE, composition_of, leaves_step
+from .bounds import within_round_off
+from .coefficients.compositions import COMPOSED, COMPOSITIONS, composition_of
 from .columns import (
     find_unit_of_time,
     find_units_of_moments,
@@ -38,7 +37,10 @@ from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
-_MOMENTA = with_balances("momentum", "vertical momentum", "momentum along the field's axis")
+TOLERANCE = 1e-20
+"""Relative tolerance of the solver in a stage: below round-off, because even a small systematic error becomes a drift after
+10^8 steps."""
+_MOMENTA = with_balances(*MOMENTA)
 _MOMENTA_AND_ENERGY = _MOMENTA | with_balances("energy")
 
 
@@ -64,12 +66,6 @@ class Reduced(Method):
     ----------
     order
         2, 4, 6, 8 or 10.
-    composition
-        Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the most accurate one of
-        the order. Those with stages outside of the step do not take a motor that is a function of time.
-    tol
-        Relative tolerance of the solver in a stage. The default is below round-off, because even a small systematic
-        error becomes a drift after 10^8 steps.
     frame
         "body": the paper's integrator. "non_spinning": the spin of a symmetric body is added in closed form; "auto":
         non-spinning if possible. Energy and momentum of a top are then conserved only to the order of the method, because the
@@ -82,14 +78,12 @@ class Reduced(Method):
     """
 
     order: int = 2
-    composition: str | None = None
-    tol: float = 1e-20
     frame: Frame = "body"
 
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
     method_info: ClassVar[MethodInfo] = MethodInfo(
-        variants=tuple(f"order={order}" for order in BEST),
+        variants=tuple(f"order={order}" for order in COMPOSITIONS),
         report=("", "order=8"),
         suite=("order=2", "order=4", "order=6"),
         many=("order=2", "order=4", "order=6"),
@@ -102,35 +96,30 @@ class Reduced(Method):
         kernel="reduced",
         structure=lambda method: Structure(symmetric=True, symplectic=False),
         supports=ROTATION | LOADS | {Feature.ROTOR},
+        removed={"composition": COMPOSED, "tol": "settings without tol: the solver stops below round-off"},
     )
 
     def __post_init__(self) -> None:
-        composition_of(self.order, self.composition)
-        positive_number("tol", self.tol)
+        composition_of(self.order)
         choice("frame", self.frame, FRAMES)
 
     @property
     def conserves(self) -> frozenset[str]:
         return _MOMENTA_AND_ENERGY if self.frame == "body" else _MOMENTA
 
-    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid, self.tol)
+    bounds = within_round_off
 
     @property
     def stages(self) -> int:
         """Number of substeps of order 2 in a step."""
-        return composition_of(self.order, self.composition).stages
+        return composition_of(self.order).stages
 
-    def unsupported(self, scene: Scene) -> str | None:
-        motor = scene.body.motor  # asked at the ends of stages, other loads at their midpoints
-        if motor and callable(motor.value) and leaves_step(composition_of(self.order, self.composition).weights):
-            return OUTSIDE
-        return frame_unsupported(self.frame, scene)
+    unsupported = frame_unsupported
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
-        find = partial(find_coefficients, self.order, self.composition, self.tol)
+        find = partial(find_coefficients, self.order)
         return prepare_run(scene, grid, label, start, kernels("reduced"), model, find(grid.dt), find)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
@@ -147,9 +136,9 @@ def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
 
 
 @lru_cache(maxsize=256)
-def find_coefficients(order: int, composition: str | None, tol: float, dt: float) -> Any:
+def find_coefficients(order: int, dt: float) -> Any:
     """Return the kernel's coefficients of a step dt, s."""
-    return kernels("reduced").Coefficients(np.array(composition_of(order, composition).lengths(dt)), tol)
+    return kernels("reduced").Coefficients(np.array(composition_of(order).lengths(dt)), TOLERANCE)
 
 
 BODY_STEP = 2e-8
@@ -161,7 +150,7 @@ def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
     kernel, n, s = kernels("reduced"), len(bodies), grid.n_samples
     moments, R_BP = bodies.principal
     time, units = find_unit_of_time(grid), find_units_of_moments(moments)[:, None]
-    lengths, tol = find_coefficients(method.order, method.composition, method.tol, grid.dt / time)
+    lengths, tol = find_coefficients(method.order, grid.dt / time)
     J, q0 = moments / units, to_quaternion(bodies.R_WB0 @ R_BP)
     L0 = into_axes(bodies.w_WB_B0, R_BP) * moments / units * time
     columns = stack_columns([J, 1 / J], kernel.WIDTH)

@@ -9,6 +9,9 @@ P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 Fixed steps are given up as soon as those of one candidate show that the motion is not smooth, or when steps as short as a trial
 allows show no order: an adaptive method follows. It is not tried on noise of time, which no step resolves.
 
+The chosen setting is then refined over the whole duration (`refine_until`), by its step or its tolerance. `recommend` does the
+same with engines as well, and measures the errors that are estimated here and the times that are counted.
+
 Work is counted and not timed, so that the same scene always gets the same choice. The count also limits the search: once a
 candidate has reached the error, it ends when it has taken as long as the runs by that candidate. The first trial of a short run
 starts at a step that is likely to be short enough, and ends the search if it is.
@@ -17,10 +20,11 @@ starts at a step that is likely to be short enough, and ends the search if it is
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
+from typing import TypeVar
 
 import numpy as np
 
@@ -33,6 +37,7 @@ from .projected import Projected
 from .trials import Trials, convergence_factor, parts_for
 from .units import bound_rate
 
+Setting, Tried = TypeVar("Setting"), TypeVar("Tried")
 SAFETY = 0.5
 """Share of the requested error that steps have to reach."""
 ATTEMPTS = 24
@@ -285,6 +290,27 @@ def even_grid(t_end: float, dt: float, sample_every: int, parts: int = 2) -> Gri
     """Return a grid of a multiple of `parts` steps of at most dt up to t_end, both in s, for runs at twice the step."""
     n = parts * count_steps(t_end, parts * dt)
     return Grid(t_end / n, n, min(sample_every, n))
+
+
+def refine_until(
+    tried: list[Tried],
+    finer: Callable[[list[Tried]], Setting | None],
+    attempt: Callable[[Setting], Tried],
+    reached: Callable[[Tried], bool],
+    error: Callable[[Tried], float],
+    most: int,
+) -> list[Tried]:
+    """Add attempts with finer and finer settings to those that were tried, and return all of them.
+
+    It ends when an attempt has reached the error, when finer settings no longer help (`stops_falling` of `error`, rad), when
+    `finer` returns no setting, and at `most` attempts.
+    """
+    while len(tried) < most and not reached(tried[-1]) and not stops_falling([error(each) for each in tried]):
+        setting = finer(tried)
+        if setting is None:
+            break
+        tried.append(attempt(setting))
+    return tried
 
 
 def step_factor(estimate: float, error: float, method: Method, least: float = 0.1, unknown: float = 0.5) -> float:

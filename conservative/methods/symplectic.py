@@ -14,12 +14,13 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import FIELDS, IN_TIME, ROTATION, Feature
 from ..grid import Grid
+from ..invariants import AXIAL_MOMENTUM, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
-from .coefficients.compositions import OUTSIDE, leaves_step
-from .coefficients.splittings import SEQUENCES, Lengths, lengths_of
+from .coefficients.compositions import COMPOSED, COMPOSITIONS
+from .coefficients.splittings import Lengths, lengths_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
 from .units import in_own_units
@@ -41,10 +42,6 @@ class Splitting(Method):
     ----------
     order
         2, 4, 6, 8 or 10.
-    composition
-        Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`), or of a sequence of
-        `conservative.methods.coefficients.splittings`; None for the most accurate one of the order. Those with stages outside
-        of the step do not take potentials that are functions of time.
 
     Raises
     ------
@@ -53,17 +50,17 @@ class Splitting(Method):
     """
 
     order: int = 6
-    composition: str | None = None
 
     family: ClassVar[str] = "splitting"
     role: ClassVar[Role] = Role.OURS
     method_info: ClassVar[MethodInfo] = MethodInfo(
-        variants=tuple(f"order={order}" for order in (2, 4, 6, 8, 10)),
+        variants=tuple(f"order={order}" for order in COMPOSITIONS),
         report=("",),
         suite=(),
         kernel="symplectic",
         structure=lambda method: Structure(symmetric=True, symplectic=True),
         supports=FIELDS | IN_TIME | {Feature.ROTOR},
+        removed={"composition": COMPOSED},
     )
     kind: ClassVar[str] = "EXACT"
 
@@ -73,21 +70,18 @@ class Splitting(Method):
     @property
     def lengths(self) -> Lengths:
         """Rotations and kicks relative to the step."""
-        return lengths_of(self.order, self.composition, self.kind == "EXACT")
+        return lengths_of(self.order, self.kind == "EXACT")
 
     @property
     def conserves(self) -> frozenset[str]:
-        momenta = {"momentum", "vertical momentum", "momentum along the field's axis"}
-        return frozenset(momenta if self.kind == "AXES" else momenta | {"axial momentum"})
+        return frozenset(MOMENTA if self.kind == "AXES" else (*MOMENTA, AXIAL_MOMENTUM))
 
     bounds = within_round_off
 
     def unsupported(self, scene: Scene) -> str | None:
-        if Feature.TIME in scene.features and leaves_step(self.lengths[0]):
-            return OUTSIDE
         if scene.body.rotor_momentum is None:
             return "it is for bodies in a field; MoserVeselov is exact" if scene.free and self.kind == "EXACT" else None
-        return "its sequence needs exact free rotations, which a rotor has not" if self.composition in SEQUENCES else None
+        return None
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
@@ -185,7 +179,7 @@ def convert(scene: Scene, method: Splitting) -> tuple[str, PrincipalStart, Any]:
 @lru_cache(maxsize=256)
 def find_coefficients(method: Splitting, dt: float, exact: bool) -> Any:
     """Return the kernel's coefficients of a step dt, s. Without `exact` free rotations it is a composition of order 2."""
-    rotations, kicks = method.lengths if exact else lengths_of(method.order, method.composition, exact=False)
+    rotations, kicks = method.lengths if exact else lengths_of(method.order, exact=False)
     if method.kind == "MIDDLE":
         kicks = (0 * kicks[0],) * len(kicks)
     nodes = itertools.accumulate(rotations)

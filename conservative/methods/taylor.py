@@ -12,13 +12,13 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import ROTATION, Feature
 from ..grid import Grid
-from ..invariants import JACOBI_INTEGRAL
+from ..invariants import AXIAL_MOMENTUM, JACOBI_INTEGRAL, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
 from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
-from .bounds import bounds_of
+from .bounds import within_round_off
 from .many import RunMany
 from .run_kernel import KernelRun, prepare_run
 from .taylor_dense import prepare_dense
@@ -88,9 +88,7 @@ class Taylor(Method):
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
-    conserves = frozenset(
-        {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
-    )
+    conserves = frozenset({"energy", JACOBI_INTEGRAL, *MOMENTA, AXIAL_MOMENTUM})
     method_info: ClassVar[MethodInfo] = MethodInfo(
         variants=("order=8", "order=12", "order=16", "tolerance=1e-9"),
         report=("order=12",),
@@ -120,7 +118,7 @@ class Taylor(Method):
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         if self.tolerance is not None:
             grid = Grid(grid.dt, PARTS * grid.n_steps, PARTS * grid.n_steps)
-        return bounds_of(scene, grid)
+        return within_round_off(self, scene, grid)
 
     @property
     def terms(self) -> int:

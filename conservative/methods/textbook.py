@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,27 +12,48 @@ from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..features import IN_TIME, ROTATION
 from ..grid import Grid
+from ..invariants import AXIAL_MOMENTUM, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import MethodInfo, Structure
 from ..scene import Scene
 from .bounds import within_round_off
-from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4
+from .coefficients.explicit import CROUCH_GROSSMAN_4, RUNGE_KUTTA_4, ExplicitTableau
 from .principal_axes import principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
 Scheme = Literal["rkmk", "crouch_grossman", "generalized_alpha", "buss", "gyroscopic", "spiers", "spiers_rates"]
 _RADIUS = "a spectral radius from 0 to 1"
+_IN_WORLD, _AXIAL = frozenset(MOMENTA), frozenset({AXIAL_MOMENTUM})
+
+
+class Formula(NamedTuple):
+    """What defines a scheme: its title in tables, its order, and the tableau if it is a Runge-Kutta method.
+
+    `kernel` is the name of its number in `conservative.kernels.textbook`, and `conserves` is as in `Method`.
+    """
+
+    title: str
+    kernel: str
+    order: int
+    conserves: frozenset[str] = _AXIAL
+    tableau: ExplicitTableau | None = None
+
+
+def by_tableau(title: str, kernel: str, tableau: ExplicitTableau) -> Formula:
+    """Return the scheme of a tableau, whose order it has, because its exponentials do not lower it."""
+    return Formula(title, kernel, tableau.order, tableau=tableau)
+
+
 SCHEMES = {
-    "rkmk": ("RKMK 4", 4),
-    "crouch_grossman": ("Crouch-Grossman 4", 4),
-    "generalized_alpha": ("generalised-alpha", 2),
-    "buss": ("Buss 3", 3),
-    "gyroscopic": ("explicit gyroscopic step", 1),
-    "spiers": ("Spiers 1", 1),
-    "spiers_rates": ("Spiers 1, rates first", 1),
+    "rkmk": by_tableau("RKMK 4", "MUNTHE_KAAS", RUNGE_KUTTA_4),
+    "crouch_grossman": by_tableau("Crouch-Grossman 4", "CROUCH_GROSSMAN", CROUCH_GROSSMAN_4),
+    "generalized_alpha": Formula("generalised-alpha", "GENERALIZED_ALPHA", 2),
+    "buss": Formula("Buss 3", "BUSS", 3, _IN_WORLD),
+    "gyroscopic": Formula("explicit gyroscopic step", "GYROSCOPIC", 1),
+    "spiers": Formula("Spiers 1", "SPIERS", 1, _IN_WORLD | _AXIAL),
+    "spiers_rates": Formula("Spiers 1, rates first", "SPIERS_RATES", 1),
 }
-"""Titles in tables, and orders. In the order of the numbers in `conservative.kernels.textbook`."""
 
 
 @dataclass(frozen=True)
@@ -84,18 +105,16 @@ class Textbook(Method):
 
     @property
     def order(self) -> int:
-        return SCHEMES[self.scheme][1]
+        return SCHEMES[self.scheme].order
 
     @property
     def conserves(self) -> frozenset[str]:
-        in_world = {"momentum", "vertical momentum", "momentum along the field's axis"}
-        kept = {"buss": in_world, "spiers": {*in_world, "axial momentum"}}
-        return frozenset(kept.get(self.scheme, {"axial momentum"}))
+        return SCHEMES[self.scheme].conserves
 
     @property
     def setting_parts(self) -> dict[str, str]:
         rho = {"rho": f"rho={self.rho}"} if self.scheme == "generalized_alpha" else {}
-        return {"scheme": SCHEMES[self.scheme][0], **rho}
+        return {"scheme": SCHEMES[self.scheme].title, **rho}
 
     bounds = within_round_off
 
@@ -103,10 +122,11 @@ class Textbook(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, start = kernels("textbook"), principal_start(scene)
         model = kernel.Model(start.J, start.J_inverse, start.field, start.q, start.L)
-        tableau = CROUCH_GROSSMAN_4 if self.scheme == "crouch_grossman" else RUNGE_KUTTA_4
+        formula = SCHEMES[self.scheme]
+        tableau = formula.tableau or RUNGE_KUTTA_4  # other schemes do not use it
         weights = np.array([[*row, *[0.0] * (len(tableau.b) - len(row))] for row in (*tableau.A, tableau.b)])
         alpha_m, alpha_f = (2 * self.rho - 1) / (self.rho + 1), self.rho / (self.rho + 1)
         gamma = 0.5 + alpha_f - alpha_m
         alpha = alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4, gamma
-        coefficients = kernel.Coefficients(list(SCHEMES).index(self.scheme), weights, np.array(tableau.c), alpha, grid.dt)
+        coefficients = kernel.Coefficients(getattr(kernel, formula.kernel), weights, np.array(tableau.c), alpha, grid.dt)
         return prepare_run(scene, grid, self.label, start, kernel, model, coefficients)

@@ -28,7 +28,8 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
 from ..engine import EngineRun, load, principal_axes, unsupported_reason, version
-from .environment import Distribution
+from .environment import KINDS
+from .kind import Distribution
 from .plain_numbers import FIELDS, NEEDS, describe, read_many, read_one, take_axes
 
 
@@ -91,7 +92,7 @@ class EngineData(Distribution):
     method_info: Mapping[str, Any] = field(default_factory=dict)
 
 
-SCRIPTS = {".mjs": "npm", ".cpp": "apt"}
+SCRIPTS = {kind.suffix: kind.name for kind in KINDS.values() if kind.suffix != ".py"}
 """Suffixes of adapters that are not in Python, and the kinds of their environments."""
 
 

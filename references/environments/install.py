@@ -6,11 +6,10 @@ import hashlib
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
@@ -19,31 +18,24 @@ from conservative.programs import Program
 from conservative.registry import read_name
 
 from ..worker.client import EngineCrashed, EngineTimeout
-from . import apt, npm
-from . import lock as python_packages
 from .environment import (
     BUILD,
-    LOCK,
-    Distribution,
+    KINDS,
     Environment,
     MissingEnvironment,
     close_environment,
     distribution_of,
     find_environment,
-    folder_of_all,
-    folder_of_projects,
     list_environments,
     read_environment,
-    temporary_folder,
-    version_key,
     worker_of,
 )
-from .lock import Lock, Source, find_python, normal_name, resolve_wheel
+from .folders import folder_of_all, folder_of_projects, temporary_folder
+from .kind import Distribution, EnvironmentKind, Lock, Source, version_key
+from .pip import normal_name, resolve_wheel
 from .programs import find_program, register
 from .uv_command import UvFailed, run_uv
 
-_KINDS: Mapping[str, Any] = {"python": python_packages, "npm": npm, "apt": apt}
-"""Modules that lock, fill and list the versions of environments: functions `resolve`, `fill` and `list_versions`."""
 _EPOCH = "315532800"  # 1980, the first date in zip files, so that the same sources give the same wheel
 
 
@@ -71,13 +63,9 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
         old = find_environment(engine, version) if force else None
     except MissingEnvironment:
         old = None
-    if old is None:
-        return _install(engine, distribution, _KINDS[distribution.kind].resolve(distribution, version, source), source, force)
-    try:
-        text = (old.folder / LOCK).read_text(encoding="utf-8")
-    except OSError:
-        raise BadInput("engine", f"{old.name} without a lock", "`engines install`") from None
-    return _install(engine, distribution, Lock(old.version, find_python(old.runtime.partition(" ")[2]), text), source, force)
+    kind = KINDS[distribution.kind]
+    lock = kind.read_lock(old.folder, old.version, old.runtime) if old else kind.resolve(distribution, version, source)
+    return _install(engine, distribution, lock, source, force)
 
 
 def install_build(engine: str, path: Path, source: Source) -> Installation:
@@ -122,7 +110,7 @@ def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     Raise `BadInput` if the engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
-    known = _KINDS[distribution.kind].list_versions(distribution.package, source)
+    known = KINDS[distribution.kind].list_versions(distribution.package, source)
     if not known:
         got = f"no list of versions of {distribution.package} from the package index"
         raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
@@ -155,17 +143,17 @@ def check(requirement: str) -> None:
 def _install(engine: str, distribution: Distribution, lock: Lock, source: Source, force: bool = False) -> Installation:
     folder = folder_of_all() / engine / lock.version
     existing = None if force else read_environment(folder)
-    environment = existing or make(engine, lock, folder, source, distribution.kind)
+    environment = existing or make(engine, lock, folder, source, KINDS[distribution.kind])
     return Installation(environment, existing is None, import_trouble(environment, distribution))
 
 
-def make(engine: str, lock: Lock, folder: Path, source: Source, kind: str = "python") -> Environment:
+def make(engine: str, lock: Lock, folder: Path, source: Source, kind: EnvironmentKind = KINDS["python"]) -> Environment:
     """Create an environment in place of an old one. Raise `BadInput` if a package is missing or the disk is full."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, Path.mkdir) as scratch:
-            (scratch / LOCK).write_text(lock.text, encoding="utf-8")
-            runtime, packages = _KINDS[kind].fill(scratch, lock, source)
+            (scratch / kind.lock_file).write_text(lock.text, encoding="utf-8")
+            runtime, packages = kind.fill(scratch, lock, source)
             Environment(engine, lock.version, scratch, runtime, packages, kind).write()
             close_environment(folder)
             with _removed(folder) if folder.exists() else nullcontext():

@@ -1,4 +1,4 @@
-"""Environments of packages of JavaScript, made by npm: what `lock` is for Python.
+"""Environments of packages of JavaScript, made by npm.
 
 npm uses its own configuration, and runs no scripts of packages. A lock names no registry, so that it can be used with any.
 """
@@ -8,59 +8,75 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from conservative.errors import BadInput
 
-from .environment import NODE, Distribution, find_node, folder_of_all, temporary_folder, version_key
-from .lock import Lock, Source
+from ..worker import program
+from .folders import folder_of_all, temporary_folder
+from .kind import Distribution, EnvironmentKind, Lock, Source, version_key
+
+NODE = "Node 20 or later with npm, from https://nodejs.org or the system's packages"
 
 
-def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
-    """Return the lock of a version of an engine, by default the newest. Raise `BadInput` as `lock.resolve`."""
-    package, known = distribution.package, list_versions(distribution.package, source)
-    if version not in ("", *known):
-        raise BadInput("version", repr(f"{package}=={version}"), f"one of {', '.join(known)}")
-    with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"lock-{os.getpid()}-") as name:
-        folder = Path(name)
-        (folder / "package.json").write_text('{"name": "environment"}', encoding="utf-8")
-        options = ("--package-lock-only", "--omit-lockfile-registry-resolved", "--save-exact")
-        _run_npm(folder, "install", *options, f"{package}@{version or known[0]}")
-        return Lock(version or known[0], "", (folder / "package-lock.json").read_text(encoding="utf-8"))
+@dataclass(frozen=True)
+class Npm(EnvironmentKind):
+    """A folder of `node_modules`."""
+
+    name, lock_file, suffix = "npm", "package-lock.json", ".mjs"
+
+    def resolve(self, distribution: Distribution, version: str, source: Source) -> Lock:
+        package, known = distribution.package, self.list_versions(distribution.package, source)
+        if version not in ("", *known):
+            raise BadInput("version", repr(f"{package}=={version}"), f"one of {', '.join(known)}")
+        with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"lock-{os.getpid()}-") as name:
+            folder = Path(name)
+            (folder / "package.json").write_text('{"name": "environment"}', encoding="utf-8")
+            options = ("--package-lock-only", "--omit-lockfile-registry-resolved", "--save-exact")
+            _run_npm(folder, "install", *options, f"{package}@{version or known[0]}")
+            return Lock(version or known[0], (folder / self.lock_file).read_text(encoding="utf-8"))
+
+    def fill(self, folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
+        ask = [_find("node"), "-p", "process.versions.node"]
+        node = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
+        if version_key(node) < version_key("20"):
+            raise BadInput("engine", f"an engine in JavaScript, but Node {node}", NODE)
+        packages = json.loads(lock.text)["packages"]
+        (folder / "package.json").write_text(json.dumps(packages.pop("")), encoding="utf-8")
+        (folder / "find.mjs").write_text("export const find = (name) => import.meta.resolve(name);", encoding="utf-8")
+        _run_npm(folder, "ci")
+        names = (f"{place.rpartition('node_modules/')[2]}=={each['version']}" for place, each in packages.items())
+        return f"Node {node}", tuple(sorted(names))
+
+    def list_versions(self, package: str, source: Source) -> list[str]:
+        """Return the releases of a package, newest first. Raise `BadInput` if npm's registry does not list them."""
+        if source.find_links is not None:
+            raise BadInput("find_links", repr(str(source.find_links)), f"nothing for {package}, which npm installs")
+        known = _run_npm(temporary_folder(), "view", package, "versions")
+        releases = [each for each in ([known] if isinstance(known, str) else known) if "-" not in each]
+        return sorted(releases, key=version_key, reverse=True)
+
+    def command(self, folder: Path) -> tuple[str | Path, ...]:
+        return _find("node"), Path(program.__file__).with_suffix(self.suffix), folder
 
 
-def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-    """Install the packages of a lock. Return the runtime of the engine, such as `Node 20.20.2`, and its packages."""
-    ask = [find_node("node"), "-p", "process.versions.node"]
-    node = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
-    if version_key(node) < version_key("20"):
-        raise BadInput("engine", f"an engine in JavaScript, but Node {node}", NODE)
-    packages = json.loads(lock.text)["packages"]
-    (folder / "package.json").write_text(json.dumps(packages.pop("")), encoding="utf-8")
-    (folder / "package-lock.json").write_text(lock.text, encoding="utf-8")
-    (folder / "find.mjs").write_text("export const find = (name) => import.meta.resolve(name);", encoding="utf-8")
-    _run_npm(folder, "ci")
-    names = (f"{place.rpartition('node_modules/')[2]}=={each['version']}" for place, each in packages.items())
-    return f"Node {node}", tuple(sorted(names))
-
-
-def list_versions(package: str, source: Source) -> list[str]:
-    """Return the releases of a package, newest first. Raise `BadInput` if npm's registry does not list them."""
-    if source.find_links is not None:
-        raise BadInput("find_links", repr(str(source.find_links)), f"nothing for {package}, which npm installs")
-    known = _run_npm(temporary_folder(), "view", package, "versions")
-    releases = [each for each in ([known] if isinstance(known, str) else known) if "-" not in each]
-    return sorted(releases, key=version_key, reverse=True)
+def _find(name: str) -> str:
+    """Return the path of `node` or `npm`. Raise `BadInput` if it is not installed."""
+    if path := shutil.which(name):
+        return path
+    raise BadInput("engine", f"an engine in JavaScript, but no {name} on this machine", NODE)
 
 
 def _run_npm(folder: Path, *arguments: str) -> Any:
     """Return the output of a command of npm, which is JSON. Raise `BadInput` if it fails."""
     options = ("--json", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier")
     variables = {"npm_config_cache": str(folder_of_all().parent / "npm"), **os.environ}
-    command = [find_node("npm"), *arguments, *options]
+    command = [_find("npm"), *arguments, *options]
     done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return json.loads(done.stdout)

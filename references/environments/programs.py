@@ -9,7 +9,7 @@ import shlex
 import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -26,7 +26,23 @@ from conservative.toml_reader import read
 from ..worker.client import START_LIMIT, is_number, is_text
 from .engine_method import EngineMethod, engine_class
 from .environment import Environment, worker_of
+from .kind import EnvironmentKind
 from .plain_numbers import FIELDS
+
+
+@dataclass(frozen=True)
+class OwnProgram(EnvironmentKind):
+    """A program of the user, by the words of its command line. It has the variables of this process; nothing is installed."""
+
+    words: tuple[str, ...]
+
+    name = "program"
+
+    def command(self, folder: Path) -> tuple[str | Path, ...]:
+        return self.words
+
+    def variables(self, folder: Path) -> None:
+        return None
 
 
 class UnusableProgram(MissingEngine):
@@ -98,7 +114,7 @@ def _check_description(engine: dict[str, Any]) -> None:
 def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMethod]:
     """Return the class of a program, started for its description within a limit in s. Raise `UnusableProgram` if that fails."""
     module: Any = ModuleType(program.name, f"{program.name}, a program.")
-    environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), words=program.words)
+    environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), OwnProgram(program.words))
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)

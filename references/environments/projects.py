@@ -23,18 +23,11 @@ from conservative.errors import BadInput
 from conservative.files import make_folder, write_bytes
 from conservative.version import VERSION
 
-from .environment import (
-    LOCK,
-    RECORD,
-    Distribution,
-    Environment,
-    close_environment,
-    folder_of_projects,
-    read_environment,
-    temporary_folder,
-)
+from .environment import RECORD, Environment, close_environment, read_environment
+from .folders import folder_of_projects, temporary_folder
 from .install import build_wheel, clear_leftovers, drop, import_trouble, make
-from .lock import Source, normal_name, resolve_wheel
+from .kind import Distribution, Source
+from .pip import Pip, normal_name, resolve_wheel, versions_in
 
 KEPT = 8
 """Largest number of environments of a project. The least recently used ones are removed."""
@@ -70,10 +63,10 @@ def _make_environment(wheel: Path, requirements: Sequence[str], source: Source) 
         lock = resolve_wheel(distribution, wheel, key, source)
         with zipfile.ZipFile(wheel) as archive:
             ours = any(re.match(rf"{US}[./]", member) for member in archive.namelist())
-        if not ours and not re.search(f"^{PACKAGE}[ =]", lock.text, re.MULTILINE):
+        if not ours and PACKAGE not in versions_in(lock.text):
             raise BadInput("against", f"{wheel.name}, without {PACKAGE}", f"a version that needs {PACKAGE}")
-        environment = read_environment(folder)
-        if environment is None or (folder / LOCK).read_text(encoding="utf-8") != lock.text:
+        environment, known = read_environment(folder), folder / Pip.lock_file  # older versions wrote another file
+        if environment is None or not known.is_file() or known.read_text(encoding="utf-8") != lock.text:
             environment = make(name, lock, folder, source)
     except BadInput as error:
         raise BadInput("against", error.got, error.allowed) from None

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from conservative.errors import BadInput, require_extra
 
-from .environment import folder_of_all, temporary_folder
+from .folders import folder_of_all, temporary_folder
 
 _FROM_PIP = {
     "index-url": "UV_DEFAULT_INDEX",

@@ -1,7 +1,8 @@
-"""Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a video.
+"""Animations: trajectories side by side on one clock, as a page, as part of a page (`script`, `element`), or as a GIF.
 
-Each panel draws the body as its inertia box, the box of constant density with the same moments, centred at the fixed point. An
-arrow is the angular momentum, relative to its initial size. A rod along one axis of the body leaves a trace.
+Each panel draws the body as the box of constant density with the same moments, centred at the fixed point, and a symmetric top
+as the cone that stands on it. An arrow is the angular momentum, relative to its initial size. A rod along one axis of the body
+leaves a trace.
 `player.js` draws with `vendor/three.js`, which `.ci/three/build` bundles.
 """
 
@@ -16,15 +17,15 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from conservative.errors import BadInput, require_extra
-from conservative.files import write_bytes
+from conservative.errors import require_extra
+from conservative.files import require_ending, write_bytes
 from conservative.trajectory import Trajectory
 
-from .frames import COLOURS, Values, make_panels, speeds
+from .frames import COLOURS, Values, legend, make_panels, speeds
 from .frames import largest_values as largest_values
 from .frames import longest as longest
 
-KINDS = (".html", ".gif", ".mp4", ".png")
+KINDS = (".html", ".gif", ".png")
 """Endings of files that contain an animation, or its last frame."""
 MARK = "Written by conservative watch"
 """Text near the beginning of each such file."""
@@ -45,21 +46,20 @@ class Animation:
     values: Sequence[Values | None] | None = None
 
     def save(self, path: str | Path) -> None:
-        """Write a page (.html), a video (.gif, .mp4), or the last frame (.png); an existing file is replaced.
+        """Write a page (.html), a GIF (.gif), or the last frame (.png); an existing file is replaced.
 
         Raises
         ------
         BadInput
             The name has another ending, or the file cannot be written; or as in `element`.
         MissingExtra
-            A package is not installed: for pages of the extra `report`, for videos and frames of `video`.
+            A package is not installed: for pages of the extra `report`, for GIFs and frames of `video`.
         """
+        require_ending("path", Path(path), KINDS)
         write_bytes(Path(path), self.render(Path(path).suffix), "path")
 
     def render(self, kind: str, progress: Callable[[float], None] = lambda share: None) -> bytes:
-        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the finished share of a video."""
-        if kind not in KINDS:
-            raise BadInput("path", f"a file that ends in {kind!r}", f"one that ends in {', '.join(KINDS)}")
+        """Return the contents of a file of a kind in `KINDS`, as `save` does. `progress` gets the finished share of a GIF."""
         if kind == ".html":
             motion = element(self.trajectories, self.labels, truth=self.truth, values=self.values)
             name = self.trajectories[0].scene.name
@@ -113,16 +113,21 @@ def element(
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)
-    return frame(panels, name, duration, id, data.replace("<", "\\u003c"))  # no end of the script
+    return frame(panels, name, duration, id, data.replace("<", "\\u003c"), legend(panels, truth))  # no end of the script
 
 
-def frame(panels: Sequence[object], name: str, duration: float, id: str, data: str) -> str:
+def frame(
+    panels: Sequence[object], name: str, duration: float, id: str, data: str, legend: Sequence[tuple[str, str]] = ()
+) -> str:
     """Return the HTML of an animation of panels with `label`, `outcome` and names of `sizes`.
 
     `data` is JSON. A script of the page can set the property `content` of the element instead, in the same form, and dispatch
-    an event of that name after each change. A panel with `moments` in place of `q` shows its `L` in principal axes.
+    an event of that name after each change. A panel with `moments` in place of `q` shows its `L` in principal axes. `legend`
+    has colours and texts.
     """
-    return _fill("motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=data)
+    return _fill(
+        "motion.html.j2", id=id, name=name, panels=panels, duration=duration, speeds=speeds(duration), data=data, legend=legend
+    )
 
 
 def _fill(template: str, **values: object) -> str:

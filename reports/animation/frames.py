@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,8 @@ from ..numbers import angle, bound
 
 THINNEST = 0.04
 """Shortest side of a box relative to its longest: of a planar body, or of moments that no mass distribution has."""
+SAME = 1e-6
+"""Largest relative difference of moments that are drawn as equal, and of a centre of mass that is drawn on the axis."""
 MOST = 1e6
 """Largest angular momentum in the data of a panel, relative to the initial one; the arrow ends before."""
 ERROR = "attitude error, rad"
@@ -29,10 +33,95 @@ LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
 FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
 COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
+GRADES = {"good": "#cdebd8", "fair": "#fbe9b7", "bad": "#f8cfc8"}
+"""Backgrounds of numbers by their grade, as in player.css."""
 
 
 Values = Mapping[str, Array]
 """The largest value so far of each drift and of the attitude error, rad, at the samples of a motion (n,), by name."""
+
+
+class Shape(StrEnum):
+    """A solid of constant density with the moments of a body about the fixed point."""
+
+    BOX = "box"
+    CONE = "cone"
+
+
+QUARTERS, ROUND = 4, 12
+"""Coloured parts of the surface of a cone, which show that it spins, and straight pieces of the circle in each of them."""
+
+
+class Face(NamedTuple):
+    """A plane part of a surface: corners (n, 3), counter-clockwise from outside, a colour, and edges as numbers of corners."""
+
+    corners: Array
+    colour: str
+    edges: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """What is drawn of a body, in principal axes.
+
+    Attributes
+    ----------
+    shape
+        A box about the fixed point, or for a top a cone that stands on it.
+    size
+        The sides of a box (3,), or the radius and the height of a cone (2,). The farthest point is at a distance of 1.
+    axis
+        Direction of a cone (3,), from its tip to its base.
+    """
+
+    shape: Shape
+    size: Array
+    axis: Array
+
+    @cached_property
+    def centre(self) -> Array:
+        """The middle of the solid (3,)."""
+        return np.zeros(3) if self.shape is Shape.BOX else self.axis * self.size[1] / 2
+
+    @cached_property
+    def faces(self) -> list[Face]:
+        """The faces of the surface."""
+        if self.shape is Shape.BOX:
+            signs = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)])
+            sides = zip(_SIDES, FACES, strict=True)
+            return [
+                Face((signs * self.size / 2)[list(side)], colour, ((0, 1), (1, 2), (2, 3), (3, 0))) for side, colour in sides
+            ]
+        rim, tip, base, faces = self._rim, np.zeros(3), self.axis * self.size[1], list[Face]()
+        for k in range(len(rim)):
+            before, after, quarter = rim[k], rim[(k + 1) % len(rim)], k // ROUND
+            edges = ((1, 2), *((0, 2),) * (k % ROUND == 0), *((0, 1),) * ((k + 1) % ROUND == 0))
+            faces.append(Face(np.stack([tip, after, before]), FACES[quarter], edges))
+            faces.append(Face(np.stack([base, before, after]), FACES[4 + quarter % 2], ((1, 2),)))
+        return faces
+
+    def leave(self, direction: Array) -> float:
+        """Return the share of a vector (3,) from the fixed point that is inside the solid."""
+        with np.errstate(divide="ignore"):
+            if self.shape is Shape.BOX:
+                return float(min(np.min(self.size / 2 / np.abs(direction)), 1.0))
+        along = float(direction @ self.axis)
+        across = float(np.linalg.norm(direction - along * self.axis))
+        radius, height = self.size
+        return float(min(height / along, 1.0)) if along > 0 and across * height < along * radius else 0.0
+
+    @cached_property
+    def _rim(self) -> Array:
+        """The points of the rim of a cone, counter-clockwise about its axis."""
+        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
+        first /= np.linalg.norm(first)
+        angles = np.arange(QUARTERS * ROUND) * 2 * np.pi / (QUARTERS * ROUND)
+        circle = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), np.cross(self.axis, first))
+        return np.asarray(self.size[0] * circle + self.size[1] * self.axis)
+
+
+_SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+"""Corners of the sides of a box, in the order of `FACES`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +132,8 @@ class Panel:
     ----------
     label, outcome
         Title, and the failure of the run (empty if it reached its end).
-    size, tip
-        Sides of the inertia box (3,) and end of the rod (3,) in principal axes; half a diagonal of the box is 1.
+    solid, tip
+        The body as it is drawn, and the end of the rod (3,) in principal axes.
     R_WP, L_W
         Attitudes of the principal axes (n, 3, 3), and angular momentum relative to its initial size (n, 3), world axes.
     sizes
@@ -53,7 +142,7 @@ class Panel:
 
     label: str
     outcome: str
-    size: Array
+    solid: Solid
     tip: Array
     R_WP: Array
     L_W: Array
@@ -61,11 +150,14 @@ class Panel:
 
     def data(self) -> dict[str, Any]:
         """Return the data for the player: rounded, and numbers as the frames from which they have a text and a grade."""
-        values = {"size": self.size, "tip": self.tip, "q": np.roll(to_quaternion(self.R_WP), -1, axis=1), "L": self.L_W}
+        values = {"size": self.solid.size, "tip": self.tip, "q": np.roll(to_quaternion(self.R_WP), -1, axis=1), "L": self.L_W}
         texts = [[self.text(name, frame) for frame in range(len(self.R_WP))] for name in self.sizes]
         starts = [[next(same) for _, same in groupby(enumerate(each), lambda pair: pair[1])] for each in texts]
         shown = [[(frame, *text) for frame, text in each] for each in starts]
-        return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {"sizes": shown}
+        return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {
+            "shape": self.solid.shape,
+            "sizes": shown,
+        }
 
     def text(self, name: str, frame: int) -> tuple[str, str]:
         """Return the number of a frame in `sizes` as tables show it, rounded up, and its grade."""
@@ -144,9 +236,8 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     R_WB = (start * Rotation.from_rotvec(share[:, None] * (start.inv() * stop).as_rotvec())).as_matrix()
     last = np.append(before[:-1], len(t) - 1)  # the last numbers are those of the whole run
     lengths = np.linalg.norm(trajectory.momentum_W, axis=1)
-    squares = np.maximum(body.moments.sum() - 2 * body.moments, 0)  # of the sides: J_1 = m/12 (b^2 + c^2), and so on
-    size = np.maximum(np.sqrt(squares), THINNEST * math.sqrt(squares.max()))
     tip = np.asarray(getattr(scene.potential, "com_B", np.zeros(3))) @ body.R_BP
+    solid = _solid_of(body.moments, tip)
     if not tip.any():
         tip = np.eye(3)[np.argmax(np.abs(scene.w_WB_B0 @ body.R_BP))]
     with np.errstate(all="ignore"):  # the momentum of a run that diverged can overflow
@@ -154,12 +245,37 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     return Panel(
         label,
         "" if trajectory.ok else str(trajectory.outcome),
-        2 * size / np.linalg.norm(size),
+        solid,
         1.25 * tip / np.linalg.norm(tip),
         R_WB @ body.R_BP,
         np.clip(L_W, -MOST, MOST),
         {name: value[last] for name, value in values.items() if not np.isnan(value).any()},  # not every method has balances
     )
+
+
+def _solid_of(moments: Array, com_P: Array) -> Solid:
+    """Return the solid of a body: a cone on its tip if the centre of mass is on an axis of symmetry, otherwise a box.
+
+    Of a cone on its tip J1 = J2 = 3/5 m (r^2/4 + h^2) and J3 = 3/10 m r^2. Of a box J_1 = m/12 (b^2 + c^2), and so on.
+    """
+    along, off = int(np.argmax(np.abs(com_P))), np.sort(np.abs(com_P))[:2]
+    about, (first, second) = moments[along], np.delete(moments, along)
+    is_top = com_P.any() and off.max() <= SAME * np.abs(com_P).max() and abs(first - second) <= SAME * first
+    if is_top and about < 2 * first:
+        sides = np.sqrt([2 * about, first - about / 2])  # r and h, times a constant
+        size = np.maximum(sides, THINNEST * sides.max())
+        return Solid(Shape.CONE, size / np.linalg.norm(size), np.sign(com_P[along]) * np.eye(3)[along])
+    squares = np.maximum(moments.sum() - 2 * moments, 0)
+    size = np.maximum(np.sqrt(squares), THINNEST * math.sqrt(squares.max()))
+    return Solid(Shape.BOX, 2 * size / np.linalg.norm(size), np.zeros(3))
+
+
+def legend(panels: Sequence[Panel], truth: int | None) -> list[tuple[str, str]]:
+    """Return colour and text of what the panels draw."""
+    solids = {panel.solid.shape: f"{panel.solid.shape} of the same moments" for panel in panels}
+    entries = [*((FACES[0], text) for text in solids.values()), (str(COLOURS["arrow"]), "angular momentum")]
+    entries.append((str(COLOURS["trace"]), "axis of the body, and the trace of its end"))
+    return entries + [(str(COLOURS["outline"]), "reference solution")] * (truth is not None)
 
 
 def _errors(trajectory: Trajectory, truth: Trajectory) -> Array:

@@ -25,7 +25,7 @@
     sun.position.set(3, 2, 5);
     return new THREE.Scene().add(sky, sun, ...things);
   };
-  const wire = (box, color, depthTest) => new THREE.LineSegments(new THREE.EdgesGeometry(box), new THREE.LineBasicMaterial({ color, depthTest }));
+  const wire = (box, color, depthTest) => new THREE.LineSegments(new THREE.EdgesGeometry(box, 30), new THREE.LineBasicMaterial({ color, depthTest }));
 
   function pointer(color, radius, tip) { // a rod from the fixed point with something at its end
     const rod = mesh(new THREE.CylinderGeometry(radius, radius, 1), color), end = mesh(tip, color), group = new Group().add(rod, end);
@@ -37,12 +37,24 @@
     return { group, aim };
   }
 
-  function build({ size, tip, q, L, colours }) {
-    const turns = split(q, 4, Quaternion), momenta = split(L, 3, Vector3), end = new Vector3(...tip), box = new THREE.BoxGeometry(...size);
+  // The parts of the surface of a body and the numbers of their colours: a box, or a cone on its tip in four coloured parts.
+  function surface({ shape, size, tip }) {
+    if (shape !== "cone") return [[new THREE.BoxGeometry(...size), [0, 1, 2, 3, 4, 5]]];
+    const [radius, height] = size, axis = new Vector3(...tip).normalize(), quarter = Math.PI / 2;
+    const stand = new Quaternion().setFromUnitVectors(UP, axis.clone().negate()), middle = axis.multiplyScalar(height / 2);
+    return [0, 1, 2, 3].map((k) => {
+      const part = new THREE.ConeGeometry(radius, height, 12, 1, false, k * quarter, quarter);
+      return [part.applyQuaternion(stand).translate(middle.x, middle.y, middle.z), [k, k, 4 + (k % 2)]]; // side, none, base
+    });
+  }
+
+  function build({ shape, size, tip, q, L, colours }) {
+    const turns = split(q, 4, Quaternion), momenta = split(L, 3, Vector3), end = new Vector3(...tip), parts = surface({ shape, size, tip });
     const rod = pointer(colours.trace, 0.025, new THREE.SphereGeometry(0.06)), arrow = pointer(colours.arrow, 0.035, new THREE.ConeGeometry(0.11, 0.26));
     rod.aim(end);
-    const faces = new Mesh(box, colours.faces.map((color) => new MeshLambertMaterial({ color })));
-    const body = new Group().add(faces, wire(box, colours.ink, true), rod.group), outline = wire(box, colours.outline, false);
+    const faces = parts.map(([part, kinds]) => new Mesh(part, kinds.map((k) => new MeshLambertMaterial({ color: colours.faces[k] }))));
+    const [edges, outline] = [[colours.ink, true], [colours.outline, false]].map((style) => new Group().add(...parts.map(([part]) => wire(part, ...style))));
+    const body = new Group().add(...faces, edges, rod.group);
     const points = Array.from({ length: (turns.length - 1) * FINE + 1 }, (_, k) => end.clone().applyQuaternion(turned(turns, k / FINE)).toArray());
     const line = new THREE.LineGeometry().setPositions(points.flat());
     const trace = new THREE.Line2(line, new THREE.LineMaterial({ color: colours.trace, linewidth: 2 })); // pixels

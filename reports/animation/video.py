@@ -1,13 +1,16 @@
-"""Animations as .gif and .mp4, and their last frame as .png: the scene of the page, drawn by matplotlib."""
+"""Animations as .gif, and their last frame as .png: the scene of the page, drawn by Pillow.
+
+Its fonts have no other letters than those of ASCII, so that others are written without accents, or as question marks.
+"""
 
 from __future__ import annotations
 
 import io
 import math
-import subprocess
-import tempfile
+import unicodedata
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,130 +18,220 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import require_extra
 
-from .frames import COLOURS, FACES, Panel, speeds
+from .frames import COLOURS, FACES, GRADES, Panel, legend, speeds
 
 ARROW, TRACE, OUTLINE, INK = (str(COLOURS[name]) for name in ("arrow", "trace", "outline", "ink"))
-RATES = {".gif": 12.5, ".mp4": 30.0}
+RATE = 12.5
 """Frames per second; a GIF counts in hundredths of a second."""
-SIDE, BELOW, PIECE, DPI, FINE = 1.92, 0.64, 0.16, 100, 300
-"""Sides of the picture of a panel and of the least text below it, inches: multiples of 16 pixels, a piece, which encoders ask
-for. Pixels per inch of a video, and of a single frame."""
-TITLE, LINE = 0.17, 0.117
-"""Heights of the title of a panel and of a line of numbers, inches."""
-TILT, TURN = 20.0, 34.4
-"""Direction to the eye, degrees, as in the page."""
-EYE = np.array([math.cos(math.radians(TURN)), math.sin(math.radians(TURN)), math.tan(math.radians(TILT))])
-_CORNERS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)]) / 2
-_SIDES = [np.flatnonzero(_CORNERS[:, axis] == sign / 2)[[0, 1, 3, 2]] for axis in range(3) for sign in (1, -1)]
+PAUSE = 2000
+"""Time, ms, for which the last frame of a GIF stays before the motion starts again."""
+SIDE, LINE, TITLE, MARGIN = 192, 12, 15, 4
+"""Sizes in a GIF, pixels: the picture of a panel, a line of numbers, a title, and the margin of texts."""
+FINE, OVER = 3, 3
+"""Factors of pixels: of a single frame, for print, and of what is drawn and then averaged, so that edges are smooth."""
+TURN, TILT, DISTANCE, FIELD = 0.6, 0.35, 6.8, 30.0
+"""The camera of the page: its direction, rad, its distance, and its field of view, degrees."""
+EYE = np.array([math.cos(TILT) * math.cos(TURN), math.cos(TILT) * math.sin(TURN), math.sin(TILT)])
+_RIGHT = np.array([-math.sin(TURN), math.cos(TURN), 0.0])
+_UP = np.cross(EYE, _RIGHT)
+_FOCAL = 1 / math.tan(math.radians(FIELD / 2))
+LONGEST_ARROW = 1.25
+"""Largest angular momentum that is drawn, relative to the initial one, as on the page."""
 
 
 def draw(
     times: Array, panels: Sequence[Panel], truth: int | None, kind: str, mark: str, progress: Callable[[float], None]
 ) -> bytes:
-    """Return a video with an ending of `RATES`, at the default speed, or the last frame, .png, with `mark` as its comment.
+    """Return a GIF at the default speed, or the last frame, .png, with `mark` as its comment.
 
     Raises
     ------
     MissingExtra
-        matplotlib, or for .mp4 imageio-ffmpeg, is not installed.
+        Pillow is not installed.
     """
-    require_extra(f"Writing {kind}", "video", "matplotlib", *["imageio_ffmpeg"] * (kind == ".mp4"))
-    if kind == ".png":
-        from PIL import Image, PngImagePlugin
+    require_extra(f"Writing {kind}", "video")
+    from PIL import Image, ImageColor, PngImagePlugin
 
-        out, comment = io.BytesIO(), PngImagePlugin.PngInfo()
+    out = io.BytesIO()
+    if kind == ".png":
+        comment = PngImagePlugin.PngInfo()
         comment.add_text("Comment", mark)
         (image,) = _images(times, panels, truth, [len(times) - 1], FINE, progress)
-        Image.fromarray(image).save(out, "PNG", pnginfo=comment, dpi=(FINE, FINE))
+        image.save(out, "PNG", pnginfo=comment, dpi=(300, 300))
         return out.getvalue()
-    count = max(2, round(times[-1] / speeds(times[-1])[2] * RATES[kind]))
+    count = max(2, round(times[-1] / speeds(times[-1])[2] * RATE))
     shown = np.linspace(0, len(times) - 1, count).round().astype(int).tolist()
-    images = _images(times, panels, truth, shown, DPI, progress)
-    if kind == ".gif":
-        from PIL import Image, ImageColor
-
-        inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK)])
-        shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2])  # edges blend into the background
-        palette = Image.new("P", (1, 1))
-        palette.putpalette(shades.ravel().tolist())
-        first, *rest = (Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
-        out, options = io.BytesIO(), {"save_all": True, "append_images": rest, "loop": 0, "comment": mark, "optimize": True}
-        first.save(out, "GIF", duration=round(1000 / RATES[kind]), **options)
-        return out.getvalue()
-    import imageio_ffmpeg  # only for its ffmpeg: its own writer leaves pipes open
-
-    with tempfile.TemporaryDirectory() as folder:
-        file, image = Path(folder, "video.mp4"), next(images)
-        form = f"-f rawvideo -pix_fmt rgb24 -s {image.shape[1]}x{image.shape[0]} -r {RATES[kind]} -i -".split()
-        output = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-metadata", f"comment={mark}"]  # the comment comes first
-        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", *form, *output, str(file)]
-        # Ctrl-C is for this process: ffmpeg would print an error and break the pipe. It ends when the pipe is closed.
-        with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as ffmpeg:
-            assert ffmpeg.stdin is not None
-            for each in (image, *images):
-                ffmpeg.stdin.write(each.tobytes())
-        return file.read_bytes()
+    inks = np.array([ImageColor.getrgb(colour) for colour in (*FACES, ARROW, TRACE, OUTLINE, INK, *GRADES.values())])
+    shades = np.concatenate([[[255] * 3], inks, (inks + 255) // 2, [[74] * 3, [150] * 3]])  # edges blend into the background
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(shades.ravel().tolist())
+    images = _images(times, panels, truth, shown, 1, progress)
+    first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    durations = [*[round(1000 / RATE)] * (count - 1), PAUSE]
+    first.save(out, "GIF", save_all=True, append_images=rest, loop=0, comment=mark, optimize=True, duration=durations)
+    return out.getvalue()
 
 
 def _images(
-    times: Array, panels: Sequence[Panel], truth: int | None, shown: Sequence[int], dpi: int, progress: Callable[[float], None]
+    times: Array,
+    panels: Sequence[Panel],
+    truth: int | None,
+    shown: Sequence[int],
+    scale: int,
+    progress: Callable[[float], None],
 ) -> Iterator[Any]:
-    """Yield the images (height, width, 3), bytes, of the frames with the numbers `shown`."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    """Yield the images of the frames with the numbers `shown`, `scale` times as large as in a GIF."""
+    from PIL import Image, ImageDraw
 
-    columns, rows = min(len(panels), 4), math.ceil(len(panels) / 4)
-    below = max(BELOW, PIECE * math.ceil((TITLE + LINE * max(len(panel.sizes) for panel in panels)) / PIECE))
-    figure = Figure(figsize=(columns * SIDE, rows * (SIDE + below)), dpi=dpi)
-    canvas: Any = FigureCanvasAgg(figure)
-    axes = [figure.add_subplot(rows, columns, k + 1, projection="3d", computed_zorder=False) for k in range(len(panels))]
-    figure.subplots_adjust(0, below / (SIDE + below) / rows, 1, 1 - 0.06 / rows, wspace=0, hspace=below / SIDE)
-    clock = figure.text(0.01, 0.99, "", va="top", size=8, color=INK)
+    columns = min(len(panels), 4)
+    rows, width = math.ceil(len(panels) / columns), columns * SIDE
+    below = TITLE + LINE * max(len(panel.sizes) + bool(panel.outcome) for panel in panels) + MARGIN
+    sheet = _Sheet(ImageDraw.Draw(Image.new("RGB", (1, 1))), scale * OVER)
+    places, end = _place_legend(sheet, legend(panels, truth), width, rows * (SIDE + below) + MARGIN)
     for number, frame in enumerate(shown):
         progress(number / len(shown))
+        image = Image.new("RGB", (width * sheet.scale, end * sheet.scale), "white")
+        sheet = _Sheet(ImageDraw.Draw(image), sheet.scale)
         exact = None if truth is None else panels[truth]
-        for axis, panel in zip(axes, panels, strict=True):
-            _draw_panel(axis, panel, frame, None if panel is exact else exact)
-        clock.set_text(f"{times[frame]:.2f} s")
-        canvas.draw()
-        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        for k, panel in enumerate(panels):
+            corner = (k % columns * SIDE, k // columns * (SIDE + below))
+            _draw_panel(sheet, corner, panel, frame, None if panel is exact else exact)
+        for x, y, colour, text in places:
+            sheet.chip(x, y, colour)
+            sheet.text(x + LINE, y, text, 8)
+        sheet.text(MARGIN, MARGIN, f"{times[frame]:.2f} s", 9)
+        yield image.reduce(OVER)
 
 
-def _draw_panel(axes: Any, panel: Panel, frame: int, exact: Panel | None) -> None:
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+@dataclass(frozen=True)
+class _Sheet:
+    """A drawing in the pixels of a GIF, which has `scale` times as many pixels."""
 
-    axes.clear()
-    axes.set_axis_off()
-    axes.view_init(elev=TILT, azim=TURN)
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    axes.set_box_aspect((1, 1, 1), zoom=1.05)
-    if exact is not None:
-        corners = (_CORNERS * panel.size) @ exact.R_WP[min(frame, len(exact.R_WP) - 1)].T
-        edges = [corners[side] for side in _SIDES]
-        axes.add_collection3d(Poly3DCollection(edges, facecolors="none", edgecolors=OUTLINE, linewidths=0.7, zorder=4))
+    pencil: Any
+    scale: int
+
+    def lines(self, points: Array, colour: str, width: float) -> None:
+        """Draw a line through points (n, 2)."""
+        self.pencil.line((points * self.scale).ravel().tolist(), colour, max(1, round(width * self.scale)), "curve")
+
+    def fill(self, points: Array, colour: str) -> None:
+        """Fill a polygon (n, 2)."""
+        self.pencil.polygon((points * self.scale).ravel().tolist(), colour)
+
+    def dot(self, at: Array, radius: float, colour: str) -> None:
+        """Fill a circle."""
+        x, y, r = at[0] * self.scale, at[1] * self.scale, radius * self.scale
+        self.pencil.ellipse((x - r, y - r, x + r, y + r), colour)
+
+    def chip(self, x: float, y: float, colour: str) -> None:
+        """Fill a small square, beside the text in the line at y."""
+        self.fill(np.array([[x, y + 2], [x + 8, y + 2], [x + 8, y + 10], [x, y + 10]]), colour)
+
+    def font(self, size: float) -> Any:
+        """Return the font of a size in pixels of a GIF."""
+        from PIL import ImageFont
+
+        return ImageFont.load_default(size * self.scale)
+
+    def width(self, text: str, size: float) -> float:
+        """Return the width of a text."""
+        return float(self.font(size).getlength(text) / self.scale)
+
+    def text(self, x: float, y: float, text: str, size: float, bold: bool = False, anchor: str = "la") -> None:
+        """Write a text with its upper edge at y."""
+        weight = 0.1 * self.scale if bold else 0
+        place = (x * self.scale, y * self.scale)
+        self.pencil.text(place, text, INK, self.font(size), anchor, stroke_width=weight)
+
+    def fit(self, text: str, size: float, room: float) -> float:
+        """Return the size of a text that is not wider than the room."""
+        return size * min(1.0, room / max(self.width(text, size), 1e-9))
+
+
+def _ascii(text: str) -> str:
+    """Return a text in the letters of the font."""
+    plain = unicodedata.normalize("NFKD", text.replace("π", "pi").replace("–", "-").replace("µ", "u"))
+    return "".join(letter for letter in plain if not unicodedata.combining(letter)).encode("ascii", "replace").decode()
+
+
+def _place_legend(
+    sheet: _Sheet, entries: Sequence[tuple[str, str]], width: float, top: int
+) -> tuple[list[tuple[float, float, str, str]], int]:
+    """Return place, colour and text of each entry of a legend, in lines, and where the legend ends."""
+    places, x, y = list[tuple[float, float, str, str]](), float(MARGIN), top
+    for colour, text in entries:
+        wide = LINE + sheet.width(text, 8)
+        if x > MARGIN and x + wide > width:
+            x, y = float(MARGIN), y + LINE
+        places.append((x, y, colour, text))
+        x += wide + LINE
+    return places, y + LINE + MARGIN
+
+
+def _draw_panel(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int, exact: Panel | None) -> None:
+    def seen(points: Array) -> Array:
+        """Return points of the world (n, 3) on the sheet (n, 2)."""
+        depth = DISTANCE - points @ EYE
+        flat = np.stack([points @ _RIGHT, -points @ _UP], axis=-1) * (_FOCAL / depth)[..., None]
+        return np.asarray(corner) + SIDE / 2 * (1 + flat)
+
     frame = min(frame, len(panel.R_WP) - 1)
-    R, arrow = panel.R_WP[frame], 1.45 * panel.L_W[frame]
-    towards = np.repeat(EYE @ R, 2) * np.tile([1.0, -1.0], 3)
-    corners, seen = (_CORNERS * panel.size) @ R.T, np.flatnonzero(towards > 0)  # a seen face of a convex body hides no other
-    faces, colours = [corners[_SIDES[k]] for k in seen], [FACES[k] for k in seen]
-    axes.add_collection3d(Poly3DCollection(faces, facecolors=colours, edgecolors=INK, linewidths=0.6, zorder=2))
-    trace = panel.R_WP[: frame + 1] @ panel.tip
-    with np.errstate(divide="ignore"):  # rod and arrow are drawn from where they leave the box
-        rods = [np.stack([min(np.min(panel.size / 2 / np.abs(end @ R)), 1.0) * end, end]) for end in (trace[-1], arrow)]
-    segments = np.stack([trace[:-1], trace[1:]], axis=1)
-    for lines, colour, width in ((segments, TRACE, 1.0), (rods[0][None], TRACE, 2.0), (rods[1][None], ARROW, 2.6)):
-        near = lines.mean(axis=1) @ EYE > 0  # nearer to the eye than the fixed point: drawn after the box, the rest before
-        for part, order in ((lines[~near], 1), (lines[near], 3)):
-            if len(part):
-                axes.add_collection3d(Line3DCollection(part, colors=colour, linewidths=width, zorder=order))
-    axes.scatter(*arrow, color=ARROW, marker="^", s=34, depthshade=False, zorder=3)
-    values = "\n".join(f"{name}: {panel.text(name, frame)[0]}" for name in panel.sizes)
-    widest = max((len(f"{name}: ✓ 1.1e-11") for name in panel.sizes), default=0)  # the same in all frames
-    where: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "top", "color": INK}
-    axes.text2D(0.5, 0.0, panel.label, size=_fit(8, len(panel.label), 25), weight="bold", **where)
-    axes.text2D(0.5, -0.08, values, size=_fit(7, widest, 33), **where)
+    R, solid = panel.R_WP[frame], panel.solid
+    arrow = panel.L_W[frame] * 1.45
+    arrow = arrow * min(1.0, 1.45 * LONGEST_ARROW / max(float(np.linalg.norm(arrow)), 1e-300))
+    trace, middle = panel.R_WP[: frame + 1] @ panel.tip, float(EYE @ (R @ solid.centre))
+    # What is nearer to the eye than the middle of the body is drawn after it. Rod and arrow are drawn from where they leave it.
+    rods = [np.stack([solid.leave(end @ R) * end, end]) for end in (trace[-1], arrow)]
+    strokes = [*((np.stack(pair), TRACE, 1.0) for pair in pairwise(trace)), (rods[0], TRACE, 2.0), (rods[1], ARROW, 2.4)]
+    nearer = [float(points.mean(axis=0) @ EYE) > middle for points, _, _ in strokes]
+    for after in (False, True):
+        for (points, colour, width), near in zip(strokes, nearer, strict=True):
+            if near is after:
+                sheet.lines(seen(points), colour, width)
+                if colour == ARROW:
+                    _draw_head(sheet, seen(points), colour)
+        if not after:
+            for face in solid.faces:
+                world = face.corners @ R.T
+                normal = np.cross(world[1] - world[0], world[2] - world[0])
+                if normal @ (DISTANCE * EYE - world[0]) > 0:  # a seen face of a convex body hides no other
+                    sheet.fill(seen(world), face.colour)
+                    for edge in face.edges:
+                        sheet.lines(seen(world[list(edge)]), INK, 0.6)
+    sheet.dot(seen(trace[-1:])[0], 2.4, TRACE)
+    if exact is not None:
+        last = exact.R_WP[min(frame, len(exact.R_WP) - 1)]
+        for face in exact.solid.faces:
+            for edge in face.edges:
+                sheet.lines(seen(face.corners[list(edge)] @ last.T), OUTLINE, 0.8)
+    _write_numbers(sheet, corner, panel, frame)
 
 
-def _fit(size: float, length: int, most: int) -> float:
-    """Return the size of a text of a length, so that it is not wider than a panel, which has room for `most` characters."""
-    return size * min(1.0, most / max(1, length))
+def _draw_head(sheet: _Sheet, shaft: Array, colour: str) -> None:
+    """Draw the head of an arrow at the end of its shaft (2, 2)."""
+    along = shaft[1] - shaft[0]
+    length = float(np.linalg.norm(along))
+    if length > 1.0:
+        along = along / length
+        across = 3.6 * np.array([-along[1], along[0]])
+        sheet.fill(np.array([shaft[1] + 5 * along, shaft[1] - 4 * along + across, shaft[1] - 4 * along - across]), colour)
+
+
+def _write_numbers(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int) -> None:
+    """Write the title of a panel, why its run ended early, and its numbers, each on the colour of its grade."""
+    middle, y, room = corner[0] + SIDE / 2, float(corner[1] + SIDE), SIDE - 2 * MARGIN
+    label = _ascii(panel.label)
+    sheet.text(middle, y, label, sheet.fit(label, 9, room - 4), bold=True, anchor="ma")
+    y += TITLE
+    if panel.outcome:
+        text = _ascii(panel.outcome)
+        sheet.text(middle, y, text, sheet.fit(text, 8, room), anchor="ma")
+        y += LINE
+    rows = [(f"{_ascii(name)}: ", *panel.text(name, frame)) for name in panel.sizes]
+    widest = max((sheet.width(name + "1.1e-11", 8) for name, _, _ in rows), default=0.0)  # the same in all frames
+    size = 8 * min(1.0, (room - LINE) / max(widest, 1e-9))
+    for name, value, grade in rows:
+        left = middle - widest * size / 16 - LINE / 2
+        sheet.chip(left, y, GRADES[grade])
+        sheet.text(left + LINE, y, name + _ascii(value.partition(" ")[2]), size)
+        y += LINE

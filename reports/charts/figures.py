@@ -82,8 +82,9 @@ def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
     logs: Any = ends.set_index("text").apply(np.log).groupby("text")
     first, second = logs.first(), logs.last()
     places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # at the ends they would run into an axis
-    labels = alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, color=PALETTE["grey"])
-    return [lines, labels.encode(x=x, y=y, text="text:N")]
+    halo, plain = ({"stroke": "white", "strokeWidth": 3}, {"color": PALETTE["grey"]})  # over lines of the grid
+    labels = [alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, **style) for style in (halo, plain)]
+    return [lines, *(each.encode(x=x, y=y, text="text:N") for each in labels)]
 
 
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:

@@ -161,8 +161,6 @@ def picture_file(chart: Any, kind: str) -> bytes:
     """Return the file of a picture of a kind in `PICTURES`, with the mark."""
     if kind == ".svg":
         return svg_text(chart).encode()
-    if kind == ".pdf":  # a comment after its end
-        return vl_convert.vegalite_to_pdf(specification(chart)) + f"\n% {MARK}\n".encode()
     png, text = vl_convert.vegalite_to_png(specification(chart), scale=2), f"tEXtSoftware\0{MARK}".encode()
     chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
     return png[:33] + chunk + png[33:]  # after the header

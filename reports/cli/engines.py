@@ -55,7 +55,7 @@ def install(
     """
     require_extra("conservative engines", "environments")
     from conservative.references.environments.install import check, install
-    from conservative.references.environments.lock import Source
+    from conservative.references.environments.kind import Source
 
     from ..sections.environments import installation_line
     from ..terminal.progress import announce

@@ -162,8 +162,8 @@ def _compare(options: dict[str, Any]) -> Document:
     from conservative.benchmarks.versions.project import compare_projects
     from conservative.benchmarks.versions.version import Version, build_version, install_version
     from conservative.programs import list_programs, project_file
-    from conservative.references.environments.environment import temporary_folder
-    from conservative.references.environments.lock import Source
+    from conservative.references.environments.folders import temporary_folder
+    from conservative.references.environments.kind import Source
     from conservative.registry import read_name
 
     from ..run.causes import find_causes

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conservative.errors import BadInput, NotWritten
+from conservative.errors import REMOVED, BadInput, NotWritten
+from conservative.files import require_ending
 
 from ..document import MARK, PICTURES
 from . import completion
@@ -67,6 +68,15 @@ class OldName(click.ClickException):
         super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
 
 
+class GoneOption(click.ClickException):
+    """An option that is gone, in the table `REMOVED`."""
+
+    exit_code = 2
+
+    def __init__(self, option: str) -> None:
+        super().__init__(f"{option} is gone. {REMOVED[option]}")
+
+
 class Command(click.Command):
     """A command that takes the old names of options, and whose help lists its own exit codes.
 
@@ -84,6 +94,8 @@ class Command(click.Command):
             name, *value = word.split("=", 1)
             if name.startswith("-") and f"{self.name} {name}" in OLD_NAMES and not ctx.resilient_parsing:
                 raise OldName(f"{self.name} {name}", [*args[:i], *args[i + 1 :]])
+            if f"{self.name} {name}" in REMOVED and not ctx.resilient_parsing:
+                raise GoneOption(f"{self.name} {name}")
             if name in new and not ctx.resilient_parsing:  # as in completion
                 click.echo(f"{name} is now {new[name]}; the old name works until the next release.", err=True)
                 args = [*args[:i], "=".join([new[name], *value]), *args[i + 1 :]]
@@ -134,7 +146,7 @@ class Output(FilePath):
     Parameters
     ----------
     marks
-        Text within the first or last `HEAD` bytes of every such file; of a folder, the names of its files with their texts. A
+        Text within the first `HEAD` bytes of every such file; of a folder, the names of its files with their texts. A
         file without its text was not written by this option.
     """
 
@@ -149,15 +161,14 @@ class Output(FilePath):
 
 
 class Picture(Output):
-    """A file of a picture: SVG, PNG or PDF by its ending."""
+    """A file of a picture: SVG or PNG by its ending."""
 
     def __init__(self) -> None:
         super().__init__(MARK)
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         path = super().convert(value, param, ctx)
-        if path.suffix not in PICTURES:
-            raise BadInput("picture", repr(str(path)), f"a file that ends in {', '.join(PICTURES)}")
+        require_ending("picture", path, PICTURES)
         return path
 
 
@@ -196,13 +207,13 @@ def is_special(file: Path) -> bool:
 
 
 HEAD = 4096
-"""Number of bytes at the beginning and the end of a file that are searched for a mark."""
+"""Number of bytes at the beginning of a file that are searched for a mark."""
 
 
 def require_replaceable(file: Path, mark: str, option: str, force: bool = False, inputs: Iterable[Path] = ()) -> None:
     """Raise `BadInput` for an option whose file must not be replaced: one without its mark, unless `force`, or an input.
 
-    A file that does not exist, is empty, or is a pipe or a device passes. The mark is within the first or last `HEAD` bytes.
+    A file that does not exist, is empty, or is a pipe or a device passes. The mark is within the first `HEAD` bytes.
     """
     try:
         if not file.is_file() or not file.stat().st_size:
@@ -217,9 +228,6 @@ def require_replaceable(file: Path, mark: str, option: str, force: bool = False,
         raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
     with suppress(OSError), file.open("rb") as stream:
         head = stream.read(HEAD)
-        if len(head) == HEAD:  # PDF has the mark at the end
-            stream.seek(max(HEAD, file.stat().st_size - HEAD))
-            head += stream.read()
     if not force and mark.encode() not in head:
         allowed = "a new file, an earlier result of the same option, or --force to replace the file"
         raise BadInput(option, f"{str(file)!r}, which this option did not write", allowed)
@@ -272,7 +280,7 @@ target_option = error_option(
 )
 scene_argument = click.argument("scene", shell_complete=completion.scenes)
 t_end_option = option("t_end", "Duration, s.  [default: the scene's]", type=float, metavar="S")
-picture_option = option("picture", "Write a picture (.svg, .png or .pdf).", type=Picture(), metavar="FILE")
+picture_option = option("picture", "Write a picture (.svg or .png).", type=Picture(), metavar="FILE")
 scheduler_option = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 skip_missing_option = click.option(

@@ -67,8 +67,8 @@ from .options import (
     "potential in Python, take up to 100 budgets together; the others are skipped, with the reason. A run beyond ten times the "
     "budget (at least 60 s) is stopped.  [default: 0.15, with --full 0.6]",
 )
-@click.option("--png", is_flag=True, help="Write pictures as PNG as well as SVG and PDF.")
-@click.option("--latex", is_flag=True, help="Write the tables as LaTeX, report.tex.")
+@click.option("--png", is_flag=True, help="Write pictures as PNG as well as SVG.")
+@click.option("--latex", is_flag=True, help="Write a table of errors, drifts, orders and times as LaTeX, report.tex.")
 @click.option("--json", "as_json", is_flag=True, help="Print the content of measurements.json instead of tables.")
 @click.option("--resume", is_flag=True, help="Continue an interrupted report, with the same options.")
 @option(

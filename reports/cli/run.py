@@ -62,7 +62,6 @@ FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
     help="Errors against the reference solution, at up to 20,000 samples.  [default: unless it takes long]",
 )
 @click.option("--csv", type=Output(SAMPLES), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample.")
-@click.option("--parquet", type=Output("PAR1"), help="Write the same as a Parquet file.")
 @option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
 @picture_option
 def run(
@@ -82,8 +81,6 @@ def run(
     every step is stored, of longer runs a million evenly spaced ones. If the run fails, the files contain the samples before
     the failure. The exit code is 1 if a run fails or its attitude error is above 0.1 rad.
     """
-    if files["parquet"] is not None:
-        require_extra("conservative run --parquet", "parquet", "pyarrow")
     if files["picture"] is not None:
         require_extra("conservative run --picture", "report")
     from ..run import single_run as work
@@ -100,7 +97,6 @@ def run(
         document = write(
             document,
             csv=lambda: work.csv_text(trajectory),
-            parquet=lambda: work.parquet_bytes(trajectory),
             picture=lambda: picture_file(trajectory.plot(), files["picture"]),
         )
     show(document, as_json)

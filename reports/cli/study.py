@@ -31,8 +31,7 @@ from .options import (
     split_names,
 )
 
-TABLES = "% Written by conservative"
-FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": ', "study.tex": TABLES}
+FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": '}
 """The files of `--out` beside pictures, and how each begins."""
 
 
@@ -81,8 +80,7 @@ class StudyCommand(OutputCommand):
 @json_option
 @click.option("--csv", type=Output(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=Output(FILES["study.md"]), help="Write the tables as Markdown.")
-@click.option("--latex", type=Output(TABLES), help="Write the tables as LaTeX.")
-@option("out", f"Write {', '.join(FILES)} and the pictures, as SVG, PDF and PNG, into this folder.", type=Output(FILES))
+@option("out", f"Write {', '.join(FILES)} and the pictures, as SVG and PNG, into this folder.", type=Output(FILES))
 def study(
     name: str,
     scenes: tuple[str, ...],
@@ -93,7 +91,6 @@ def study(
     as_json: bool,
     csv: Path | None,
     markdown: Path | None,
-    latex: Path | None,
     out: Path | None,
     **numbers: Any,
 ) -> None:
@@ -113,7 +110,7 @@ def study(
 
     if (old := f"study {name}") in OLD_NAMES:
         raise OldName(old, [*split_names("methods", methods), *split_list("engines", engines)])
-    with output_files(out, FILES, csv=csv, markdown=markdown, latex=latex) as write:
+    with output_files(out, FILES, csv=csv, markdown=markdown) as write:
         planned = plan_study(
             name,
             split_names("scenes", scenes),

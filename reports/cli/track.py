@@ -80,7 +80,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     from conservative.check import choice
     from conservative.references.environments.environment import distribution_of
     from conservative.references.environments.install import install_build, install_releases, newest_releases
-    from conservative.references.environments.lock import Source
+    from conservative.references.environments.kind import Source
     from conservative.registry import read_name
 
     from ..run.provenance import provenance

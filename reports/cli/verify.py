@@ -60,7 +60,7 @@ LISTS = ("only", "pairs", "engines")
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
         "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",
         "conservative verify mujoco --only pairs --scripts scripts       a script for each pair that differs",
-        "conservative verify flight.parquet --body brick_flip --euler zyx --rates world --error 1e-3 --json",
+        "conservative verify flight.csv --body brick_flip --euler zyx --rates world --error 1e-3 --json",
     ),
 )
 @click.argument("subjects", nargs=-1, metavar="SUBJECT...", shell_complete=completion.subjects)
@@ -121,7 +121,7 @@ def verify(
 ) -> None:
     """Decide whether each SUBJECT is right, and name the mistakes that explain what is wrong.
 
-    A SUBJECT is a recording (CSV, STK or CCSDS attitudes, JSON lines, Parquet), an engine with a version or a setting, a method
+    A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method
     of this package, a program (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder
     of recordings or of model files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines
     load the small model files of this package, each with one trap.

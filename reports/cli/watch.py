@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conservative.errors import BadInput
+from conservative.files import require_ending
 
 from .options import (
     FAILED,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=OutputCommand,
-    short_help="Show motions side by side, as a page or a video.",
+    short_help="Show motions side by side, as a page or a GIF.",
     codes={1: f"{FAILED}, and no other reached its end"},
     epilog=epilog(
         "conservative watch brick_flip -m mujoco:Euler,reduced,exact",
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     type=Output("Written by conservative watch"),
     default="watch.html",
     show_default=True,
-    help="File that ends in .html, .gif or .mp4, or in .png for the last frame. All but .html need the extra `video`.",
+    help="File that ends in .html, .gif, or .png for the last frame. All but .html need the extra `video`.",
 )
 def watch(
     scene: str,
@@ -87,8 +87,7 @@ def watch(
     from ..run import single_run as work
     from ..terminal.progress import progress
 
-    if out.suffix not in KINDS:
-        raise BadInput("out", repr(str(out)), f"a file that ends in {', '.join(KINDS)}")
+    require_ending("out", out, KINDS)
     body, names = registry.scene(scene), split_names("methods", methods)
     target = work.read_error(error, dt, names)
 

@@ -9,14 +9,14 @@ from .model import Document
 MARK = "Written by conservative"
 SVG_MARK = f"<!-- {MARK} -->"
 """The first line of pictures in files of their own."""
-PICTURES = (".svg", ".png", ".pdf")
+PICTURES = (".svg", ".png")
 """Endings of files that contain a picture."""
 
 
 def text(document: Document, kind: str) -> str:
-    """Return a document as "markdown" or "md", "html", "junit", "json" (its data), or "latex" or "tex" (its tables).
+    """Return a document as "markdown" or "md", "html", "junit", or "json" (its data).
 
     Renderers are imported when used.
     """
-    renderer = import_module(f".{ {'md': 'markdown', 'tex': 'latex'}.get(kind, kind) }", __package__)
+    renderer = import_module(f".{ {'md': 'markdown'}.get(kind, kind) }", __package__)
     return str(renderer.render(document.data if kind == "json" else document))

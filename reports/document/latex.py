@@ -1,6 +1,6 @@
-"""The tables of a document as LaTeX, for papers, by the styler of pandas.
+"""A table as LaTeX, for a paper, by the styler of pandas.
 
-They need the packages booktabs, longtable, amssymb and textcomp. Text of other alphabets stays as it is.
+It needs the packages booktabs, longtable, amssymb and textcomp. Text of other alphabets stays as it is.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import re
 
 import pandas as pd
 
-from .model import Document, Table, walk
+from .model import Table
 
 LATEX_MARK = "% Written by conservative. It needs \\usepackage{booktabs,longtable,amssymb,textcomp}"
-"""The first line of files of tables."""
+"""The first line of a file with a table."""
 LONGEST = 40
 """Largest number of rows of a table on one page."""
 _SIGNS = str.maketrans(
@@ -33,12 +33,6 @@ _SIGNS = str.maketrans(
 )
 
 
-def render(document: Document) -> str:
-    """Return all tables of a document."""
-    tables = [table(block) for block in walk(document.blocks) if isinstance(block, Table) and block.rows]
-    return "\n".join([LATEX_MARK, *tables])
-
-
 def table(content: Table) -> str:
     """Return a table, with its caption, numbers such as 1e-3 as powers of ten, and columns of numbers to the right."""
     texts = [[str(cell) for cell in row] for row in content.rows]
@@ -50,7 +44,8 @@ def table(content: Table) -> str:
     )
     form, kind = "l" + "r" * (len(header) - 1), "longtable" if len(texts) > LONGEST else None
     caption = _typeset(content.caption) or None
-    return style.hide(axis="index").to_latex(hrules=True, caption=caption, column_format=form, environment=kind)
+    made = style.hide(axis="index").to_latex(hrules=True, caption=caption, column_format=form, environment=kind)
+    return f"{LATEX_MARK}\n{made}"
 
 
 def _typeset(text: object) -> str:

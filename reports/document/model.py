@@ -257,8 +257,8 @@ class Document:
         Reasons why the command fails; empty if it succeeds.
     pages
         Documents next to this one, by the names of their files without an ending.
-    badge
-        A picture (SVG) with the result, for others to show; empty if there is none.
+    for_paper
+        A table that is also a file of its own, in LaTeX, or None.
     """
 
     command: str
@@ -269,7 +269,7 @@ class Document:
     checks: Sequence[Check] = ()
     failures: Sequence[str] = ()
     pages: Mapping[str, Document] = field(default_factory=dict)
-    badge: str = ""
+    for_paper: Table | None = None
 
     @property
     def figures(self) -> list[Figure]:

@@ -36,6 +36,12 @@ def signed_drifts(samples: pd.DataFrame, scene: str, invariants: Iterable[str]) 
     return rows[["scene", "method", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
 
 
+def early_ends(rows: pd.DataFrame) -> dict[str, float]:
+    """Return the last time of each line, by its name, that ends before the others; columns name and t."""
+    ends = rows.groupby("name", sort=False)["t"].max()
+    return {str(name): float(end) for name, end in ends[ends < 0.99 * ends.max()].items()}
+
+
 def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
     """Return the motion of each method over the first duration of a scene, by the name of the method."""
     rows = samples[(samples["study"] == motion.STUDY.name) & (samples["scene"] == scene.name)]
@@ -117,8 +123,9 @@ def orders(rows: pd.DataFrame) -> pd.Series[float]:
 
 
 def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
-    """Return errors or fits of one scene with the slope in each name: `reduced (2.00 ± 0.01)`."""
-    slopes = dict(zip(fits["name"], fits["text"], strict=True))
+    """Return errors or fits of one scene with the slope in each name, `reduced (2.00 ± 0.01)`, if it is sure (see `SURE`)."""
+    sure = fits["text"].where(fits["stderr"] <= SURE, "no clear order")
+    slopes = dict(zip(fits["name"], sure, strict=True))
     return rows.assign(name=[f"{name} ({slopes[name]})" for name in rows["name"]])
 
 

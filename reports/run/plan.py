@@ -106,7 +106,7 @@ def plan_report(
     skip_missing, time_limit
         See `Study`. The default limit is that of the kind.
     png, latex
-        True if pictures are also written as PNG, and tables as LaTeX.
+        True if pictures are also written as PNG, and a table as LaTeX.
     bodies, seed
         Random bodies in each field, and their seed. Default: those of the kind; in a default report in `FEW_BODIES` fields, and
         none if a scene or a method is named; in a full one none if a scene is named.

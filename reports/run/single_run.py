@@ -17,12 +17,11 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import Array, angle_between, orthonormality
 from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed, MissingEngine
-from conservative.grid import Grid, grid_for
+from conservative.grid import ROUNDING, Grid, grid_for
 from conservative.integration import one
 from conservative.integration.one import integrate, interrupt_of, read_method, require_support, warn_of_steps
 from conservative.invariants import sizes
 from conservative.method import Method
-from conservative.methods.search import candidates
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.presentation import header
 from conservative.presentation import samples as samples_of
@@ -48,8 +47,8 @@ TURNS = 1000.0
 """Angle at the initial rate, rad, up to which a solution without closed form is computed unasked: it takes seconds."""
 LARGE = 0.1
 """Attitude error, rad, above which a run is called inaccurate and another method or step is looked for."""
-PARTS, MOST_TRIED = (1, 10, 100), 10**6
-"""Parts into which steps are divided in the search for an accurate run, and the largest number of steps of a run there."""
+MOST_TRIED = 10**6
+"""Largest number of steps of an accurate run that is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,12 +148,6 @@ def csv_text(trajectory: Trajectory) -> str:
     writer.writerow(header(trajectory))
     writer.writerows(samples_of(trajectory).tolist())
     return stream.getvalue()
-
-
-def parquet_bytes(trajectory: Trajectory) -> bytes:
-    """Return the samples as a Parquet file."""
-    made: bytes = trajectory.to_pandas().set_axis(header(trajectory), axis=1).to_parquet(index=False)
-    return made
 
 
 def run_chosen(scene: Scene, error: float, dt: float | None, t_end: float | None) -> tuple[Trajectory, Grid]:
@@ -261,32 +254,31 @@ def describe_errors(found: Compared | str) -> dict[str, Any]:
 
 
 def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_end: float | None) -> dict[str, Any] | None:
-    """Return the most accurate run by a candidate of the automatic choice, at the same step, or else at a part of it.
+    """Return the run by the method and the step that `integrate(error=)` chooses; None if it becomes inaccurate at once.
 
-    Candidates are run and compared with the reference solution `truth`, which has every `stride`-th sample of the grid. The
-    result has the `command` and its `attitude` error. If all runs become inaccurate, it is the one that does so last, up to
-    that time; None if all do so at once.
+    The step is the same or an equal part of it, so that the run is compared with the reference solution `truth`, which has
+    every `stride`-th sample of the grid. The result has the `command` and its `attitude` error. A run that becomes inaccurate
+    ends before.
     """
-    scene, n, best, ranks = truth.scene, len(truth.t), None, [(1, 0.0)]
-    for parts in PARTS:
-        finer = Grid(grid.dt / parts, grid.n_steps * parts, grid.every * stride * parts)
-        for method in candidates(scene) if finer.n_steps <= MOST_TRIED else ():
-            try:
-                found = method.solve(scene, finer)
-            except (BadInput, MissingEngine):  # such as a step that is too long for the method
-                continue
-            errors = angle_between(truth.R_WB[: len(found)], found.R_WB)
-            good = int(np.argmax([*~(errors <= LARGE), True]))  # samples before the first with a large error
-            rank = good, -float(errors[:good].max(initial=0.0))
-            if rank > max(ranks):
-                end = t_end if good == n else float(found.t[good - 1])
-                words = ["conservative", "run", scene_name, "-m", method.name, "--dt", f"{finer.dt:.10g}"]
-                command = shlex.join(words + ([] if end is None else ["--t-end", f"{end:.10g}"]))
-                best = {"command": command, "attitude": -rank[1], "shorter": good < n}
-            ranks.append(rank)
-        if best is not None and max(ranks)[0] == n:
-            break
-    return best
+    scene, n = truth.scene, len(truth.t)
+    end = min(float(truth.t[-1]), scene.t_end if t_end is None else t_end)
+    try:
+        choice = run_chosen(scene, one.TARGET, end, end)[0].choice
+        assert choice is not None  # of `integrate(error=)`
+        parts = math.ceil(grid.dt / choice.dt * (1 - ROUNDING))
+        if grid.n_steps * parts > MOST_TRIED:
+            return None
+        found = choice.method.solve(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * stride * parts))
+    except (BadInput, MissingEngine):  # such as an error that takes too many steps
+        return None
+    errors = angle_between(truth.R_WB[: len(found)], found.R_WB)
+    good = int(np.argmax([*~(errors <= LARGE), True]))  # samples before the first with a large error
+    if good < 2:
+        return None
+    end_time = t_end if good == n else float(found.t[good - 1])
+    command = ["conservative", "run", scene_name, "-m", choice.method.name, "--dt", f"{grid.dt / parts:.10g}"]
+    command += [] if end_time is None else ["--t-end", f"{end_time:.10g}"]
+    return {"command": shlex.join(command), "attitude": float(errors[:good].max()), "shorter": good < n}
 
 
 def attitude_error(summary: dict[str, Any]) -> float | None:

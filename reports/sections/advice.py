@@ -20,8 +20,8 @@ from .summary import ERRORS
 
 HEADER = ("motion", "error, rad", "use", "µs per simulated s", "fastest engine or solver", "its time / ours", "repeat with")
 _OWN = (
-    "Install it by `pip install 'conservative-rotation[all]'`. For your own body: `conservative new > my_body.toml`, then "
-    "`conservative recommend my_body.toml --error 1e-6`. In Python, `import conservative as cv`; `cv.integrate(scene, "
+    "Install it: `pip install 'conservative-rotation[report,engines]'`. For your own body: `conservative new > my_body.toml`, "
+    "then `conservative recommend my_body.toml --error 1e-6`. In Python, `import conservative as cv`; `cv.integrate(scene, "
     "error=1e-6)` chooses method and step."
 )
 

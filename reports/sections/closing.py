@@ -1,8 +1,10 @@
-"""The end of `conservative report` on the terminal: a table per scene with one row per method."""
+"""A row per method: the end of `conservative report` on the terminal, and the table for a paper."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -10,6 +12,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.speed_ratio import costs
 from conservative.benchmarks.studies import convergence, paper, speed
 from conservative.method import Role
+from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..document.cells import DASH, angle, bound, factor, number, outcome_cell, tolerance
@@ -26,41 +29,98 @@ LEGEND = (
 )
 
 
-def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Table:
-    """Return one row per method on a scene, in the order of measurement, and a column for each of its invariants.
+@dataclass(frozen=True)
+class Line:
+    """A method with a setting on a scene, and how its run at the scene's own step ended.
 
-    Those that failed come last, with the reason; settings of a method that failed in the same way share a row.
+    Attributes: `drifts`, the largest of each invariant, relative; `error`, the largest attitude error, rad; `order`, measured;
+    `step` and `second`, the wall time per step and per simulated second, s; `reached`, the wall time per simulated second at
+    the attitude error `MIDDLE`, s. All are NaN if they were not measured.
+    """
+
+    name: str
+    family: str
+    outcome: Outcome
+    drifts: dict[str, float]
+    error: float
+    order: float
+    step: float
+    second: float
+    reached: float
+
+
+def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Iterator[Line]:
+    """Yield a line for each method on a scene, in the order of measurement.
 
     The table is that of `names.with_names`; the points are those of the scene (see `rows.points`). If the methods were `named`,
-    each has its row, also if it does not support the scene or is not installed. Otherwise such methods have none, and methods
-    that differ only in tolerance are one row, with the drifts and errors of the default tolerance, which is the last.
+    each has its line, also if it does not support the scene or is not installed. Otherwise such methods have none, and methods
+    that differ only in tolerance are one line, with the drifts and errors of the default tolerance, which is the last.
     """
     accuracy = of_study(table, paper.STUDY.name, scene.name)
     accuracy = accuracy[accuracy["role"] != Role.TRUTH.value]
     accuracy = accuracy if named else without_outcome(accuracy, *ABSENT)
     accuracy = accuracy[accuracy["dt"] == accuracy.groupby("method")["dt"].transform("max")]
-    times = costs(points, [MIDDLE], ["series"]).set_index("series")["time"]
+    reached = costs(points, [MIDDLE], ["series"]).set_index("series")["time"]
     orders = lines.orders(of_study(table, convergence.STUDY.name, scene.name))
-    steps = of_measure(of_study(table, speed.STUDY.name, scene.name), Measure.TIME_PER_STEP).set_index("method")["value"]
-    body: list[Row] = []
-    failed: dict[tuple[str, str], list[str]] = {}
+    timed = of_study(table, speed.STUDY.name, scene.name)
+    steps, seconds = (
+        of_measure(timed, each).groupby("method")["value"].last() for each in (Measure.TIME_PER_STEP, Measure.TIME)
+    )
     for _, line in accuracy.groupby("method" if named else "series", sort=False):
         rows = line[line["method"] == line["method"].iloc[-1]]
         method, family, series = rows[["method", "family", "series"]].iloc[0]
-        name, outcome = display_name(family, "", rows["setting" if named else "series_setting"].iloc[0]), outcomes(rows)[0]
-        if not outcome.ok:
-            failed.setdefault((family, str(outcome_cell(outcome, reason=True))), []).append(name)
+        values = (
+            float(known.get(key, math.nan))
+            for known, key in ((orders, method), (steps, method), (seconds, method), (reached, series))
+        )
+        yield Line(
+            display_name(family, "", rows["setting" if named else "series_setting"].iloc[0]),
+            str(family),
+            outcomes(rows)[0],
+            largest_drifts(rows, scene),
+            float(of_measure(rows, Measure.ATTITUDE_MAX)["value"].max()),
+            *values,
+        )
+
+
+def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Table:
+    """Return one row per line of `scene_lines`, and a column for each invariant of the scene.
+
+    Methods that failed come last, with the reason; settings of a method that failed in the same way share a row.
+    """
+    body: list[Row] = []
+    failed: dict[tuple[str, str], list[str]] = {}
+    for line in scene_lines(table, points, scene, named):
+        if not line.outcome.ok:
+            failed.setdefault((line.family, str(outcome_cell(line.outcome, reason=True))), []).append(line.name)
             continue
-        order, time = (float(known.get(key, math.nan)) for known, key in ((orders, method), (times, series)))
-        cells = [
-            *(bound(drift) for drift in largest_drifts(rows, scene).values()),
-            angle(float(of_measure(rows, Measure.ATTITUDE_MAX)["value"].max())),
-            DASH if math.isnan(order) else f"{order:.2f}",
-            number(float(steps.get(method, math.nan)) * 1e6),
-            factor(time * 1e6),
-        ]
-        body.append([name, *cells])
+        order, step = _order(line), number(line.step * 1e6)
+        body.append([line.name, *map(bound, line.drifts.values()), angle(line.error), order, step, factor(line.reached * 1e6)])
     header = ["method", *(each.name for each in scene.invariants), *HEADER]
     # In the first cell, because a terminal has no room for a column of reasons.
     body += [[f"{', '.join(names)}: {reason}", *[DASH] * (len(header) - 1)] for (_, reason), names in failed.items()]
     return Table(header, body, scene.name)
+
+
+def paper_table(table: pd.DataFrame, points: Mapping[str, pd.DataFrame], scenes: Iterable[Scene]) -> Table:
+    """Return the error, drift, order and time of each scheme, for a paper: by scene and name, whoever wrote the scheme.
+
+    A scheme that failed has the outcome in place of its error.
+    """
+    header = ["scheme", "scene", "attitude error, rad", "largest relative drift", "order", "time per simulated second, µs"]
+    body: list[Row] = []
+    for scene in scenes:
+        for line in sorted(scene_lines(table, points[scene.name], scene), key=lambda line: line.name.casefold()):
+            if line.outcome.ok:
+                drift = max(line.drifts.values(), default=math.nan)
+                cells = [angle(line.error), bound(drift), _order(line), number(line.second * 1e6)]
+            else:
+                cells = [str(outcome_cell(line.outcome)), *[DASH] * 3]
+            body.append([line.name, scene.name, *cells])
+    steps = ", ".join(f"{scene.name} {scene.dt:g} s" for scene in scenes)
+    caption = f"Each scheme at the scene's step ({steps}), or at its default tolerance. Errors and drifts are rounded up"
+    return Table(header, body, caption)
+
+
+def _order(line: Line) -> str:
+    return DASH if math.isnan(line.order) else f"{line.order:.2f}"

@@ -44,12 +44,24 @@ def drift_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None
         f"drift_{scene.name}" if methods is None else "drift_over_time",
         f"{scene.name}: change of energy and momentum in {drifts['t'].max():.3g} s",
         f"Step: the engine's default, or {scene.dt:g} s if it has none. Middle line: exact. Above it a method gains, below it "
-        "loses. The axis is logarithmic on both sides of it.",
+        f"loses. The axis is logarithmic on both sides of it.{_why_early(drifts)}",
         picture if methods is None else None,
         vega_embed.embed(picture, ("name", "t", "drift"), 260),
         vega_embed.legend(families_of(drifts), marks=False),
         Layout.PAIRS,
     )
+
+
+def _why_early(drifts: pd.DataFrame) -> str:
+    """Return why lines end before the others; empty if none does."""
+    ends = lines.early_ends(drifts)
+    parts = []
+    if lines.EXACT in ends:
+        parts.append(f"The exact motion is drawn for one duration, {ends.pop(lines.EXACT):.3g} s.")
+    if ends:
+        names = ", ".join(f"{name} ({end:.3g} s)" for name, end in ends.items())
+        parts.append(f"Lines that end early: {names}. Longer runs failed, or exceed the time budget.")
+    return "".join(f" {part}" for part in parts)
 
 
 def spheres_figure(measured: Measured, scene: Scene, methods: Sequence[str] | None = None) -> Figure | None:

@@ -9,17 +9,14 @@ from collections.abc import Sequence
 from functools import partial
 
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
-from conservative.benchmarks.verification.finding import Verdict
 from conservative.references.environments.engine_method import EngineMethod
-from conservative.references.environments.environment import version_key
+from conservative.references.environments.kind import version_key
 from conservative.version import VERSION
 
 from ..document.attempt import attempt
-from ..document.badge import badge
 from ..document.cells import DASH, angle
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
 from ..rows.points import points as points_over
-from ..run.verification import Verified
 from . import verified_engines
 from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
@@ -61,19 +58,6 @@ def pages(measured: Measured) -> dict[str, Document]:
     return found
 
 
-def _badge(verified: Sequence[Verified], version: str) -> str:
-    """Return a badge with the exact motions that are right in a version with its best setting, of those that were tested."""
-    counts = []
-    for each in verified:
-        motions = [finding.verdict for finding in each.findings if finding.check == "motions"]
-        if each.names["version"] == version and (tested := len(motions) - motions.count(Verdict.NOT_TESTED)):
-            counts.append((motions.count(Verdict.RIGHT), tested))
-    if not counts:
-        return ""
-    best, every = max(counts, key=lambda count: count[0])
-    return badge("exact motions, at its best", f"{best} of {every}", "good" if best == every else "fair")
-
-
 def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> Document:
     newest, blocks, facts = versions[0], list[Block](), list[Item]()
     for scene in measured.plan.scenes:
@@ -90,7 +74,7 @@ def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict
     name = _title(family, newest)
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
     facts.append(Item(TERMS))
-    return Document("conservative report", name, [lead, Items(facts), *blocks], badge=_badge(found, newest))
+    return Document("conservative report", name, [lead, Items(facts), *blocks])
 
 
 def _title(family: str, version: str) -> str:

@@ -17,7 +17,7 @@ from conservative.benchmarks.studies import engines_at_one_step, engines_over_st
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.benchmarks.studies.selection import Missing
-from conservative.invariants import AXIAL_MOMENTUM
+from conservative.invariants import AXIAL_MOMENTUM, MOMENTA
 from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..charts import figures, vega_embed
@@ -33,8 +33,6 @@ USABLE = 0.1
 """Largest attitude error over the run, rad, of a usable step."""
 ERROR = 1e-3
 """Attitude error, rad, at which a simulated second is timed."""
-MOMENTA = ("momentum", "vertical momentum", "momentum along the field's axis")
-"""Names of the conserved momentum in the world: of a free body, and about the axis of a field."""
 AT_ITS_BEST = "at its best"
 FAR_FROM_ORDER = 0.5
 """Largest difference of an order below the expected one that is not marked."""

@@ -14,6 +14,7 @@ from ..charts import figures, vega_embed
 from ..charts.style import families_of
 from ..document.cells import DASH, bound, number, numeric
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
+from ..rows.lines import early_ends
 
 TERMS = (
     "The largest error so far, over runs of up to a million turns at the scene's step: relative drifts, and the attitude error "
@@ -31,8 +32,19 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
         title, picture = "Growth of errors over a million turns", figures.growth(lines)
         panels = vega_embed.embed(picture, ("name",), 220)
         legend = vega_embed.legend(families_of(lines), marks=False)
-        figure = Figure("long_time", title, "A level line is bounded.", picture, panels, legend, Layout.PANELS)
+        note = f"A level line is bounded.{why_early(lines, table)}"
+        figure = Figure("long_time", title, note, picture, panels, legend, Layout.PANELS)
     return Section("Long times", filled(figure, as_table(table), Paragraph(TERMS, Emphasis.NOTE)), "long-times")
+
+
+def why_early(lines: pd.DataFrame, table: pd.DataFrame) -> str:
+    """Return why lines end before the others of their scene; empty if none does."""
+    here, found = table[(table["study"] == STUDY.name) & (table["outcome"] != OutcomeKind.OK)], list[str]()
+    for scene, part in lines.groupby("scene", sort=False):
+        failed = here[here["scene"] == scene].groupby("name")["reason"].first()
+        for name, end in early_ends(part).items():
+            found.append(f"{name} on {scene} ({number(end)} turns: {failed.get(name, 'longer runs exceed the time budget')})")
+    return f" Lines that end early: {'; '.join(found)}." if found else ""
 
 
 def as_table(table: pd.DataFrame) -> Table:

@@ -12,7 +12,7 @@ from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import PROBE_LIMIT, Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..document.cells import angle, bound
+from ..document.cells import angle, bound, number
 from ..document.model import Block, Document, Emphasis, Items, Paragraph, Section, Table
 from ..rows.names import method_text, setting_text
 
@@ -79,7 +79,8 @@ def answer_lines(recommendation: Recommendation, scene: str) -> Iterator[str]:
     yield f"Run: conservative run {scene} -m {probe.method.name} --dt {probe.dt:.7g} --t-end {conditions.duration:g}"
     if engine is not None and engine is not best and engine.best is not None:
         ratio = engine.cost / best.cost
-        yield f"Fastest engine: {method_text(engine)} with {setting_text(engine.best)}, which takes {ratio:.2g} times as long."
+        name = f"{method_text(engine)} with {setting_text(engine.best)}"
+        yield f"Fastest engine: {name}, which takes {number(ratio)} times as long."
     if conditions.amplification.unstable:
         yield "The motion is unstable and amplifies errors: --verbose shows by how much."
 
@@ -123,7 +124,7 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
         if advice.reached:
             reaching.append((*names, angle(probe.expected), drift))
         else:
-            failing.append((*names, f"{probe.holds:.2g} s", _expected(probe), drift))
+            failing.append((*names, f"{number(probe.holds)} s", _expected(probe), drift))
     if reaching:
         yield Table(REACHING, reaching, "Settings that reach the error, fastest first")
     if failing:

@@ -83,6 +83,10 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     cases = part("hard cases", lambda: hard_cases.sections(measured.rows))
     details += [cases] if isinstance(cases, Paragraph) else cases
     details.append(part("failures", lambda: failures.section(rows)))
+    paper = part("table for a paper", lambda: closing.paper_table(rows, points, plan.scenes)) if plan.latex else None
+    if isinstance(paper, Paragraph):
+        details.append(paper)
+        paper = None
     folded = [replace(each, folded=True) if isinstance(each, Section) else each for each in details]
     blocks: list[Block] = [
         part("motion", lambda: tumbling.section(measured, found())),
@@ -100,6 +104,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         data=measurements.content(source),
         failures=failures.failures_of_ours(rows),
         pages=pages,
+        for_paper=paper,
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import DASH, angle, bound
+from ..document.cells import DASH, angle, bound, number
 from ..document.model import Block, Document, Facts, Items, Table
 from ..run.single_run import is_right, status_of
 
@@ -46,14 +46,14 @@ def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "orthonormality", bound(summary["orthonormality"], 3)
     if last := summary["last"]:
         yield f"at t = {last['t']:g} s", ""
-        yield from ((f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1))
+        yield from ((f"R_WB row {i}", _numbers(row)) for i, row in enumerate(last["R_WB"], start=1))
         yield "w_WB_B, rad/s", _numbers(last["w_WB_B"])
 
 
 def _advice(error: dict[str, Any]) -> str:
     if error["better"] is None:
         return "no accurate run was found; use a shorter --dt or a shorter --t-end"
-    end = ", and no run that was tried is accurate for longer" if error["better"]["shorter"] else ""
+    end = ", which stays accurate up to that time only" if error["better"]["shorter"] else ""
     return f"{error['better']['command']} (attitude error {angle(error['better']['attitude'])} rad{end})"
 
 
@@ -79,7 +79,7 @@ def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
             *(_cell(summary.get("drift", {}).get(name)) for name in drifts),
             *(_cell(summary["error"].get(name), shown) for name, shown in (("attitude", angle), ("rate", bound))),
             f"{summary['counters']['steps']:,}" if "counters" in summary else DASH,
-            f"{summary['wall_time']:.2g}" if "wall_time" in summary else DASH,
+            number(summary["wall_time"]) if "wall_time" in summary else DASH,
         ]
         for summary in summaries
     ]

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import pytest
 
-from conservative import BadInput, MissingEngine, Reduced, Taylor, registry
+from conservative import BadInput, Convected, MissingEngine, Reduced, Taylor, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import list_installed, select_engines
@@ -78,7 +78,7 @@ def test_tolerances_belong_to_adaptive_methods_only():
 def test_tolerances_of_a_method_are_one_line():
     assert series(registry.method("scipy:rtol=1e-9")) == series(registry.method("scipy:rtol=1e-5")) == "scipy"
     assert series(registry.method("scipy:RK45,rtol=1e-5")) == "scipy:integrator=RK45"
-    assert series(Reduced(tol=1e-9)) == "reduced:tol=1e-09"
+    assert series(Convected(tol=1e-9)) == "convected:tol=1e-09"
     assert {series(Taylor(tolerance=10.0**-k)) for k in (3, 9)} == {"taylor:tolerance"} != {series(Taylor())}
 
 

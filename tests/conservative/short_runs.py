@@ -27,7 +27,7 @@ from conservative.methods.many import Block
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-OTHER = ("conservative.kernels.compiler", "conservative.kernels.compiler.parts", "conservative.kernels.compiler.signals")
+OTHER = ("conservative.kernels.compiler", "conservative.kernels.compiler.signals")
 """Modules that short runs in plain Python do not call: how kernels are compiled, and what long runs reach."""
 
 

@@ -18,7 +18,7 @@ from conservative.errors import Diverged, InvalidResult, NotConserved
 from conservative.grid import Grid
 from conservative.invariants import kept_sizes
 from conservative.method_info import MethodInfo
-from conservative.methods.bounds import bounds_of
+from conservative.methods.bounds import within_round_off
 from conservative.outcome import OutcomeKind
 from conservative.trajectory import Bounds, Trajectory
 
@@ -272,15 +272,14 @@ def test_bounds() -> None:
 
     ordinary, grid, rounding = scene(3.0, 4.0, 6.0), Grid(0.1, 90), 4 * sys.float_info.epsilon * 100
     assert Foreign().bounds(BRICK, GRID) == Bounds(drift=1e-3, orthonormality=0.1)
-    assert bounds_of(ordinary, grid).drift == pytest.approx(rounding * 2, rel=1e-12, abs=0)
-    assert bounds_of(scene(1.0, 7.0, 7.5), grid).drift == pytest.approx(rounding * 7.5, rel=1e-12, abs=0)
-    assert bounds_of(ordinary, grid, tol=1e-9).drift == pytest.approx(10 * 90 * 1e-9, rel=1e-6, abs=0)
-    assert bounds_of(ordinary, grid, tol=1.0).drift == 1e-3
-    assert bounds_of(ordinary, grid).orthonormality == 1e-13
-    loose = bounds_of(ordinary, grid, 1e-9, None)
+    assert within_round_off(None, ordinary, grid).drift == pytest.approx(rounding * 2, rel=1e-12, abs=0)
+    assert within_round_off(None, scene(1.0, 7.0, 7.5), grid).drift == pytest.approx(rounding * 7.5, rel=1e-12, abs=0)
+    assert within_round_off(None, ordinary, grid, tol=1e-9).drift == pytest.approx(10 * 90 * 1e-9, rel=1e-6, abs=0)
+    assert within_round_off(None, ordinary, grid, tol=1.0).drift == 1e-3
+    assert within_round_off(None, ordinary, grid).orthonormality == 1e-13
+    loose = within_round_off(None, ordinary, grid, 1e-9, None)
     assert loose.orthonormality == loose.drift > 1e-7
-    assert cv.Reduced(tol=1e-9).bounds(ordinary, grid) == bounds_of(ordinary, grid, 1e-9)
-    assert cv.Convected(1e-7).bounds(ordinary, grid) == bounds_of(ordinary, grid, 1e-7, None)
+    assert cv.Convected(1e-7).bounds(ordinary, grid) == within_round_off(None, ordinary, grid, 1e-7, None)
     assert cv.Substepped(most=8).bounds(ordinary, grid) == cv.Reduced().bounds(ordinary, Grid(0.0125, 720))
 
 

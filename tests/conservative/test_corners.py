@@ -14,7 +14,7 @@ import conservative as cv
 from conservative import registry
 from conservative.errors import NotConserved
 from conservative.grid import count_steps, grid_for
-from conservative.integration.one import warn_of_loads
+from conservative.integration.one import warn_of_steps
 from conservative.invariants import sizes
 from conservative.methods.between import grid_before
 from conservative.methods.pieces import count_most_steps, list_pieces
@@ -143,7 +143,7 @@ def test_a_table_of_thousands_of_rows_is_integrated_at_any_step():
         for dt in (0.6, 0.4, 0.02, 0.0017):
             found = cv.integrate(scene, dt, "projected" if dt == 0.6 else "reduced", sample_every=10**6)
             steps = found.counters.stages // (12 if dt == 0.6 else 1)
-            assert steps <= count_most_steps(scene, grid_for(scene, dt))
+            assert steps <= count_most_steps(grid_for(scene, dt), scene.breaks)
             at_end = cv.integrate(scene, dt, "reduced", t_eval=[1.2])
             right = found.R_WB[1:] if right is None else right
             assert angle_between(at_end.R_WB, right).max() < 1e-5  # measured: 4e-6, of steps of 0.002 s
@@ -176,9 +176,9 @@ def test_a_warning_says_that_steps_do_not_resolve_a_table_that_they_do_not_resol
         scene = replace(case, t_end=4.0).scene()
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            warn_of_loads(scene, cv.Reduced(), grid_for(scene, dt))
+            warn_of_steps(scene, cv.Reduced(), grid_for(scene, dt))
         assert [type(each.message) for each in said] == [cv.LoadNotResolved] * (longest is not None)
-        warn_of_loads(scene, registry.method("scipy"), cv.Grid(dt, round(4 / dt)))  # chooses its steps; a warning is an error
+        warn_of_steps(scene, registry.method("scipy"), cv.Grid(dt, round(4 / dt)))  # chooses its steps; a warning is an error
         for each in said:
             assert each.message.step <= longest * (1 + 1e-12)
             assert each.message.dt == dt
@@ -193,7 +193,7 @@ def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t
     scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), of_scene, None, torque=torque)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1, t_end))
+        warn_of_steps(scene, cv.Reduced(), grid_for(scene, 0.1, t_end))
     assert [each.category for each in said] == [cv.LoadNotResolved] * warns
     for each in said:
         assert 5 < each.message.interval[1] <= t_end
@@ -221,7 +221,7 @@ def test_a_warning_of_noise_names_no_step():
     torque = cv.Torque(lambda t: (crc32(repr(t).encode()) / 2**32, 0, 0))
     scene = cv.Scene("noise", cv.RigidBody((3, 2, 1)), np.eye(3), (1, 0.5, 0.3), 2.0, None, torque=torque)
     with pytest.warns(cv.LoadNotResolved) as said:
-        warn_of_loads(scene, cv.Reduced(), grid_for(scene, 0.1))
+        warn_of_steps(scene, cv.Reduced(), grid_for(scene, 0.1))
     assert [each.message.step for each in said] == [0.0]
 
 

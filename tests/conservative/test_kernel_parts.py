@@ -187,7 +187,7 @@ BRICK = cv.scenes.brick_flip()
 
 @pytest.mark.parametrize("pause", [4, 5, 7])
 def test_pauses_do_not_change_samples(pause):
-    model, coefficients = reduced_method.convert(BRICK, cv.Reduced())[2], reduced_method.find_coefficients(2, None, 1e-20, 0.01)
+    model, coefficients = reduced_method.convert(BRICK, cv.Reduced())[2], reduced_method.find_coefficients(2, 0.01)
     found = []
     for length in (0, pause):
         q, L = np.zeros((8, 4)), np.zeros((8, 3))

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.deferred_imports import kernels
 from conservative.kernels import digest
-from conservative.kernels.compiler import TRIED
 from conservative.kernels.protocol import Result, Workspace
 from conservative.registry import list_families
 
@@ -80,46 +78,51 @@ def test_registers_of_four_and_of_eight_floats_agree(method: str, tmp_path: Path
     np.testing.assert_allclose(np.load(short), np.load(own), rtol=0, atol=1e-15)
 
 
-OTHER_VERSION = """
-import sys, warnings
-import numba
-numba.__version__ = sys.argv[1]
-with warnings.catch_warnings(record=True) as told:
-    warnings.simplefilter("always")
-    from conservative.kernels import compiler
-print(len(told), compiler.LINKED, *(each.message for each in told))
-if len(sys.argv) > 2:
-    import numpy as np
-    import conservative as cv
-    top, w = cv.scenes.asymmetric_top(), np.random.default_rng(3).normal(size=(5, 3))
-    runs = {name: cv.integrate(top, 0.02, name, t_end=1.0) for name in ("convected", "reduced", "gauss", "taylor", "projected")}
-    runs["moser_veselov"] = cv.integrate(cv.scenes.brick_flip(), 0.02, "moser_veselov", t_end=1.0)
-    runs["lame"] = cv.integrate(cv.scenes.lagrange_top(), 0.02, "lame", t_end=1.0)
-    for name in ("reduced", "taylor"):
-        runs[f"many, {name}"] = cv.integrate_many(top, dt=0.02, w_WB_B0=w, t_end=1.0, method=name)
-    np.savez(sys.argv[2], **{name: run.R_WB for name, run in runs.items()})
+DOUBLE = """
+from conservative.kernels import brief
+@brief
+def double(x):
+    return x + x
+"""
+TOGETHER = """
+import sys, time
+from pathlib import Path
+from numba.core import caching, event
+from double import double
+class Slow(event.Listener):
+    def on_start(self, _): time.sleep(0.5)
+    def on_end(self, _): pass
+event.register("numba:compile", Slow())
+save_index = caching.IndexDataCacheFile._save_index
+caching.IndexDataCacheFile._save_index = lambda *of: (time.sleep(0.5), save_index(*of))
+begin, x = Path(sys.argv[1]), eval(sys.argv[2])
+Path(begin.parent, f"ready {sys.argv[3]}").touch()
+while not begin.exists(): time.sleep(0.01)
+print(double(x), len(double.stats.cache_misses))
 """
 
 
-@pytest.mark.slow
-def test_kernels_on_a_version_of_numba_that_was_not_tried(tmp_path: Path) -> None:
-    """Measured: the same bits, for `Lame` 7e-16 and `Projected` 2e-15."""
-    plain, ours = tmp_path / "plain.npz", tmp_path / "ours.npz"
-    told = python(["-c", OTHER_VERSION, "99.1.0rc1", str(plain)], NUMBA_CACHE_DIR=str(tmp_path))
-    assert told.startswith("1 False numba 99.1.0rc1 is not one of the tried versions")
-    assert python(["-c", OTHER_VERSION, numba.__version__, str(ours)]) == "0 True"
-    with np.load(plain) as found, np.load(ours) as expected:
-        assert len(found.files) == 9
-        for name in found:
-            most = 5e-15 if name in ("lame", "projected") else 0.0
-            np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=most, err_msg=name)
+def test_processes_that_share_a_cache_compile_each_kernel_once(tmp_path: Path, start: Any) -> None:
+    """All begin to compile, and to write the index of a function, at the same time."""
+    (tmp_path / "double.py").write_text(DOUBLE)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
 
+    def run(number: int, argument: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", TOGETHER, str(tmp_path / "begin"), argument, str(number)]
+        return start(command, env=environment, stdout=subprocess.PIPE, text=True)  # type: ignore[no-any-return]
 
-def test_the_tried_versions_of_numba_are_those_of_the_project() -> None:
-    """From the oldest one that can be installed to the one that CI installs."""
-    project, pins = ((PACKAGE.parent / name).read_text() for name in ("pyproject.toml", ".ci/constraints.txt"))
-    found = re.search(r'"numba>=(\d+)\.(\d+)"', project), re.search(r"^numba==(\d+)\.(\d+)", pins, re.MULTILINE)
-    assert tuple(tuple(map(int, each.groups())) for each in found if each) == TRIED
+    arguments = ["1.5", "1.5", "1.5", "2"]
+    processes = [run(*each) for each in enumerate(arguments)]
+    while len([*tmp_path.glob("ready *")]) < len(arguments):
+        assert not any(process.poll() for process in processes)
+        time.sleep(0.01)
+    (tmp_path / "begin").touch()
+    found = [process.communicate()[0].split() for process in processes]
+    assert [value for value, _ in found] == ["3.0", "3.0", "3.0", "4"]
+    assert sum(int(misses) for _, misses in found) == 2  # of float and of int
+    later = [run(*each).communicate()[0] for each in enumerate(["1.5", "2"])]
+    assert later == ["3.0 0\n", "4 0\n"]
+    assert not [*tmp_path.rglob("*.lock")]
 
 
 QUARTER_TURN = """

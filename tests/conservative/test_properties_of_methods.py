@@ -10,7 +10,6 @@ from conservative.features import Feature
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
-from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, composition_of
 
 from .one_body import free, in_field, top
 
@@ -60,13 +59,11 @@ def test_order_and_invariants(method, name, order, conserves):
         (lambda: cv.Gauss(2, "own"), "frame"),
         (lambda: cv.Reduced(12), "order"),
         (lambda: cv.Reduced(True), "order"),
-        (lambda: cv.Reduced(4, "one_step"), "composition"),
-        (lambda: cv.Reduced(4, "kahan_li_9"), "composition"),
+        (lambda: cv.registry.method("reduced:composition=suzuki_5"), "method reduced"),
+        (lambda: cv.registry.method("reduced:tol=1e-9"), "method reduced"),
+        (lambda: cv.registry.method("rattle:composition=suzuki_5"), "method rattle"),
         (lambda: cv.Reduced(frame="own"), "frame"),
         (lambda: cv.Splitting(5), "order"),
-        (lambda: cv.Splitting(6, "blanes_moan_6"), "composition"),
-        (lambda: cv.NoSquish(6, "blanes_moan_14"), "composition"),
-        (lambda: cv.Splitting(8, "blanes_moan_14"), "composition"),
         (lambda: cv.MoserVeselov(True), "order"),
         (lambda: cv.MoserVeselov(12), "order"),
         (lambda: cv.MoserVeselov("best"), "order"),
@@ -91,13 +88,11 @@ def test_limits_are_included():
     assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
     assert [cv.Taylor(order).order for order in (4, 18)] == [4, 18]
     assert cv.Substepped(most=1).most == 1
-    heun = explicit.ExplicitTableau("", 3, ((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4))
+    heun = explicit.HEUN_3
     assert heun.c == pytest.approx((0, 1 / 3, 2 / 3))
     factors, columns, starts = heun.packed
     assert (factors.tolist(), columns.tolist()) == ([1 / 3, 2 / 3, 1 / 4, 3 / 4], [0, 1, 0, 2])
     assert starts.tolist() == [0, 0, 1, 2, 4]
-    assert [composition_of(order).order for order in BEST] == list(BEST)
-    assert composition_of(4, "forest_ruth_3") is COMPOSITIONS["forest_ruth_3"]
 
 
 def test_methods_give_the_reason_for_unsupported_scenes():

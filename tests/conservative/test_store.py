@@ -255,7 +255,7 @@ READINGS = {
     "to_zarr": lambda found: found.to_zarr("copy.zarr"),
     "pickle": lambda found: pickle.dumps(found[:10]),
 }
-OF_MOTIONS = {"to_xarray": lambda found: found.to_xarray(), "plot": lambda found: found.plot()}
+OF_MOTIONS = {"plot": lambda found: found.plot()}
 """Ways that read attitudes or rates, and no work of loads."""
 
 

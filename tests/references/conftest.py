@@ -5,7 +5,7 @@ import pytest
 import conservative as cv
 from conservative import deferred_imports
 from conservative.attitude import rotation_about
-from conservative.references.environments import environment
+from conservative.references.environments import folders
 
 from . import trial_engine
 from .local_wheels import write_numpy, write_wheel
@@ -66,7 +66,7 @@ def trial_home(tmp_path_factory):
     home = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(home))
-        make_environment(environment.folder_of_all())
+        make_environment(folders.folder_of_all())
     return home
 
 
@@ -74,7 +74,7 @@ def trial_home(tmp_path_factory):
 def trial_cache(trial_home, monkeypatch):
     """Return the folder of all environments; there is one of the test engine."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(trial_home))
-    return environment.folder_of_all()
+    return folders.folder_of_all()
 
 
 @pytest.fixture(scope="session")
@@ -91,4 +91,4 @@ def wheels(tmp_path_factory):
 def no_environments(tmp_path, monkeypatch, trial_registered):
     """Return the folder of all environments, which is empty."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return environment.folder_of_all()
+    return folders.folder_of_all()

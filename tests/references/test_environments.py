@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 import zipfile
 
 import pytest
@@ -13,10 +14,9 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.errors import MissingEngine
-from conservative.references.environments import environment, install, uv_command
-from conservative.references.environments.environment import Distribution
+from conservative.references.environments import environment, folders, install, uv_command
 from conservative.references.environments.install import install_build, install_releases, newest_releases
-from conservative.references.environments.lock import Source
+from conservative.references.environments.kind import Distribution, Source
 from conservative.references.worker.client import close_workers
 
 from ..environments import PATIENCE, ROOT, variables
@@ -46,9 +46,9 @@ def test_the_newest_version_is_installed_with_numpy_and_recorded(cache, wheels):
     assert (created.engine, created.version, done.new, done.trouble) == ("trial", "1.10", True, "")
     assert [package.partition("==")[0] for package in created.packages] == ["numpy", "trial"]
     assert environment.list_environments() == (created,)
-    lock = (created.folder / environment.LOCK).read_text()
-    assert "trial==1.10" in lock
-    assert "--hash=sha256:" in lock
+    lock = tomllib.loads((created.folder / "pylock.toml").read_text())
+    (package,) = (each for each in lock["packages"] if each["name"] == "trial")
+    assert (lock["lock-version"], package["version"], len(package["wheels"][0]["hashes"]["sha256"])) == ("1.0", "1.10", 64)
     stamp = (created.folder / environment.RECORD).stat().st_mtime_ns
     assert not installed(wheels).new
     assert (created.folder / environment.RECORD).stat().st_mtime_ns == stamp
@@ -164,8 +164,8 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
 
 def test_an_environment_without_a_lock_is_not_rebuilt(cache, wheels):
     before = installed(wheels).environment
-    (before.folder / environment.LOCK).unlink()  # as of an environment that somebody made by hand
-    with pytest.raises(cv.BadInput, match="without a lock"):
+    (before.folder / before.kind.lock_file).unlink()  # as of an environment that somebody made by hand
+    with pytest.raises(cv.BadInput, match=r"without a lock; expected pylock.toml.* engines remove trial@1.10, then install it"):
         install.install("trial", Source(wheels), force=True)
     assert environment.list_environments() == (before,)
 
@@ -174,12 +174,12 @@ def test_an_environment_without_a_lock_is_not_rebuilt(cache, wheels):
 def test_a_rebuild_that_fails_leaves_the_environment(cache, wheels, monkeypatch, step):
     before = installed(wheels).environment
     if step == "_fill":
-        source = Source(cache)  # without wheels
+        lock = before.folder / before.kind.lock_file
+        lock.write_text(re.sub('(?<=sha256 = ").', "x", lock.read_text()))
     else:
-        source = Source(wheels)
         monkeypatch.setattr(install.Path, "rename", renamed_never_from(install.Path.rename, ".1.10-"))
     with pytest.raises(cv.BadInput):
-        install.install("trial", source, force=True)
+        install.install("trial", Source(wheels), force=True)
     assert environment.list_environments() == (before,)
     assert installed(wheels).trouble == ""
 
@@ -204,7 +204,7 @@ INSTALL = """
 import os, signal, sys
 from pathlib import Path
 from conservative.references.environments.install import install
-from conservative.references.environments.lock import Source
+from conservative.references.environments.kind import Source
 changes, last = [], int(sys.argv[2])
 def note(event, arguments):
     if event in ("os.rename", "subprocess.Popen"):
@@ -250,7 +250,7 @@ def test_a_full_disk_leaves_nothing_and_is_reported(wheels, tmp_path, monkeypatc
         with pytest.raises(cv.BadInput, match=r"room"):
             installed(wheels)
         assert environment.list_environments() == ()
-        assert not list(environment.folder_of_all().glob("trial/*"))
+        assert not list(folders.folder_of_all().glob("trial/*"))
     finally:
         subprocess.run(["umount", small], check=True)
 

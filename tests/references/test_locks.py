@@ -5,12 +5,20 @@ import sys
 
 import pytest
 
-from conservative.references.environments import lock
-from conservative.references.environments.environment import LOCK
-from conservative.references.environments.lock import Lock, Source
+from conservative.references.environments.kind import Lock, Source
+from conservative.references.environments.pip import Pip
 from conservative.references.environments.uv_command import UvFailed
 
 from .local_wheels import write_wheel
+
+TEXT = """lock-version = "1.0"
+created-by = "a test"
+
+[[packages]]
+name = "trial"
+version = "1.0"
+wheels = [{{ url = "{url}"{hashes} }}]
+"""
 
 
 @pytest.fixture
@@ -23,18 +31,18 @@ def fill(tmp_path, monkeypatch):
     folder.mkdir()
 
     def fill_with(hashes):
-        text = f"trial==1.0 {hashes.format(hashlib.sha256(wheel.read_bytes()).hexdigest())}\n"
-        (folder / LOCK).write_text(text)
-        return lock.fill(folder, Lock("1.0", sys.executable, text), Source(tmp_path))[1]
+        text = TEXT.format(url=wheel.as_uri(), hashes=hashes % hashlib.sha256(wheel.read_bytes()).hexdigest() if hashes else "")
+        (folder / Pip.lock_file).write_text(text)
+        return Pip().fill(folder, Lock("1.0", text, sys.executable), Source(tmp_path))[1]
 
     return fill_with
 
 
 def test_the_file_of_the_lock_is_installed(fill):
-    assert fill("--hash=sha256:{}") == ("trial==1.0",)
+    assert fill(', hashes = { sha256 = "%s" }') == ("trial==1.0",)
 
 
-@pytest.mark.parametrize("hashes", ["", f"--hash=sha256:{'0' * 64}"], ids=["none", "of another file"])
+@pytest.mark.parametrize("hashes", ["", ', hashes = { sha256 = "%.1s' + "0" * 63 + '" }'], ids=["none", "of another file"])
 def test_a_file_whose_hash_is_not_in_the_lock_is_refused(hashes, fill, tmp_path):
     with pytest.raises(UvFailed):
         fill(hashes)

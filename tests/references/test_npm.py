@@ -16,11 +16,11 @@ import conservative as cv
 from conservative import registry
 from conservative.grid import grid_for
 from conservative.references.engine import principal_axes
-from conservative.references.environments import environment, install
+from conservative.references.environments import environment, folders, install
 from conservative.references.environments.adapter import read_script
 from conservative.references.environments.engine_method import engine_class
-from conservative.references.environments.environment import Distribution
-from conservative.references.environments.lock import Source
+from conservative.references.environments.kind import Distribution, Lock, Source
+from conservative.references.environments.npm import Npm
 from conservative.references.environments.plain_numbers import describe
 from conservative.references.worker.client import EngineCrashed
 
@@ -130,10 +130,10 @@ def prepare(worker, adapter, trouble="none"):
 def test_the_newest_release_is_installed_and_locked_without_a_registry(address, tmp_path):
     done = install.install("trial")
     created = done.environment
-    assert (created.version, done.new, done.trouble, created.kind) == ("1.10.0", True, "", "npm")
+    assert (created.version, done.new, done.trouble, created.kind) == ("1.10.0", True, "", Npm())
     assert created.runtime.startswith("Node ")
     assert created.packages == ("@trial/engine==1.10.0",)
-    lock = (created.folder / environment.LOCK).read_text()
+    lock = (created.folder / Npm.lock_file).read_text()
     assert "sha512-" in lock
     assert '"resolved"' not in lock
     assert environment.list_environments() == (created,)
@@ -151,7 +151,7 @@ def test_versions(monkeypatch):
     with pytest.raises(cv.BadInput, match=r"'@trial/engine==3.0'; expected one of 1.10.0, 1.9.0, 1.0.0"):
         install.install("trial==3.0")
     with pytest.raises(cv.BadInput, match="find_links"):
-        install.install("trial==1.0.0", Source(find_links=environment.folder_of_all()))
+        install.install("trial==1.0.0", Source(find_links=folders.folder_of_all()))
     monkeypatch.setenv("npm_config_registry", "http://me:secret@127.0.0.1:9/")
     with pytest.raises(cv.BadInput, match=r"ECONNREFUSED.*; expected a network") as caught:
         install.install("trial==1.0.0")
@@ -167,7 +167,7 @@ def test_a_missing_or_old_node_is_named_with_the_one_to_install(tmp_path, monkey
     old.write_text("#!/bin/sh\necho 18.0.0\n")
     old.chmod(0o755)
     with pytest.raises(cv.BadInput, match=r"but Node 18\.0\.0; expected Node 20"):
-        install.npm.fill(tmp_path, install.Lock("1", "", "{}"), Source())
+        Npm().fill(tmp_path, Lock("1", "{}"), Source())
 
 
 def test_a_run_and_what_it_owns(worker, trial):

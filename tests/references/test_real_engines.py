@@ -14,10 +14,10 @@ from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.errors import BadInput
 from conservative.grid import grid_for
 from conservative.references.engine import principal_axes
-from conservative.references.environments import apt
-from conservative.references.environments.environment import Distribution, worker_of
+from conservative.references.environments.apt import Apt
+from conservative.references.environments.environment import worker_of
 from conservative.references.environments.install import install
-from conservative.references.environments.lock import Source
+from conservative.references.environments.kind import Distribution, Source
 from conservative.references.environments.plain_numbers import describe, read_states
 from conservative.references.samples import to_body_axes
 
@@ -229,9 +229,9 @@ def test_an_engine_without_a_default_has_none(engine):
 @pytest.mark.engine("ode")
 def test_an_engine_whose_package_the_system_does_not_have():
     with pytest.raises(BadInput, match="apt install libnone-dev nlohmann-json3-dev"):
-        apt.resolve(Distribution("libnone-dev", "none"), "", Source())
+        Apt().resolve(Distribution("libnone-dev", "none"), "", Source())
     with pytest.raises(BadInput, match="the version of the system"):
-        apt.resolve(registry.engine("ode").data, "0.0.1", Source())
+        Apt().resolve(registry.engine("ode").data, "0.0.1", Source())
 
 
 @pytest.mark.engine("jsbsim")

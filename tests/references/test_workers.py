@@ -22,7 +22,7 @@ from conservative.benchmarks.studies.time_limit import attempt_here, attempt_wit
 from conservative.errors import MissingEngine, Unsupported
 from conservative.grid import grid_for
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.environments import environment
+from conservative.references.environments import environment, folders
 from conservative.references.environments.environment import worker_of
 from conservative.references.worker import client
 from conservative.references.worker.client import EngineCrashed, Worker, time_limit
@@ -116,11 +116,11 @@ def test_the_memory_of_an_engine_is_limited(folder):
 
 
 def test_files_of_an_engine_are_removed(folder):
-    before = {*environment.temporary_folder().iterdir()}  # of processes that other tests ended
+    before = {*folders.temporary_folder().iterdir()}  # of processes that other tests ended
     assert run("leave").ok
     client.close_workers()
     assert not list(folder.rglob("left_behind"))
-    assert {*environment.temporary_folder().iterdir()} <= before
+    assert {*folders.temporary_folder().iterdir()} <= before
 
 
 def test_a_run_survives_the_crash_of_another():

@@ -2,11 +2,9 @@
 
 import json
 import re
-import subprocess
 from dataclasses import replace
 from html import escape
 
-import imageio_ffmpeg
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -53,7 +51,7 @@ def test_frames_of_different_steps_are_the_motion_at_the_times_of_one_clock(moti
     for panel, most in zip(panels, (7e-4, 1e-6, 2e-5), strict=True):  # measured 6.5e-4 (the method's error), 8e-7, 1.3e-5 rad
         assert angle_between(exact(times) @ BODY.R_BP, panel.R_WP).max() < most
         np.testing.assert_allclose(np.linalg.norm(panel.L_W, axis=1), 1, atol=1e-14)  # measured 7e-16
-    sides = panels[0].size
+    sides = panels[0].solid.size
     moments = (sides**2).sum() - sides**2  # of a box: m/12 (b^2 + c^2)
     np.testing.assert_allclose(moments / moments[0], BODY.moments / BODY.moments[0], rtol=1e-13)  # measured 2e-16
 
@@ -111,7 +109,7 @@ def test_the_inertia_box_of_a_planar_body_and_of_moments_without_a_box_is_thin()
     for moments in ((1.0, 2.0, 3.0), (1.0, 2.0, 3.5)):
         scene = cv.Scene("planar", impossible_body(moments), R0, (0.1, 0.2, 0.3), 1.0)
         _, (panel,) = make_panels([cv.integrate(scene, 0.01)], ["a"], None)
-        assert panel.size.min() / panel.size.max() == pytest.approx(THINNEST)
+        assert panel.solid.size.min() / panel.solid.size.max() == pytest.approx(THINNEST)
 
 
 def test_mistakes_name_the_argument(motions):
@@ -203,47 +201,45 @@ def counts(image):
     return {f"#{r:02x}{g:02x}{b:02x}": int(n) for (r, g, b), n in zip(colours, numbers, strict=True)}
 
 
-def read_frames(file, shape=None):
-    """Return the images of a GIF (n, height, width, 3), or of an MP4 with that `shape` (height, width)."""
-    if file.suffix == ".gif":
-        with Image.open(file) as images:
-            return np.stack([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(images)])
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", file, *["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]]
-    pixels = subprocess.run(command, capture_output=True, check=True).stdout
-    return np.frombuffer(pixels, np.uint8).reshape(-1, *shape, 3)
+def read_frames(file):
+    """Return the images of a GIF (n, height, width, 3)."""
+    with Image.open(file) as images:
+        return np.stack([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(images)])
 
 
 def faces_to_the_eye(panel, R):
     """Return the projected area of each face of a box at an attitude (3, 3), negative for those turned away, by colour."""
     towards = np.repeat(R.T @ video.EYE, 2) * np.tile([1, -1], 3)
-    return dict(zip(FACES, towards * np.repeat(panel.size.prod() / panel.size, 2), strict=True))
+    return dict(zip(FACES, towards * np.repeat(panel.solid.size.prod() / panel.solid.size, 2), strict=True))
 
 
 def test_a_gif_shows_the_faces_that_the_exact_attitude_turns_to_the_eye(motions, tmp_path, monkeypatch):
-    monkeypatch.setitem(video.RATES, ".gif", 2.0)
+    monkeypatch.setattr(video, "RATE", 2.0)
     motions[0].animate(labels=["a", "b"], truth=motions[1]).save(tmp_path / "a.gif")
     images = read_frames(tmp_path / "a.gif")
     times, panels = make_panels(motions[1:2], ["b"], None)
     assert len(images) == 30  # 3 s at 0.2 simulated s per s
     chosen = np.linspace(0, len(times) - 1, len(images)).round().astype(int)
     for image, R in zip(images, panels[0].R_WP[chosen], strict=True):
-        found = counts(image[:, image.shape[1] // 2 :])
+        found = counts(image[: video.SIDE, video.SIDE :])
         for colour, area in faces_to_the_eye(panels[0], R).items():
             if abs(area) > 0.15:  # an edge on its own has pixels of blended colours
                 assert (found.get(colour, 0) > 30) == (area > 0)
         assert found[COLOURS["arrow"]] > 30  # measured 51
 
 
-@pytest.mark.parametrize("kind", [".gif", ".mp4"])
-def test_watch_writes_a_video_and_replaces_its_own(kind, tmp_path, monkeypatch):
-    monkeypatch.setitem(video.RATES, kind, 1.0)
-    out = tmp_path / f"brick{kind}"
+def test_watch_writes_a_gif_that_pauses_at_its_end_and_replaces_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(video, "RATE", 1.0)
+    out = tmp_path / "brick.gif"
     for _ in range(2):
         done = watch("brick_flip", "-m", "reduced,exact", "--t-end", "1", "--out", out)
         assert done.exit_code == 0, done.output
-    images = read_frames(out, (256, 384))
-    assert images.shape == (10, 256, 384, 3)
+    images = read_frames(out)
+    assert images.shape[0] == 10
     assert np.abs(images[0].astype(float) - images[-1]).mean() > 1  # measured 10: it moves
+    with Image.open(out) as gif:
+        durations = [frame.info["duration"] for frame in ImageSequence.Iterator(gif)]
+    assert durations == [1000] * 9 + [video.PAUSE]
     assert list(tmp_path.iterdir()) == [out]
 
 
@@ -253,8 +249,8 @@ def test_watch_writes_the_last_frame_and_replaces_its_own(tmp_path):
         done = watch("brick_flip", "-m", "moser_veselov,exact", "--t-end", "1", "--out", out)
         assert done.exit_code == 0, done.output
     with Image.open(out) as image:
-        assert (image.size, image.text) == ((1152, 768), {"Comment": MARK})  # 2 panels at 300 pixels per inch
-        found = counts(np.asarray(image.convert("RGB")))
+        assert (image.width, image.text) == (1152, {"Comment": MARK})  # 2 panels at 300 pixels per inch
+        found = counts(np.asarray(image.convert("RGB"))[: video.SIDE * video.FINE])
     _, (panel,) = make_panels([Exact().solve(cv.scenes.brick_flip(), cv.Grid(0.005, 200))], ["a"], None)
     areas = faces_to_the_eye(panel, panel.R_WP[-1])
     assert [found.get(colour, 0) > 1000 for colour, area in areas.items() if abs(area) > 0.15] == [
@@ -267,9 +263,9 @@ def test_watch_writes_the_last_frame_and_replaces_its_own(tmp_path):
 def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():
     file = ROOT / "reports" / "pictures" / "brick_flip.gif"
     assert MARK.encode() in file.read_bytes()[:HEAD]
-    assert file.stat().st_size < 1e6  # 946 kB
+    assert file.stat().st_size < 1e6  # 872 kB
     images = read_frames(file)
-    last = [counts(part) for part in np.split(images[-1], 4, axis=1)]
+    last = [counts(part) for part in np.split(images[-1][: video.SIDE], 4, axis=1)]
     shown = [[each.get(colour, 0) for colour in FACES] for each in last]
     assert np.abs(np.subtract(shown[2], shown[3])).sum() < 0.3 * sum(shown[3])  # the paper's map, below the outline
     for engine in shown[:2]:  # measured 0.65 and 0.9
@@ -287,4 +283,28 @@ def test_all_numbers_are_in_the_picture_of_a_free_flight(tmp_path):
     pixels = np.asarray(Image.open(tmp_path / "flight.png"))
     height, width = pixels.shape[:2]
     assert (pixels[-5:] == 255).all()
-    assert (pixels[height * 2 // 3 :, width // 2 - 2 : width // 2 + 2] == 255).all()
+    numbers = pixels[video.SIDE * video.FINE : height - 4 * video.LINE * video.FINE]  # without the legend
+    assert (numbers[:, width // 2 - 2 : width // 2 + 2] == 255).all()
+
+
+def test_a_top_on_its_tip_is_the_cone_of_its_moments_and_other_bodies_are_boxes():
+    _, (panel,) = make_panels([cv.integrate(cv.scenes.lagrange_top(t_end=0.1), 0.01)], ["a"], None)
+    assert panel.solid.shape == "cone"
+    assert panel.solid.size[0] / panel.solid.size[1] == pytest.approx(0.5, rel=1e-12)  # the paper's: half its height
+    np.testing.assert_allclose(panel.solid.axis, [0, 0, 1])
+    radius, height = panel.solid.size
+    tetrahedra = [np.linalg.det(face.corners - panel.solid.centre) / 6 for face in panel.solid.faces]
+    assert min(tetrahedra) > 0  # corners are counter-clockwise from outside
+    assert sum(tetrahedra) == pytest.approx(np.pi / 3 * radius**2 * height, rel=0.01)  # the surface is closed; measured 0.003
+    offset = cv.Scene("offset", BODY, R0, (0.1, 0.2, 0.3), 0.1, cv.UniformGravity(1.0, (0.1, 0.2, 0.3)))
+    _, (panel,) = make_panels([cv.integrate(offset, 0.01)], ["a"], None)
+    assert (panel.solid.shape, panel.solid.leave(np.array([0.0, 0.0, 9.0]))) == ("box", panel.solid.size[2] / 18)
+
+
+@pytest.mark.parametrize(("truth", "entries"), [(None, 3), (1, 4)])
+def test_the_legend_has_what_is_drawn(truth, entries, motions):
+    page = element(motions, ["a", "b", "c"], truth=truth)
+    legend = re.search(r'<ul class="legend">(.*)</ul>', page)[1]
+    assert legend.count("<li>") == entries
+    assert all((COLOURS[name] in legend) for name in ("arrow", "trace"))
+    assert (COLOURS["outline"] in legend) is (truth is not None)

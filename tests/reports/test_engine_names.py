@@ -19,7 +19,7 @@ from conservative.errors import BadInput
 from conservative.method import Method
 from conservative.method_info import settings_text
 from conservative.programs import list_programs
-from conservative.references.environments import environment
+from conservative.references.environments import environment, folders
 from conservative.registry import read_name
 from conservative.reports.cli.main import main
 
@@ -35,7 +35,7 @@ NEEDS = {"gate": "against", "track": "versions"}
 TABLES = ("recommend", "report", "study", "verify")
 """Commands that show all settings of a name."""
 CAPTURED = {
-    "engines install": ("references.environments.lock.resolve",),
+    "engines install": ("references.environments.pip.Pip.resolve",),
     "engines remove": ("references.environments.install.drop", "references.environments.install.register"),
     "gate": (),
     "recommend": ("benchmarks.recommendation.recommend.recommend",),
@@ -91,7 +91,7 @@ def engines(tmp_path_factory):
             patch.setenv(f"XDG_{kind}_HOME", str(folder / kind))
         patch.setenv("CONSERVATIVE_PROJECT", str(folder))
         patch.chdir(folder)
-        place = environment.folder_of_all() / "mujoco" / "0.1"
+        place = folders.folder_of_all() / "mujoco" / "0.1"
         place.mkdir(parents=True)
         record = {"engine": "mujoco", "version": "0.1", "runtime": "Python 3.11.7", "packages": ["mujoco==0.1"]}
         (place / environment.RECORD).write_text(json.dumps(record))

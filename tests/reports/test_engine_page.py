@@ -1,7 +1,6 @@
-"""The page of an engine and its badge, on made-up measurements."""
+"""The page of an engine, on made-up measurements."""
 
 import math
-from xml.etree import ElementTree
 
 import pytest
 
@@ -12,7 +11,6 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports import report
 from conservative.reports.document import html, markdown
 from conservative.reports.document.attempt import failed_parts
-from conservative.reports.document.badge import badge
 from conservative.reports.document.model import Document, Links, Section, Table
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan
@@ -106,7 +104,7 @@ def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
     links = Links([(page.title, f"{name}.html") for name, page in pages.items()])
     document = Document("", "all", [links], pages=pages)
     report.render(document, tmp_path, png=False)
-    written = {"report.md", "index.html", "engine_a.html", "engine_a.md", "engine_a.svg", "engine_b.html", "engine_b.md"}
+    written = {"report.md", "index.html", "engine_a.html", "engine_a.md", "engine_b.html", "engine_b.md"}
     assert {path.name for path in tmp_path.iterdir()} == written
     assert "[b 7](engine_b.html), [a 2](engine_a.html)" in (tmp_path / "report.md").read_text(encoding="utf-8")
     assert '<a href="engine_a.html">a 2</a>' in (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -115,7 +113,7 @@ def test_a_report_writes_the_pages_and_links_them(pages, tmp_path):
 OTHERS = "since 1.10, 3 rad in 1.9"
 
 
-@pytest.mark.parametrize(("name", "kept"), [("_since", ""), ("_badge", ""), ("findings", OTHERS), ("render", OTHERS)])
+@pytest.mark.parametrize(("name", "kept"), [("_since", ""), ("findings", OTHERS), ("render", OTHERS)])
 def test_a_part_of_a_page_that_fails_is_a_sentence_on_it(name, kept, measured, tmp_path, monkeypatch):
     def fault(*_, **__):
         raise ZeroDivisionError("planted")
@@ -134,14 +132,3 @@ def test_a_part_of_a_page_that_fails_is_a_sentence_on_it(name, kept, measured, t
     assert "planted" in text
     assert kept in text
     assert ("planted" in (tmp_path / "engine_a.html").read_text(encoding="utf-8")) == (name != "render")  # of Markdown alone
-
-
-def test_a_badge_counts_a_crash_as_a_failure_and_not_what_an_engine_does_not_take(pages):
-    svg = ElementTree.fromstring(pages["engine_a"].badge)
-    assert svg.get("aria-label") == "exact motions, at its best: 2 of 3"
-    assert pages["engine_b"].badge == ""
-
-
-def test_a_badge_is_well_formed_with_any_text():
-    svg = ElementTree.fromstring(badge("a < b", "x & y"))
-    assert [each.text for each in svg.iter("{http://www.w3.org/2000/svg}text")] == ["a < b", "x & y"]

@@ -5,14 +5,14 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from conservative.references.environments import environment
+from conservative.references.environments import environment, folders
 from conservative.reports.cli.main import main
 
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return environment.folder_of_all()
+    return folders.folder_of_all()
 
 
 def run(*arguments):

@@ -29,12 +29,15 @@ def test_the_page_has_at_most_400_words():
     assert 300 < len(text.split()) <= 400
 
 
+def test_the_file_beside_the_page_is_current_and_needs_no_network():
+    text = flip.FILE.read_text(encoding="utf-8")
+    assert text == flip.page(), "run: python -m conservative.reports.documentation.flip"
+    assert not re.findall(r"""(?:src|href)=["']?(?:https?:)?//""", text)
+
+
 @pytest.fixture(scope="module")
-def file(tmp_path_factory):
-    file = tmp_path_factory.mktemp("flip") / "flip.html"
-    head = '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    file.write_text(f"{head}<title>flip</title><main>{flip.figure(sliders=True)}</main>", encoding="utf-8")
-    return file
+def file():
+    return flip.FILE
 
 
 @pytest.fixture(scope="module")

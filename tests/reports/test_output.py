@@ -257,8 +257,8 @@ def test_new_empty_and_special_files_may_be_written(tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["run", "brick_flip", "--csv", "out.csv", "--parquet", "./out.csv"],
-        ["run", "brick_flip", "--csv", "there/out.csv", "--parquet", "link/out.csv"],
+        ["run", "brick_flip", "--csv", "out.svg", "--picture", "./out.svg"],
+        ["run", "brick_flip", "--csv", "there/out.svg", "--picture", "link/out.svg"],
         ["study", "convergence", "--out", "there", "--csv", "there/study.csv"],
     ],
 )
@@ -272,5 +272,11 @@ def test_two_options_never_write_the_same_file(arguments, tmp_path, monkeypatch)
 
 
 def test_two_options_can_write_to_the_same_device():
-    done = CliRunner().invoke(main, ["run", "brick_flip", "--t-end", "0.1", "--csv", "/dev/null", "--parquet", "/dev/null"])
+    @click.command(cls=OutputCommand)
+    @click.option("--csv", type=Output("mark"))
+    @click.option("--markdown", type=Output("mark"))
+    def write(**files):
+        pass
+
+    done = CliRunner().invoke(write, ["--csv", "/dev/null", "--markdown", "/dev/null"])
     assert done.exit_code == 0, done.output

@@ -238,8 +238,8 @@ def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, tmp_pat
     assert "observed order" in page  # the table next to it
 
 
-def test_tables_in_latex_that_fail_leave_the_pages(rows_of_a_report, tmp_path, monkeypatch):
-    monkeypatch.setattr(latex, "render", fault)
+def test_a_table_in_latex_that_fails_leaves_the_pages(rows_of_a_report, tmp_path, monkeypatch):
+    monkeypatch.setattr(latex, "table", fault)
     done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--latex"])
     assert done.exit_code == 1
     assert "'report.tex' could not be made (ZeroDivisionError: planted)" in done.stderr

@@ -56,12 +56,11 @@ def test_files_have_the_rows_and_the_tables(made_up, tmp_path):
         assert len(list(csv.DictReader(file))) == len(made_up)
     line = "| spring | 1e-2 | 2 of 2 | 1 | 0 | 1 | ≈ 1.00 (0.500 to 2.00) | ✗ 0.500 | ✓ 2.00 | 1 | gauss | heyoka |"
     assert line in (tmp_path / "a.md").read_text()
-    pictures = [f"random_bodies.{kind}" for kind in ("pdf", "png", "svg")]
-    names = [*pictures, "study.csv", "study.json", "study.md", "study.tex"]
+    pictures = [f"random_bodies.{kind}" for kind in ("png", "svg")]
+    names = [*pictures, "study.csv", "study.json", "study.md"]
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == names
     assert "](random_bodies.svg)" in (tmp_path / "folder" / "study.md").read_text()
     assert ".svg" not in (tmp_path / "a.md").read_text()
-    assert r"spring & $10^{-2}$ & 2 of 2 & 1 & 0 & 1 & $\approx$ 1.00" in (tmp_path / "folder" / "study.tex").read_text()
 
 
 def test_a_place_that_cannot_be_written_is_an_error_before_any_work(monkeypatch, tmp_path):

@@ -5,6 +5,7 @@ from itertools import chain
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import conservative as cv
@@ -16,7 +17,7 @@ from conservative.reports.document.model import Grade
 from conservative.reports.rows import lines
 from conservative.reports.rows.points import points
 from conservative.reports.run import single_run
-from conservative.reports.sections import failures, hard_cases, recommendation, scene_ratios, scenes
+from conservative.reports.sections import failures, hard_cases, long_time, recommendation, scene_ratios, scenes
 from conservative.reports.sections import run as single
 from conservative.trajectory import Trajectory
 
@@ -122,6 +123,26 @@ def test_too_few_points_give_the_reason_and_no_order():
     (cells,) = texts(order_table(found))
     assert cells[1] == "no order"
     assert "2 runs" in cells[3]
+
+
+def test_a_legend_has_an_order_that_is_sure_and_no_other():
+    fits = pd.DataFrame(
+        {"name": ["a", "b", "c"], "text": ["2.00 ± 0.01", "18.38 ± 18.96", "no order"], "stderr": [0.01, 18.96, math.nan]}
+    )
+    assert list(lines.with_slopes(fits, fits)["name"]) == ["a (2.00 ± 0.01)", "b (no clear order)", "c (no clear order)"]
+
+
+def test_a_line_that_ends_before_the_others_has_its_end_and_the_reason():
+    drifts = pd.DataFrame({"name": ["a", "a", "b", "b", "exact"], "t": [0.0, 10.0, 0.0, 3.0, 1.0]})
+    assert lines.early_ends(drifts) == {"b": 3.0, "exact": 1.0}
+    assert lines.early_ends(drifts[drifts["name"] == "b"]) == {}
+    grown = pd.DataFrame({"scene": "top", "name": ["a", "b", "c"], "t": [1e6, 1e4, 1e2]})
+    failed = pd.DataFrame(
+        {"study": "long_time", "scene": "top", "name": ["b"], "outcome": OutcomeKind.DIVERGED, "reason": "at t = 3 s"}
+    )
+    note = long_time.why_early(grown, failed)
+    assert "b on top (10,000 turns: at t = 3 s); c on top (100 turns: longer runs" in note
+    assert long_time.why_early(grown[:1], failed) == ""
 
 
 def test_failures_and_unsupported_runs_have_separate_tables():

@@ -86,7 +86,7 @@ def test_a_list_and_a_repeated_option_are_the_same(name, option):
 
 
 @pytest.mark.parametrize("name", [name for name, option in CELLS if option.name == "picture"])
-def test_a_picture_is_svg_png_or_pdf(name):
+def test_a_picture_is_svg_or_png(name):
     for ending in PICTURES:
         assert parse(name, "--picture", f"a{ending}")[0]["picture"].suffix == ending
     with pytest.raises(BadInput, match=r"picture: got 'a\.jpg'"):

@@ -10,6 +10,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.methods.coefficients.explicit import (
+    EULER,
+    HEUN,
+    HEUN_3,
+    KUTTA_3,
+    MIDPOINT,
+    RALSTON,
+    RUNGE_KUTTA_4,
+    SHU_OSHER_3,
+    ExplicitTableau,
+)
 
 from ..solution import cross
 from .mistake import Mistake, Number
@@ -47,40 +58,34 @@ def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rat
     return new
 
 
-def _tableau(
-    f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], A: Sequence[Sequence[float]], b: Sequence[float]
-) -> Array:
-    slopes: list[Array] = []
-    for row in ((), *A):
-        slopes.append(f(t + h * sum(row), y + h * sum((a * k for a, k in zip(row, slopes, strict=True)), np.zeros_like(y))))
-    return y + h * sum((weight * k for weight, k in zip(b, slopes, strict=True)), np.zeros_like(y))
+Turning = Callable[[Array, Array], Array]
+"""The derivative of rotation vectors (3, ...), of which stages make a sum, from that sum and the rates in body axes."""
 
 
-def _turned_tableau(
-    f: Slope,
-    t: Any,
-    y: Array,
-    h: float,
-    past: Sequence[Array],
-    A: Sequence[Sequence[float]],
-    b: Sequence[float],
-    corrected: bool,
+def _runge_kutta(
+    f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], tableau: ExplicitTableau, turning: Turning | None
 ) -> Array:
-    """Return the state of a Runge-Kutta method whose stages turn the body by sums of rates, or of those of rotation vectors."""
+    """Return the state of a Runge-Kutta method; with `turning`, stages turn the body by a sum of rates or rotation vectors.
+
+    The compiled steppers of `conservative.kernels` take one tableau, one body and its own equations. This one takes any slope
+    of many states at once, as the search for integrators needs it: wrong equations, and all rows of a recording in one step.
+    """
     slopes, turns = list[Array](), list[Array]()
+    for row, c in zip((*tableau.A, tableau.b), (*tableau.c, 1.0), strict=True):
+        state = y + h * sum((a * k for a, k in zip(row, slopes, strict=True)), np.zeros_like(y))
+        turn = h * sum((a * w for a, w in zip(row, turns, strict=True)), np.zeros_like(y[4:])) if turning else None
+        if turn is not None:
+            state[:4] = _rotate(y[:4], turn)
+        if len(slopes) < len(tableau.b):
+            slopes.append(f(t + h * c, state))
+            if turning and turn is not None:
+                turns.append(turning(turn, f.rates(t + h * c, state)))
+    return state
 
-    def state(weights: Sequence[float]) -> tuple[Array, Array]:
-        new = y + h * sum((a * k for a, k in zip(weights, slopes, strict=True)), np.zeros_like(y))
-        turn = h * sum((a * w for a, w in zip(weights, turns, strict=True)), np.zeros_like(y[4:]))
-        new[:4] = _rotate(y[:4], turn)
-        return new, turn
 
-    for row in ((), *A):
-        (stage, turn), at = state(row), t + h * sum(row)
-        slopes.append(f(at, stage))
-        w = f.rates(at, stage)
-        turns.append(_vector_rates(turn, w) if corrected else w)
-    return state(b)[0]
+def _rates(turn: Array, w: Array) -> Array:
+    """Return the rates themselves: a rotation vector that is their sum, as if rotations commuted."""
+    return w
 
 
 def _vector_rates(turn: Array, w: Array) -> Array:
@@ -160,10 +165,6 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     return new
 
 
-KUTTA = (((0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6))
-RK4 = (((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
-
-
 TURNED = " with the exponential map of weighted rates"
 BARE = " without normalisation"
 
@@ -182,8 +183,14 @@ class Step:
     recurrent: bool = False
 
 
+def _by_tableau(tableau: ExplicitTableau, turning: Turning | None = None) -> Step:
+    """Return the method of a tableau. Sums of rates are of order 2, because rotations do not commute."""
+    order = min(2, tableau.order) if turning is _rates else tableau.order
+    return Step(order, 0, partial(_runge_kutta, tableau=tableau, turning=turning))
+
+
 STEPS: dict[str, Step] = {
-    "explicit Euler": Step(1, 0, partial(_tableau, A=(), b=(1.0,))),
+    "explicit Euler": _by_tableau(EULER),
     "explicit Euler with the exponential map": Step(1, 0, partial(_split_step, rates=1, use="old", exact=True)),
     "semi-implicit Euler with an explicit gyroscopic term": Step(1, 0, partial(_split_step, rates=1, use="new", exact=False)),
     "semi-implicit Euler with an explicit gyroscopic term and the exponential map": Step(
@@ -197,9 +204,9 @@ STEPS: dict[str, Step] = {
         1, 0, partial(_split_step, rates=1, use="mean", exact=True)
     ),
     "implicit Euler": Step(1, 0, partial(_implicit, at=1.0)),
-    "the explicit midpoint rule (RK2)": Step(2, 0, partial(_tableau, A=((0.5,),), b=(0.0, 1.0))),
-    "Heun's method": Step(2, 0, partial(_tableau, A=((1.0,),), b=(0.5, 0.5))),
-    "Ralston's method": Step(2, 0, partial(_tableau, A=((2 / 3,),), b=(0.25, 0.75))),
+    "the explicit midpoint rule (RK2)": _by_tableau(MIDPOINT),
+    "Heun's method": _by_tableau(HEUN),
+    "Ralston's method": _by_tableau(RALSTON),
     "the implicit midpoint rule": Step(2, 0, partial(_implicit, at=0.5)),
     "the trapezoidal rule": Step(2, 0, _trapezoid),
     "leapfrog (velocity Verlet)": Step(2, 0, _leapfrog),
@@ -211,16 +218,14 @@ STEPS: dict[str, Step] = {
     "Buss 3 (augmented)": Step(3, 0, partial(_buss, order=3)),
     "Adams-Bashforth 3": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12))),
     f"Adams-Bashforth 3{BARE}": Step(3, 2, partial(_adams, weights=(23 / 12, -16 / 12, 5 / 12)), normalised=False),
-    "RK3 (Kutta)": Step(3, 0, partial(_tableau, A=KUTTA[0], b=KUTTA[1])),
-    "RK3 (Heun)": Step(3, 0, partial(_tableau, A=((1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))),
-    "RK3 (SSP)": Step(3, 0, partial(_tableau, A=((1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))),
-    "RK4": Step(4, 0, partial(_tableau, A=RK4[0], b=RK4[1])),
-    f"the explicit midpoint rule (RK2){TURNED}": Step(
-        2, 0, partial(_turned_tableau, A=((0.5,),), b=(0.0, 1.0), corrected=False)
-    ),
-    f"Heun's method{TURNED}": Step(2, 0, partial(_turned_tableau, A=((1.0,),), b=(0.5, 0.5), corrected=False)),
-    f"RK4{TURNED}": Step(2, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=False)),
-    "RK4 on rotation vectors (Munthe-Kaas)": Step(4, 0, partial(_turned_tableau, A=RK4[0], b=RK4[1], corrected=True)),
+    "RK3 (Kutta)": _by_tableau(KUTTA_3),
+    "RK3 (Heun)": _by_tableau(HEUN_3),
+    "RK3 (SSP)": _by_tableau(SHU_OSHER_3),
+    "RK4": _by_tableau(RUNGE_KUTTA_4),
+    f"the explicit midpoint rule (RK2){TURNED}": _by_tableau(MIDPOINT, _rates),
+    f"Heun's method{TURNED}": _by_tableau(HEUN, _rates),
+    f"RK4{TURNED}": _by_tableau(RUNGE_KUTTA_4, _rates),
+    "RK4 on rotation vectors (Munthe-Kaas)": _by_tableau(RUNGE_KUTTA_4, _vector_rates),
 }
 
 

@@ -137,8 +137,8 @@ def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options
             reason = MOVES
         elif horizon and "angles" in kind and options.euler is None:
             reason = HORIZON
-        if reason or members[0] in layout.unused:
-            layout.unused |= {name: reason or layout.unused[name] for name in members}
+        if reason:
+            layout.unused |= dict.fromkeys(members, reason)
             del chosen[kind]
 
 

@@ -87,9 +87,9 @@ class Recording:
 
 
 def read(path: Path, options: Options) -> Recording:
-    """Return the motion in a file: CSV, STK attitudes, Parquet or JSON lines, gzipped or not. Every row is checked, in chunks.
+    """Return the motion in a file: CSV or JSON lines. Every row is checked, in chunks.
 
-    Raises `BadInput` for files, columns, options and rows that cannot be used, and `MissingEngine` for Parquet without pyarrow.
+    Raises `BadInput` for files, columns, options and rows that cannot be used.
     """
     return read_all([path], options)[0]
 
@@ -111,7 +111,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
     if start is not None and end is not None and not start < end:
         raise BadInput("until", f"{end:g}, not after {start:g} s", "a time after the first one, s")
     table = open_table(path)
-    layout = choose(path, Layout(table.names, unused=dict(table.unused)), options)
+    layout = choose(path, Layout(table.names), options)
     if options.world and layout.used["rates"] and layout.attitude is None:
         raise BadInput(
             "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
-from conservative.flight import rotation_only
+from conservative.presentation import number
 from conservative.scene import Scene
 
 from ..compare import Compared, differ
@@ -86,7 +86,7 @@ def verify_two(
     for name, recording in sorted((first, second), key=_missing):
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
         try:
-            rows[name] = prepare(rotation_only(started), recording, from_row, error)
+            rows[name] = prepare(started.rotation_only, recording, from_row, error)
             made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
         except BadInput as refused:
             if refused.argument != "run" or name in str(refused.got):
@@ -117,7 +117,7 @@ def verify_two(
 
 def _reason(a: Verification, b: Verification, found: Difference) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    size = "" if found.missing else f"{found.error[found.worse]:.2g} {UNITS[found.worse]}"
+    size = "" if found.missing else f"{number(found.error[found.worse])} {UNITS[found.worse]}"
     both = (a.verdict, b.verdict)
     (one,), (other,) = a.findings, b.findings
     if both == (Verdict.RIGHT, Verdict.RIGHT):

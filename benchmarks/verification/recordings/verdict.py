@@ -12,8 +12,8 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
-from conservative.flight import rotation_only
 from conservative.invariants import find_energy, kinetic_energy, sizes
+from conservative.presentation import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -42,7 +42,7 @@ class Unit(NamedTuple):
 
     def show(self, error: float) -> str:
         """Return an error as a number with its unit."""
-        return f"{error * self.size:.2g} {self.name}"
+        return f"{number(error * self.size)} {self.name}"
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def verify_recording(
         got = describe(error) if real_number(error) is None else f"{error:g}"
         raise BadInput("error", got, "a finite number of 1e-12 or more, which the exact motion is rounded to")
     name = name or (recording.path.name if recording.path else "recording")
-    rows = prepare(rotation_only(scene), recording, from_row, error)
+    rows = prepare(scene.rotation_only, recording, from_row, error)
     recording, notes = rows.recording, rows.notes
     tell("compare")
     found = compare(rows.case, recording, from_row)
@@ -267,10 +267,10 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
 
 
 def _single_rows(found: Comparison) -> Explanation:
-    number, at, size = found.outliers[0]
+    row, at, size = found.outliers[0]
     unit = UNITS[int(np.argmax(found.worst.max(axis=1)))]
-    text = f"Single rows are off, the first of them row {number:,} at {at:g} s, by {size:.2g} {unit}; the others agree"
-    values = {"row": float(number), "time": at, "error": size}
+    text = f"Single rows are off, the first of them row {row:,} at {at:g} s, by {number(size)} {unit}; the others agree"
+    values = {"row": float(row), "time": at, "error": size}
     return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
 

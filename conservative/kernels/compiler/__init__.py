@@ -1,27 +1,43 @@
-"""The compilation of kernels, which relies on internals of numba and llvmlite; README.md in this folder lists them."""
+"""One source for one body and for several, compiled by `njit`.
+
+`traced` runs a function without branches once with symbols, and emits LLVM instructions for one float or for one float per body
+(`lanes`). `vector` has the arithmetic of `conservative.arithmetic` in this form, `series` the recurrences of Taylor series, and
+`signals` is Ctrl-C during a kernel. Written as loops over arrays for `njit`, a Taylor step of order 12 of a heavy body takes
+2.6 times as long, and 5 times as long as in lanes.
+
+Numba and llvmlite do not document these parts, and have no other way to do the same. If one changes, importing or compiling a
+kernel raises:
+
+* `traced`, `lanes`: `cpu_target.target_context` with `get_value_type`, `make_tuple`, `make_array`, `codegen().magic_tuple()`;
+  `numba.core.cgutils`; `types.BaseTuple.from_types`, `types.BaseNamedTuple.instance_class`.
+* `signals`, `kernels.function_field`: `context.get_python_api` with `gil_ensure`, `gil_release`, `pyobj` and `decref`;
+  `context.call_conv.return_exc`; `context.insert_const_string`.
+* `kernels`: `Dispatcher.stats.cache_path`, `Dispatcher._cache.save_overload`, `global_compiler_lock`, and that an index of
+  cached code is a file `*.nbi`.
+"""
 
 from __future__ import annotations
 
-import re
-import warnings
+from functools import partial
+from typing import Any
 
-import numba
 from numba import config
+from numba.extending import register_jitable
 
 COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
 """True if kernels are machine code, False if they are plain Python."""
 
-TRIED = (0, 63), (0, 68)
-"""Oldest and newest version of numba that the tests have passed with. A version of numba comes with one version of llvmlite."""
 
-LINKED = COMPILED and TRIED[0] <= tuple(map(int, re.findall(r"\d+", numba.__version__)[:2])) <= TRIED[1]
-"""True if kernels rely on parts of numba that it does not document, False if they are compiled by `njit` alone."""
+def kernel(function: Any, **options: Any) -> Any:
+    """Compile a function that only kernels call, with `options` of `njit`. In Python it does not change.
 
-if COMPILED and not LINKED:
-    _oldest, _newest = (".".join(map(str, version)) for version in TRIED)
-    warnings.warn(
-        f"numba {numba.__version__} is not one of the tried versions {_oldest} to {_newest}. Results agree to "
-        f"round-off, but compiling takes up to 2.2 times as long. To avoid this, run: pip install 'numba=={_newest}.*'",
-        RuntimeWarning,
-        stacklevel=2,
-    )
+    IEEE arithmetic as written: no fastmath, as compensated sums must survive.
+    """
+    return register_jitable(error_model="numpy", **options)(function) if COMPILED else function
+
+
+SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
+"""Options of small functions in inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
+
+small: Any = partial(kernel, **SMALL)
+"""Compile a small function in an inner loop. Contraction is safe in compensated sums: they have no product to contract with."""

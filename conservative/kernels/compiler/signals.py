@@ -11,8 +11,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from . import COMPILED
-from .parts import kernel
+from . import COMPILED, kernel
 
 
 @intrinsic

@@ -1,4 +1,10 @@
-"""Coefficients of explicit Runge-Kutta methods. Tests check the order conditions."""
+"""Explicit Runge-Kutta methods: a tableau and an order each. Tests check the order conditions.
+
+Three steppers take them, for three paths of data. `kernels.projected.take_step` skips the zeros of `packed`, of which
+`DORMAND_PRINCE_8` has 20 among 78 coefficients. `kernels.textbook.runge_kutta_step` turns the body by exponentials, because
+rotations do not add up. The search for integrators in `benchmarks/verification/mistakes/steps.py` steps many
+states at once by any slope.
+"""
 
 from __future__ import annotations
 
@@ -84,6 +90,13 @@ DORMAND_PRINCE_8 = ExplicitTableau(
 )
 """Twelve stages of order 8 with small error constants; made for steps of adaptive length, used here with constant ones."""
 
+EULER = ExplicitTableau(source="Euler 1768", order=1, A=((),), b=(1.0,))
+MIDPOINT = ExplicitTableau(source="Runge 1895", order=2, A=((), (0.5,)), b=(0.0, 1.0))
+HEUN = ExplicitTableau(source="Heun 1900", order=2, A=((), (1.0,)), b=(0.5, 0.5))
+RALSTON = ExplicitTableau(source="Ralston 1962", order=2, A=((), (2 / 3,)), b=(0.25, 0.75))
+KUTTA_3 = ExplicitTableau(source="Kutta 1901", order=3, A=((), (0.5,), (-1.0, 2.0)), b=(1 / 6, 2 / 3, 1 / 6))
+HEUN_3 = ExplicitTableau(source="Heun 1900", order=3, A=((), (1 / 3,), (0.0, 2 / 3)), b=(0.25, 0.0, 0.75))
+SHU_OSHER_3 = ExplicitTableau(source="Shu & Osher 1988", order=3, A=((), (1.0,), (0.25, 0.25)), b=(1 / 6, 1 / 6, 2 / 3))
 RUNGE_KUTTA_4 = ExplicitTableau(
     source="Kutta 1901", order=4, A=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), b=(1 / 6, 1 / 3, 1 / 3, 1 / 6)
 )

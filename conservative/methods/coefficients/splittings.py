@@ -11,8 +11,7 @@ import itertools
 from fractions import Fraction
 from typing import NamedTuple
 
-from ...check import choice
-from .compositions import COMPOSITIONS, composition_of
+from .compositions import composition_of
 
 Lengths = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 """Rotations, and the kicks after each of them, relative to the step; the first rotation or the last kick can be 0."""
@@ -40,35 +39,34 @@ class Sequence(NamedTuple):
 
 
 SEQUENCES = {
-    "blanes_moan_6": Sequence(
-        4,
-        "Blanes & Moan 2002, SRKN6b",
-        True,
-        "0.0829844064174052 0.245298957184271 0.3963098014983680 0.604872665711080 -0.0390563049223486",
-    ),
-    "blanes_moan_14": Sequence(
-        6,
-        "Blanes & Moan 2002, SRKN14a",
-        False,
-        "0.0378593198406116 0.09171915262446165 0.102635633102435 0.183983170005006 -0.0258678882665587 -0.05653436583288827 "
-        "0.314241403071447 0.004914688774712854 -0.130144459517415 0.143761127168358 0.106417700369543 0.328567693746804 "
-        "-0.00879424312851058",
-    ),
+    each.order: each
+    for each in (
+        Sequence(
+            4,
+            "Blanes & Moan 2002, SRKN6b",
+            True,
+            "0.0829844064174052 0.245298957184271 0.3963098014983680 0.604872665711080 -0.0390563049223486",
+        ),
+        Sequence(
+            6,
+            "Blanes & Moan 2002, SRKN14a",
+            False,
+            "0.0378593198406116 0.09171915262446165 0.102635633102435 0.183983170005006 -0.0258678882665587 "
+            "-0.05653436583288827 0.314241403071447 0.004914688774712854 -0.130144459517415 0.143761127168358 "
+            "0.106417700369543 0.328567693746804 -0.00879424312851058",
+        ),
+    )
 }
-"""Sequences by name, at most one of an order. Their errors on random bodies are below a twentieth (order 4) and a thousandth
-(order 6) of those of the best composition with the same step."""
+"""Sequences by order. Their errors on random bodies are below a twentieth (order 4) and a thousandth (order 6) of those of the
+composition with the same step."""
 
 
-def lengths_of(order: int, name: str | None, exact: bool) -> Lengths:
-    """Return the lengths of a sequence, or of a composition of half a kick, a rotation and half a kick.
+def lengths_of(order: int, exact: bool) -> Lengths:
+    """Return the lengths of a sequence if rotations are `exact` and there is one, else of a composition of order 2.
 
-    `name` is that of either; None for the most accurate one of the order, which is a sequence only if rotations are `exact`.
-    Raise `BadInput` if there is none of this order, or none of this name that has this order.
+    A step of order 2 is half a kick, a rotation and half a kick. Raise `BadInput` if there is none of this order.
     """
-    found = [known for known in SEQUENCES if exact and SEQUENCES[known].order == order]
-    if found and name in (None, *found):
-        return SEQUENCES[found[0]].lengths
-    if found:
-        choice("composition", name, (*found, *(known for known in COMPOSITIONS if COMPOSITIONS[known].order == order)))
-    weights = (Fraction(0), *composition_of(order, name).weights, Fraction(0))
+    if exact and order in SEQUENCES:
+        return SEQUENCES[order].lengths
+    weights = (Fraction(0), *composition_of(order).weights, Fraction(0))
     return weights[:-1], tuple((a + b) / 2 for a, b in itertools.pairwise(weights))

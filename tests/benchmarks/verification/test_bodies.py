@@ -1,5 +1,6 @@
 """The bodies of model files, the bodies that engines make of them, and the mistakes between the two."""
 
+import csv
 import json
 import shlex
 import sys
@@ -411,11 +412,11 @@ def test_newton_turned_inertia_on_one_side_until_1_1():
 
 def test_every_rule_of_the_formats_has_a_model_and_every_model_a_rule():
     """132 rules."""
-    rows = [line.strip("|").split("|") for line in (CATALOGUE.parent / "rules.md").read_text().splitlines() if line[:2] == "| "]
-    rules = [(kind.strip(), models.split(", ")) for kind, _, models in rows[2:]]
-    named = [model.strip() for _, models in rules for model in models]
+    with (CATALOGUE.parent / "rules.csv").open(newline="") as file:
+        rules = [(row["format"], row["models"].split(", ")) for row in csv.DictReader(file)]
+    named = [model for _, models in rules for model in models]
     assert sorted(named) == sorted(path.name for path in TRAPS)
     assert {kind: sum(kind == each for each, _ in rules) for kind, _ in rules} == {"URDF": 31, "SDF": 34, "MJCF": 34, "USD": 33}
     suffixes = {"URDF": ".urdf", "SDF": ".sdf", "MJCF": ".xml", "USD": ".usda"}
-    assert all(model.strip().endswith(suffixes[kind]) for kind, models in rules for model in models)
+    assert all(model.endswith(suffixes[kind]) for kind, models in rules for model in models)
     assert all(Path(path).stat().st_size < 5000 for path in TRAPS)

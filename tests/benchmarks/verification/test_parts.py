@@ -18,7 +18,6 @@ from conservative.benchmarks.verification.recordings.formats import table as for
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
-from conservative.flight import rotation_only
 from conservative.grid import Grid
 from conservative.potentials.turning import Orbit
 from conservative.references import truth
@@ -225,7 +224,7 @@ def test_missing_parts_are_named_together():
 
 @pytest.mark.parametrize("name", registry.list_scenes())
 def test_the_right_motion_of_every_scene_is_right(name):
-    scene = rotation_only(registry.scene(name))
+    scene = registry.scene(name).rotation_only
     grid = Grid(min(scene.t_end, 40 / (np.linalg.norm(scene.w_WB_B0) or 1.0)) / 60, 60)
     right = truth.solve(scene, grid)
     # From the start of the scene: separatrices amplify the round-off of the first row to 1 rad.

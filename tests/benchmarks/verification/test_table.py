@@ -7,8 +7,10 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from conservative.benchmarks.verification.recordings.formats import GONE
 from conservative.benchmarks.verification.recordings.table import ROWS, Options, read, read_all
-from conservative.errors import BadInput
+from conservative.benchmarks.verification.verify import verify
+from conservative.errors import REMOVED, BadInput
 
 from .made import FREE, T, exact
 
@@ -85,12 +87,6 @@ def test_the_same_motion_in_other_columns(name, ending, tmp_path):
     np.testing.assert_allclose(recording.data[1], W, atol=1e-12)
 
 
-def test_parquet(tmp_path):
-    pytest.importorskip("pyarrow")
-    pd.DataFrame(TABLES["wxyz"][0]).to_parquet(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(load(tmp_path / "run.parquet").data[1], W)
-
-
 def test_the_columns_of_nesc(tmp_path):
     names = [f"bodyAngularRateWrtEi_deg_s_{axis}" for axis in ("Yaw", "Roll", "Pitch")]
     angles = {f"eulerAngle_deg_{axis}": EULER[:, i] for i, axis in enumerate(("Yaw", "Pitch", "Roll"))}
@@ -150,25 +146,22 @@ def test_logs_are_read_without_options(name, tmp_path):
     assert w is None if name in ("EuRoC ground truth", "axis and angle") else np.allclose(w, RATE, rtol=0, atol=1e-12)
 
 
-MESSAGES = {
-    "TUM": "# timestamp tx ty tz qx qy qz qw\n{t:.9f} 0 0 0 {q[0]:.15f} {q[1]:.15f} {q[2]:.15f} {q[3]:.15f}\n",
-    "CCSDS": "CCSDS_AEM_VERS = 1.0\nMETA_START\nATTITUDE_DIR = A2B\nATTITUDE_TYPE = QUATERNION\nQUATERNION_TYPE = LAST\n"
-    "META_STOP\nDATA_START\n2020-01-01T00:00:{t:012.9f} {q[0]:.15f} {q[1]:.15f} {q[2]:.15f} {q[3]:.15f}\nDATA_STOP\n",
-    "STK, matrices to body axes": "stk.v.11.0\nBEGIN Attitude\nCoordinateAxes J2000\nAttitudeTimeDCM\n{t:.9f} "
-    "{C[0]:.15f} {C[1]:.15f} {C[2]:.15f} {C[3]:.15f} {C[4]:.15f} {C[5]:.15f} {C[6]:.15f} {C[7]:.15f} {C[8]:.15f}\n"
-    "END Attitude\n",
-}
-
-
-@pytest.mark.parametrize("name", MESSAGES)
-def test_formats_with_a_header_of_their_own(name, tmp_path):
-    lines = MESSAGES[name].splitlines(keepends=True)
-    row = next(line for line in lines if "{" in line)
-    rows = [row.format(t=t, q=q, C=R.T.ravel()) for t, q, R in zip(TIMES, QUATERNION, NEAR, strict=True)]
-    (tmp_path / "log.a").write_text("".join(each if each != row else "".join(rows) for each in lines))
-    recording = load(tmp_path / "log.a")
-    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=5e-7)  # dates have 2e-7 s as their last bit
+def test_tum_has_its_header_in_a_comment(tmp_path):
+    rows = np.column_stack([TIMES, np.zeros((len(TIMES), 3)), QUATERNION])
+    np.savetxt(tmp_path / "log.txt", rows, "%.15f", " ", header="timestamp tx ty tz qx qy qz qw")
+    recording = load(tmp_path / "log.txt")
+    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=1e-14)
     np.testing.assert_allclose(recording.data[0], NEAR, atol=1e-14)
+
+
+@pytest.mark.parametrize("beginning", GONE)
+def test_a_format_that_is_gone_is_answered_with_what_to_do(beginning, tmp_path):
+    file = tmp_path / f"run{GONE[beginning]}"
+    file.write_bytes(beginning + b"\n0 1 2 3\n1 1 2 3\n")
+    for subject in (file, tmp_path):  # a file, and a folder with it
+        with pytest.raises(BadInput) as error:
+            verify(str(subject), "brick_flip")
+        assert error.value.allowed == REMOVED[GONE[beginning]]
 
 
 def test_the_message_offers_the_columns_that_differ_by_their_axes(tmp_path):

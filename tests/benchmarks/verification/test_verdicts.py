@@ -1,6 +1,5 @@
 """Files of other programs, with noise, few digits and mistakes. Motions are closed forms, and steps are own loops."""
 
-import gzip
 import json
 import re
 
@@ -14,7 +13,7 @@ from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict as verdicts
 from conservative.benchmarks.verification.recordings.formats.table import CHUNK
 from conservative.benchmarks.verification.recordings.table import Options, Recording, read
-from conservative.benchmarks.verification.recordings.verdict import verify_recording
+from conservative.benchmarks.verification.recordings.verdict import Unit, verify_recording
 from conservative.errors import BadInput
 from conservative.references.exact.method import free_body
 
@@ -84,12 +83,6 @@ LAYOUTS = {
     "Basilisk": (table("t,sigma_1,sigma_2,sigma_3,omega_1,omega_2,omega_3", T, Q[:, 1:] / (1 + Q[:, :1]), W), {}),
     "rotation vectors": (table("t,rx,ry,rz,w_x,w_y,w_z", T, Rotation.from_matrix(R).as_rotvec(), W), {}),
     "units in a second line": (table("t,w_x,w_y,w_z\ns,rad/s,rad/s,rad/s", T, W), {}),
-    "STK": (
-        "stk.v.12.0\nBEGIN Attitude\nCoordinateAxes ICRF\nAttitudeTimeQuaternions\n"
-        + table("", T, Q[:, [1, 2, 3, 0]], separator=" ")
-        + "END Attitude\n",
-        {},
-    ),
 }
 
 
@@ -122,11 +115,10 @@ def test_a_file_that_is_not_clear_is_one_sentence_with_the_remedy(name, tmp_path
     assert expected in str(error.value)
 
 
-def test_byte_order_marks_line_ends_and_gzip_are_read(tmp_path):
+def test_byte_order_marks_and_line_ends_are_read(tmp_path):
     text = "\ufeff" + LAYOUTS["phyphox"][0].replace("\n", "\r\n")
-    with gzip.open(tmp_path / "run.csv.gz", "wt", encoding="utf-8", newline="") as stream:
-        stream.write(text)
-    assert verify_recording(SCENE, read(tmp_path / "run.csv.gz", Options())).verdict == "right"
+    (tmp_path / "run.csv").write_bytes(text.encode())
+    assert verify_recording(SCENE, read(tmp_path / "run.csv", Options())).verdict == "right"
 
 
 @pytest.mark.parametrize("error", [float("nan"), -1.0, 0.0, "abc", True])
@@ -329,3 +321,10 @@ def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_
     moved, rates = free_body(SCENE.body, np.eye(3), W0, np.maximum(T + np.append(0, jitter[1:]), 0))
     assert verdict(T, moved, rates).verdict == "wrong"
     assert verdict(T, moved, rates, error=0.05).verdict == "right"  # measured: an error of 0.006
+
+
+@pytest.mark.parametrize(
+    ("unit", "error", "text"), [(("degrees", 57.3), 2.8, "160 degrees"), (("rad", 1.0), 1.23e-9, "1.2e-9 rad")]
+)
+def test_an_error_is_a_plain_number_with_its_unit(unit, error, text):
+    assert Unit(*unit).show(error) == text

@@ -11,8 +11,9 @@ from conservative.benchmarks.versions import version
 from conservative.benchmarks.versions.version import install_version
 from conservative.errors import BadInput
 from conservative.references.environments import projects
-from conservative.references.environments.environment import Environment, folder_of_projects
-from conservative.references.environments.lock import Source
+from conservative.references.environments.environment import Environment
+from conservative.references.environments.folders import folder_of_projects
+from conservative.references.environments.kind import Source
 from conservative.reports.cli.main import main
 
 from ...environments import PATIENCE, ROOT

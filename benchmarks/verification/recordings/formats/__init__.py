@@ -6,7 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from . import delimited, json_lines, messages, parquet
+from conservative.errors import REMOVED, BadInput
+
+from . import delimited, json_lines
 from .table import Start, Table
 
 
@@ -22,19 +24,22 @@ class Format(NamedTuple):
 
 
 FORMATS = (
-    Format("Parquet", (".parquet",), parquet.read),
     Format("JSON lines", (".jsonl", ".ndjson", ".json"), json_lines.read),
-    Format("STK attitudes", (".a",), messages.read),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat"), delimited.read),
 )
 """The families; the first one that returns a table counts."""
-ENDINGS = tuple(f"{ending}{packed}" for each in FORMATS for ending in each.endings for packed in ("", ".gz"))
-"""Endings of recordings, plain and compressed."""
+GONE = {b"PAR1": ".parquet", b"\x1f\x8b": ".gz", b"stk.v": ".a", b"CCSDS_AEM_VERS": ".aem"}
+"""Beginnings of files in formats that are gone, and their endings."""
+ENDINGS = (*(ending for each in FORMATS for ending in each.endings), *GONE.values())
+"""Endings of recordings in folders. A file in a format that is gone is refused there, and not left out."""
 
 
 def open_table(path: Path) -> Table:
     """Return the table of a file. Raises `BadInput` for a file without one."""
     start = Start(path, ", ".join(f"{each.name} ({each.endings[0]})" for each in FORMATS))
+    for beginning, ending in GONE.items():
+        if start.head.startswith(beginning):
+            raise BadInput("run", f"{path}, of the format {ending}", REMOVED[ending])
     for each in FORMATS:
         if (table := each.read(start)) is not None:
             return table

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 import warnings
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from types import MappingProxyType
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 
@@ -25,21 +22,19 @@ CHUNK = 50_000  # rows that are read at a time
 LOOKED = 200  # lines among which the header and the first row of numbers are
 LONGEST = 1_000_000  # characters of a line, and of the lines that are looked at
 AT_ONCE = 64 * LONGEST  # characters that are read at a time
-UNREADABLE = OSError, ValueError, TypeError, EOFError, RecursionError, zlib.error
-"""Errors of files that are damaged, and of values such as JSON in a thousand brackets."""
+UNREADABLE = OSError, ValueError, TypeError, RecursionError
+"""Errors of files that cannot be read, and of values such as JSON in a thousand brackets."""
 
 
 @dataclass(frozen=True)
 class Table:
     """The table of a file: names of columns, and a function from some of these names to chunks of rows (n, columns).
 
-    The function raises `BadInput` for text in the place of a number; empty fields are nan. `unused` has reasons of columns that
-    the format defines and that cannot be compared.
+    The function raises `BadInput` for text in the place of a number; empty fields are nan.
     """
 
     names: list[str]
     rows: Callable[[Sequence[str]], Iterator[Array]]
-    unused: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True)
@@ -51,8 +46,17 @@ class Start:
 
     @property
     def ending(self) -> str:
-        """The ending of the name, lower case, without .gz."""
-        return (self.path.with_suffix("") if self.path.suffix == ".gz" else self.path).suffix.lower()
+        """The ending of the name, lower case."""
+        return self.path.suffix.lower()
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes."""
+        try:
+            with open_file(self.path) as stream:
+                return stream.read(32)
+        except UNREADABLE as error:
+            raise self.fail(error) from None
 
     @cached_property
     def lines(self) -> list[str]:
@@ -64,25 +68,19 @@ class Start:
             raise self.fail(error) from None
 
     def open(self) -> IO[str]:
-        """Open the file as text, gzipped or not."""
-        stream: Any = open_file(self.path)
-        packed = stream.read(2) == b"\x1f\x8b"
-        stream.seek(0)
-        if packed:  # a GzipFile closes only a file that it has opened itself
-            stream.close()
-            stream = gzip.GzipFile(self.path)
-        return TextIOWrapper(stream, encoding="utf-8-sig", errors="replace")
+        """Open the file as text."""
+        return TextIOWrapper(open_file(self.path), encoding="utf-8-sig", errors="replace")
 
     def fail(self, reason: object) -> BadInput:
         """Return the error of a file without a table."""
         text = (str(reason).strip().splitlines() or ["empty"])[0]
         return BadInput("run", f"{self.path} ({text})", f"a table: {self.formats}")
 
-    def parts(self, skip: int = 0, end: str | None = None, comments: bool = True) -> Iterator[list[str]]:
-        """Yield the lines behind the first ones, to one that begins with `end`, in parts; without empty lines and comments."""
+    def parts(self, skip: int = 0, comments: bool = True) -> Iterator[list[str]]:
+        """Yield the lines behind the first ones, in parts; without empty lines and comments."""
         try:
             with self.open() as stream:
-                yield from chunks(_wanted(islice(_each_line(stream), skip, None), end, comments), CHUNK, AT_ONCE)
+                yield from chunks(_wanted(islice(_each_line(stream), skip, None), comments), CHUNK, AT_ONCE)
         except UNREADABLE as error:
             raise self.fail(error) from None
 
@@ -92,12 +90,11 @@ class Start:
         wanted: Sequence[str],
         separator: str | None,
         skip: int,
-        end: str | None = None,
         comma: bool = False,
     ) -> Iterator[Array]:
         """Yield the numbers in some columns of lines whose fields are separated, by blanks if `separator` is None."""
         places, done = [names.index(name) for name in wanted], 0
-        for lines in self.parts(skip, end):
+        for lines in self.parts(skip):
             yield _parse(
                 self.path, [line.replace(",", ".") for line in lines] if comma else lines, separator, wanted, places, done
             )
@@ -120,10 +117,8 @@ def _each_line(stream: IO[str]) -> Iterator[str]:
         yield line
 
 
-def _wanted(lines: Iterable[str], end: str | None, comments: bool) -> Iterator[str]:
+def _wanted(lines: Iterable[str], comments: bool) -> Iterator[str]:
     for line in lines:
-        if end is not None and line.startswith(end):
-            return
         if line.strip() and not (comments and line.lstrip().startswith(("#", "%"))):
             yield line
 

@@ -1,4 +1,4 @@
-"""Locks: every package of an environment with its version and hashes, and the Python for it."""
+"""Environments of packages of Python: virtual environments that uv makes from a lock in the standard format, `pylock.toml`."""
 
 from __future__ import annotations
 
@@ -7,92 +7,86 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from conservative.errors import BadInput
 
-from .environment import LOCK, Distribution, interpreter_of, version_key
+from ..worker import program
+from .kind import Distribution, EnvironmentKind, Lock, Source, version_key
 from .uv_command import UvFailed, run_uv
 
 _PYTHONS = ("3.14", "3.13", "3.12", "3.11", "3.10", "3.9")  # those that the worker supports
+_COMPILE = ("pip", "compile", "--quiet", "--no-header", "--format", "pylock.toml", "--generate-hashes")
 
 
 @dataclass(frozen=True)
-class Source:
-    """Source of packages.
+class Pip(EnvironmentKind):
+    """A virtual environment."""
 
-    Attributes
-    ----------
-    find_links
-        A folder of wheels that replaces the index.
-    allow_build
-        True if a package without a wheel may be built, which runs its code.
-    """
+    name, lock_file, suffix = "python", "pylock.toml", ".py"
 
-    find_links: Path | None = None
-    allow_build: bool = False
+    def resolve(self, distribution: Distribution, version: str, source: Source) -> Lock:
+        """Return the lock of a version of an engine, by default the newest, with NumPy and its other requirements.
 
-    @property
-    def options(self) -> tuple[str, ...]:
-        """Command line options of uv."""
-        folder = () if self.find_links is None else ("--no-index", "--find-links", str(self.find_links))
-        return (*folder, *(() if self.allow_build else ("--only-binary", ":all:")))
+        The first Python on this machine for which there are wheels is used, starting with the running one. Raise `BadInput` if
+        there is no such version, no wheel of it for a Python on this machine, or no network.
+        """
+        package = distribution.package
+        pin = f"=={version}" if version else f">={distribution.oldest}" if distribution.oldest else ""
+        python, text = _compile(distribution, package + pin, version, source)
+        return Lock(versions_in(text)[normal_name(package)], text, python)
 
+    def fill(self, folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
+        python = interpreter_of(folder)
+        run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
+        options = ("--quiet", "--require-hashes", "--python", python)
+        run_uv("pip", "sync", *options, *source.options, folder / self.lock_file)
+        packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
+        ask = [str(python), "-I", "-c", "import platform; print('Python', platform.python_version())"]
+        return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip(), packages
 
-@dataclass(frozen=True)
-class Lock:
-    """The contents of an environment.
+    def list_versions(self, package: str, source: Source) -> list[str]:
+        if source.find_links is not None:
+            names = (path.name.split("-") for path in source.find_links.glob("*.whl"))
+            versions = {parts[1] for parts in names if normal_name(parts[0]) == normal_name(package)}
+            return sorted(versions, key=version_key, reverse=True)
+        options = () if source.allow_build else ("--only-binary=:all:",)
+        try:
+            listing = run_uv("tool", "run", "--quiet", "pip", "index", "versions", package, *options)
+        except UvFailed:
+            return []
+        line = re.search(r"Available versions: (.+)", listing)
+        return line[1].split(", ") if line else []
 
-    Attributes
-    ----------
-    version
-        Version of the engine.
-    python
-        Path of the Python interpreter, unless the engine is in JavaScript.
-    text
-        Requirements with hashes, in the format of uv and pip; for engines in JavaScript, npm's `package-lock.json`.
-    """
+    def read_lock(self, folder: Path, version: str, runtime: str) -> Lock:
+        return replace(super().read_lock(folder, version, runtime), python=_find_python(runtime.partition(" ")[2]))
 
-    version: str
-    python: str
-    text: str
-
-
-def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
-    """Return the lock of a version of an engine, by default the newest, with NumPy and its other requirements.
-
-    The first Python on this machine for which there are wheels is used, starting with the running one. Raise `BadInput` if
-    there is no such version, no wheel of it for a Python on this machine, or no network.
-    """
-    package = distribution.package
-    pin = f"=={version}" if version else f">={distribution.oldest}" if distribution.oldest else ""
-    python, text = _compile(distribution, package + pin, version, source)
-    pinned = re.search(rf"^{re.escape(normal_name(package))}==([^\s\\;]+)", text, re.MULTILINE)
-    assert pinned is not None, text
-    return Lock(pinned[1], python, text)
+    def command(self, folder: Path) -> tuple[str | Path, ...]:
+        return interpreter_of(folder), "-I", program.__file__
 
 
-def fill(folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-    """Create a virtual environment from a lock. Return the runtime of the engine, such as `Python 3.11.4`, and its packages."""
-    python = interpreter_of(folder)
-    run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
-    options = ("--quiet", "--require-hashes", "--python", python)
-    run_uv("pip", "sync", *options, *source.options, folder / LOCK)
-    packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
-    ask = [str(python), "-I", "-c", "import platform; print('Python', platform.python_version())"]
-    return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip(), packages
+def interpreter_of(folder: Path) -> Path:
+    """Return the Python of a virtual environment."""
+    return folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def versions_in(lock: str) -> dict[str, str]:
+    """Return the versions of all packages in the text of a lock, by their normal names."""
+    return {each["name"]: each["version"] for each in tomllib.loads(lock)["packages"]}
 
 
 def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source: Source) -> Lock:
-    """Return the lock of a wheel of an engine, under a version of our own. Raise as `resolve`."""
-    return Lock(version, *_compile(distribution, f"{distribution.package} @ {wheel.as_uri()}", version, source))
+    """Return the lock of a wheel of an engine, under a version of our own. Raise as `Pip.resolve`."""
+    python, text = _compile(distribution, f"{distribution.package} @ {wheel.as_uri()}", version, source)
+    return Lock(version, text, python)
 
 
 def _compile(distribution: Distribution, requirement: str, version: str, source: Source) -> tuple[str, str]:
-    """Return the path of the first Python for which there are wheels, and all requirements with their hashes."""
+    """Return the path of the first Python for which there are wheels, and the text of the lock."""
     package, requirements = distribution.package, "\n".join([requirement, "numpy", *distribution.requirements])
     name, tried = f"{package}=={version}" if version else package, []
     for python, path in _pythons():
@@ -111,12 +105,9 @@ def _compile(distribution: Distribution, requirement: str, version: str, source:
     raise BadInput("version", f"{name!r}, which has no wheel for Python {' or '.join(tried)}", needs)
 
 
-_COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--generate-hashes")
-
-
 def _as_bad_input(package: str, name: str, version: str, failure: UvFailed, source: Source) -> BadInput:
     if failure.says("there is no version of", "there are no versions of"):
-        newest = sorted(list_versions(package, source), key=version_key, reverse=True)
+        newest = sorted(Pip().list_versions(package, source), key=version_key, reverse=True)
         if not newest:
             return BadInput("version", repr(name), "a version that exists")
         nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
@@ -134,7 +125,7 @@ def normal_name(package: str) -> str:
     return re.sub(r"[-_.]+", "-", package.partition("[")[0]).lower()
 
 
-def find_python(version: str) -> str:
+def _find_python(version: str) -> str:
     """Return the path of a Python with the major and minor number of a version, by default of the running Python."""
     return dict(_pythons()).get(".".join(version.split(".")[:2]), sys.executable)
 
@@ -156,18 +147,3 @@ def _pythons() -> Iterator[tuple[str, str]]:
     installed = [entry for entry in listing if entry.get("path") and entry.get("implementation") == "cpython"]
     others = {".".join(entry["version"].split(".")[:2]): entry["path"] for entry in installed}
     yield from ((python, others[python]) for python in _PYTHONS if python in others and python != ours)
-
-
-def list_versions(package: str, source: Source) -> list[str]:
-    """Return the versions of a package with wheels, newest first; empty if the source does not list them."""
-    if source.find_links is not None:
-        names = (path.name.split("-") for path in source.find_links.glob("*.whl"))
-        versions = {parts[1] for parts in names if normal_name(parts[0]) == normal_name(package)}
-        return sorted(versions, key=version_key, reverse=True)
-    options = () if source.allow_build else ("--only-binary=:all:",)
-    try:
-        listing = run_uv("tool", "run", "--quiet", "pip", "index", "versions", package, *options)
-    except UvFailed:
-        return []
-    line = re.search(r"Available versions: (.+)", listing)
-    return line[1].split(", ") if line else []

@@ -1,25 +1,25 @@
-"""The rows of the table of calls: what studies time of an engine, and the shortest correct script that a user would write.
+"""What studies time of an engine against the shortest correct script that a user would write, and the ratio of their times.
 
-The scripts are here, independent of the adapters. Each body is the brick, in principal axes, and a run is one step, or what
+The scripts are independent of the adapters. Each body is the brick, in principal axes, and a run is one step, or what
 an adaptive solver needs for `SHORT` s. Both sides are prepared `COPIES` times, because the place of data in memory makes a
 loop several percent slower for the life of a process; the fastest counts.
 """
 
 from __future__ import annotations
 
-import datetime
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures.timing import time_interleaved
 from conservative.grid import Grid
 
 SHORT, STEP, COPIES, ROUNDS = 0.05, 0.01, 4, 200
+pytestmark = pytest.mark.attack
 SAMPLES = 20
-COMMAND = "python .ci/readme --calls"
 SCENE = registry.scene("brick_flip")
 MOMENTS, Q0, W0 = SCENE.body.moments, np.array([1.0, 0.0, 0.0, 0.0]), SCENE.w_WB_B0
 Script = Callable[[], Callable[[], Any]]
@@ -179,26 +179,29 @@ def prepare(method: str, grid: Grid) -> Callable[[], Any]:
     return own_loop
 
 
-def measure_calls(rounds: int = ROUNDS) -> dict[str, tuple[float, float]]:
-    """Return the times of a timed call and of the script, s. Raise AssertionError if a script has another final state."""
-    runs: dict[tuple[str, int, int], Callable[[], Any]] = {}
-    for name, (method, grid, script) in CALLS.items():
-        expected = registry.method(method).prepare(SCENE, grid)().w_WB_B
-        for copy in range(COPIES):
-            timed, written = prepare(method, grid), script()
-            found = np.array(written(), ndmin=2)[-1, -3:]
-            np.testing.assert_allclose(found, expected[-1] @ SCENE.body.R_BP, rtol=1e-12, atol=1e-12)
-            runs |= {(name, 0, copy): timed, (name, 1, copy): written}
-    timings = time_interleaved(runs, rounds, 1e-4)
-    least = lambda *key: min(timings[*key, copy].minimum for copy in range(COPIES))  # noqa: E731
-    return {name: (least(name, 0), least(name, 1)) for name in CALLS}
+def compare(name):
+    """Return the runs of an engine, timed and as a script. Raise AssertionError if their final states differ."""
+    method, grid, script = CALLS[name]
+    expected = registry.method(method).prepare(SCENE, grid)().w_WB_B
+    runs = {}
+    for copy in range(COPIES):
+        timed, written = prepare(method, grid), script()
+        found = np.array(written(), ndmin=2)[-1, -3:]
+        np.testing.assert_allclose(found, expected[-1] @ SCENE.body.R_BP, rtol=1e-12, atol=1e-12)
+        runs |= {("timed", copy): timed, ("script", copy): written}
+    return runs
 
 
-def call_rows(found: dict[str, tuple[float, float]]) -> Iterator[dict[str, Any]]:
-    """Yield the times of calls and scripts and their ratio."""
-    common = {"scene": "call", "version": "", "command": COMMAND, "date": datetime.date.today().isoformat()}
-    for name, (timed, script) in found.items():
-        common |= {"name": name, "method": CALLS[name][0]}
-        for quantity, value in (("timed call", 1e6 * timed), ("shortest script", 1e6 * script)):
-            yield common | {"quantity": quantity, "unit": "us", "value": value}
-        yield common | {"quantity": "ratio", "unit": "1", "value": timed / script}
+@pytest.mark.parametrize("name", CALLS)
+def test_a_timed_call_does_what_the_shortest_script_does(name, capsys):
+    timings = time_interleaved(compare(name), ROUNDS, 1e-4)
+    timed, script = (min(timings[side, copy].minimum for copy in range(COPIES)) for side in ("timed", "script"))
+    with capsys.disabled():
+        print(f"\n{name}: {1e6 * timed:.3g} us timed, {1e6 * script:.3g} us by the script, ratio {timed / script:.3g}")
+    assert min(timed, script) > 2e-7  # s: both make their run
+
+
+def test_a_script_with_another_step_is_found(monkeypatch):
+    monkeypatch.setitem(globals(), "STEP", 0.02)  # of the scripts only
+    with pytest.raises(AssertionError, match="Mismatched"):
+        compare("MuJoCo, a step of RK4")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[2]
 PART = re.compile(r"(<!-- generated ([\w ]+): python \.ci/readme -->\n)((?:(?!<!-- ).)*)(<!-- end -->\n)", re.DOTALL)
 
 
@@ -18,7 +21,20 @@ def fill(page: str, parts: Mapping[str, Callable[[], str]]) -> str:
     return PART.sub(lambda match: f"{match[1]}{parts[match[2]]()}{match[4]}", page)
 
 
-def table(header: list[str], rows: list[list[str]]) -> str:
+def table(header: list[str], rows: Iterable[list[str]]) -> str:
     """Return lines of cells as a table."""
     lines = [header, ["---"] * len(header), *rows]
     return "".join(re.sub(r"\|  (?=\|)", "| ", f"| {' | '.join(line)} |\n") for line in lines)
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def summary(text: str | None) -> str:
+    """Return the sentences that end in the first line of a docstring, or its first sentence if that is longer."""
+    first = (text or "").partition("\n\n")[0]
+    whole = re.match(r".*\.(?=\s|$)", first) or re.match(r".*?\.(?=\s|$)", first, re.DOTALL)
+    return " ".join((whole[0] if whole else first).split())

@@ -1,0 +1,51 @@
+"""Tables that count the rows of CSV files: what others published, bodies that engines load, and where mistakes are named."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+
+from pages import ROOT, read_csv, table
+
+FIGURES, SOURCES = (ROOT / "tests" / "data" / f"published_{name}.csv" for name in ("figures", "sources"))
+BODIES = ROOT / "references" / "model_files" / "measured.csv"
+MISTAKES = ROOT / "reports" / "documentation" / "mistakes.csv"
+LATE = 10
+"""Programs that print all digits of a double print their round-off too: figures that differ from here on are counted apart."""
+
+
+def count(title: str, columns: tuple[str, ...], cells: Iterable[tuple[str, str]]) -> str:
+    """Return a table that counts pairs of a row and a column, and nothing for 0."""
+    numbers: dict[str, Counter[str]] = {}
+    for row, column in cells:
+        for each in (row, "all"):
+            numbers.setdefault(each, Counter())[column] += 1
+    numbers["all"] = numbers.pop("all")
+    lines = [[row, *(str(line[column] or "") for column in columns)] for row, line in numbers.items()]
+    return table([title, *columns], lines)
+
+
+def figures() -> str:
+    """Return a row for each source of published figures."""
+    sources = {row["source"]: f"[{row['title']}]({row['link']})" if row["link"] else row["title"] for row in read_csv(SOURCES)}
+    late = lambda row: row["result"] == "differs" and int(row["digit"] or 0) >= LATE  # noqa: E731
+    cells = ((sources[row["source"]], "round-off" if late(row) else row["result"]) for row in read_csv(FIGURES))
+    return count("source", ("agrees", "round-off", "differs", "not measured"), cells)
+
+
+def bodies() -> str:
+    """Return a row for each engine that loads model files."""
+    cells = ((f"{row['engine']} {row['version']}", row["verdict"]) for row in read_csv(BODIES))
+    return count("engine", ("right", "wrong", "undecided"), cells)
+
+
+def mistakes() -> str:
+    """Return a row for each kind of subject in which mistakes were planted."""
+    answers = ("named", "with others", "another is named", "not named", "cannot be seen")
+    cells = [(door, cell) for row in read_csv(MISTAKES) for door, cell in row.items() if door != "mistake"]
+    short = ((door, cell if cell in answers else answers[2] if cell.startswith("as ") else answers[4]) for door, cell in cells)
+    return count("subject", answers, short)
+
+
+TABLES: dict[str, Callable[[], str]] = {"published figures": figures, "loaded bodies": bodies, "named mistakes": mistakes}
+"""Tables by the name of their mark."""
