@@ -130,7 +130,7 @@ def watch(
             Animation(motions, labels, outline, values).render, out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing")
         )
         lost = write(Document("conservative watch", body.name, []), out=draw).failures
-    notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != "ok"]
+    notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != work.RIGHT]
     failures = [] if any(run.ok for run, _ in runs) else [f"{run.label} on {body.name}: {run.outcome}" for run, _ in runs]
     where = "" if lost else f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html")
     blocks: list[Block] = [Paragraph(f"{where}{part}".strip()), *([Items.of(notes)] if notes else [])]

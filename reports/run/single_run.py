@@ -304,6 +304,9 @@ class Status(NamedTuple):
         return self.short + self.detail
 
 
+RIGHT = Status("ok")
+
+
 def status_of(summary: dict[str, Any]) -> Status:
     """Return the status of a run."""
     if not summary["outcome"].ok:
@@ -316,7 +319,7 @@ def status_of(summary: dict[str, Any]) -> Status:
         return Status("inaccurate", detail)
     if choice and not choice["reached"] and not summary["error"].get("attitude", math.inf) <= choice["error"]:
         return Status("less accurate than asked for", detail)
-    return Status("ok")
+    return RIGHT
 
 
 def bounded_grid(scene: Scene, dt: float | None, t_end: float | None) -> Grid:

@@ -9,6 +9,7 @@ from itertools import groupby
 
 import pandas as pd
 
+from conservative.benchmarks.measures.convergence_order import grows_with_shorter_steps
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.speed_ratio import cost
@@ -265,7 +266,9 @@ def _order(line: pd.DataFrame, expected: float) -> Cell:
     if math.isnan(expected):
         return numeric(math.nan)
     fit, order = of_measure(line, Measure.ORDER), _value(line, Measure.ORDER)
-    if len(fit) and fit["outcome"].iloc[0] == OutcomeKind.NO_ORDER and fit["reason"].iloc[0] == WORSE:
+    errors = of_measure(line, Measure.ATTITUDE_MAX)
+    without = len(fit) > 0 and fit["outcome"].iloc[0] == OutcomeKind.NO_ORDER
+    if without and grows_with_shorter_steps(errors["dt"].to_numpy(), errors["value"].to_numpy()):
         return Cell(f"{DASH} none ({expected:.0f}): {WORSE}", Grade.BAD)
     if math.isnan(order):
         return numeric(order, f"{DASH} not seen ({expected:.0f})")

@@ -77,7 +77,7 @@ class Description:
     @property
     def possible(self) -> bool:
         """True if a mass distribution has this inertia."""
-        return not find_impossible(np.linalg.eigvalsh(self.inertia))
+        return not find_impossible(np.asarray(np.linalg.eigvalsh(self.inertia), dtype=float))
 
     @property
     def scene(self) -> Scene:
