@@ -118,10 +118,19 @@ class _Sheet:
         """Fill a polygon (n, 2)."""
         self.pencil.polygon((points * self.scale).ravel().tolist(), colour)
 
-    def dot(self, at: Array, radius: float, colour: str) -> None:
-        """Fill a circle."""
-        x, y, r = at[0] * self.scale, at[1] * self.scale, radius * self.scale
-        self.pencil.ellipse((x - r, y - r, x + r, y + r), colour)
+    def ball(self, rod: Array) -> None:
+        """Draw a ball at the end of a rod (2, 2)."""
+        (x, y), r = rod[1] * self.scale, 2.4 * self.scale
+        self.pencil.ellipse((x - r, y - r, x + r, y + r), TRACE)
+
+    def head(self, shaft: Array) -> None:
+        """Draw the head of an arrow at the end of its shaft (2, 2)."""
+        along = shaft[1] - shaft[0]
+        length = float(np.linalg.norm(along))
+        if length > 1.0:
+            along = along / length
+            across = 3.6 * np.array([-along[1], along[0]])
+            self.fill(np.array([shaft[1] + 5 * along, shaft[1] - 4 * along + across, shaft[1] - 4 * along - across]), ARROW)
 
     def chip(self, x: float, y: float, colour: str) -> None:
         """Fill a small square, beside the text in the line at y."""
@@ -175,21 +184,23 @@ def _draw_panel(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int
         flat = np.stack([points @ _RIGHT, -points @ _UP], axis=-1) * (_FOCAL / depth)[..., None]
         return np.asarray(corner) + SIDE / 2 * (1 + flat)
 
-    frame = min(frame, len(panel.R_WP) - 1)
+    now, frame = frame, min(frame, len(panel.R_WP) - 1)  # a run that ended early stands still
     R, solid = panel.R_WP[frame], panel.solid
     arrow = panel.L_W[frame] * 1.45
     arrow = arrow * min(1.0, 1.45 * LONGEST_ARROW / max(float(np.linalg.norm(arrow)), 1e-300))
     trace, middle = panel.R_WP[: frame + 1] @ panel.tip, float(EYE @ (R @ solid.centre))
     # What is nearer to the eye than the middle of the body is drawn after it. Rod and arrow are drawn from where they leave it.
     rods = [np.stack([solid.leave(end @ R) * end, end]) for end in (trace[-1], arrow)]
-    strokes = [*((np.stack(pair), TRACE, 1.0) for pair in pairwise(trace)), (rods[0], TRACE, 2.0), (rods[1], ARROW, 2.4)]
-    nearer = [float(points.mean(axis=0) @ EYE) > middle for points, _, _ in strokes]
+    strokes: list[tuple[Array, str, float, Callable[[Array], None] | None]]
+    strokes = [*((np.stack(pair), TRACE, 1.0, None) for pair in pairwise(trace)), (rods[0], TRACE, 2.0, sheet.ball)]
+    strokes.append((rods[1], ARROW, 2.4, sheet.head))
+    nearer = [float(points.mean(axis=0) @ EYE) > middle for points, *_ in strokes]
     for after in (False, True):
-        for (points, colour, width), near in zip(strokes, nearer, strict=True):
+        for (points, colour, width, end), near in zip(strokes, nearer, strict=True):
             if near is after:
                 sheet.lines(seen(points), colour, width)
-                if colour == ARROW:
-                    _draw_head(sheet, seen(points), colour)
+                if end is not None:
+                    end(seen(points))
         if not after:
             for face in solid.faces:
                 world = face.corners @ R.T
@@ -198,23 +209,12 @@ def _draw_panel(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int
                     sheet.fill(seen(world), face.colour)
                     for edge in face.edges:
                         sheet.lines(seen(world[list(edge)]), INK, 0.6)
-    sheet.dot(seen(trace[-1:])[0], 2.4, TRACE)
     if exact is not None:
-        last = exact.R_WP[min(frame, len(exact.R_WP) - 1)]
+        last = exact.R_WP[min(now, len(exact.R_WP) - 1)]
         for face in exact.solid.faces:
             for edge in face.edges:
                 sheet.lines(seen(face.corners[list(edge)] @ last.T), OUTLINE, 0.8)
     _write_numbers(sheet, corner, panel, frame)
-
-
-def _draw_head(sheet: _Sheet, shaft: Array, colour: str) -> None:
-    """Draw the head of an arrow at the end of its shaft (2, 2)."""
-    along = shaft[1] - shaft[0]
-    length = float(np.linalg.norm(along))
-    if length > 1.0:
-        along = along / length
-        across = 3.6 * np.array([-along[1], along[0]])
-        sheet.fill(np.array([shaft[1] + 5 * along, shaft[1] - 4 * along + across, shaft[1] - 4 * along - across]), colour)
 
 
 def _write_numbers(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int) -> None:

@@ -268,12 +268,12 @@ def test_a_table_marks_inaccurate_runs_and_says_what_to_do_once():
 def test_samples_as_csv_equal_the_table_and_replace_their_own_file(tmp_path):
     file = tmp_path / "run.csv"
     for _ in range(2):
-        assert conservative("run", "lagrange_top", "--dt", "0.01", "--csv", file).exit_code == 0
-    table, other = pd.read_csv(file), cv.integrate(cv.scenes.lagrange_top(), dt=0.01).to_pandas()
+        assert conservative("run", "brick_flip", "--dt", "0.01", "--csv", file).exit_code == 0
+    table, other = pd.read_csv(file), cv.integrate(cv.scenes.brick_flip(), dt=0.01).to_pandas()
     assert {"t (s)", "q_WB_w", "w_WB_B_1 (rad/s)", "energy (J)", "momentum_W_3 (kg m^2/s)"} <= set(table.columns)
     np.testing.assert_array_equal(table, other)
     file.write_text("mine")
-    assert conservative("run", "lagrange_top", "--csv", file).exit_code == 2
+    assert conservative("run", "brick_flip", "--csv", file).exit_code == 2
 
 
 @pytest.mark.parametrize(
