@@ -12,9 +12,9 @@ import pytest
 def sampled(cases: Iterable[Any], size: int, keep: Iterable[Any] = ()) -> list[Any]:
     """Return the cases as parameters of pytest; those that are not in the sample of `size` cases carry the mark `slow`.
 
-    A case is a value, a tuple of values or a `pytest.param`. The sample is the same in each run. `keep` has cases that are in it.
-    Each further case adds the most values that the sample does not have yet, then the most pairs of values; of cases that add as
-    much, the one that is farthest from those before it in the list.
+    A case is a value, a tuple of values or a `pytest.param`. The sample is the same in each run, and has the cases of `keep`.
+    Each further case adds the most values that the sample does not have yet, then the most pairs of values; of cases that add
+    as much, it is the one farthest from its neighbours in the list.
     """
     params = [case if isinstance(case, type(pytest.param())) else pytest.param(*_values(case)) for case in cases]
     parts = [[(place, repr(value)) for place, value in enumerate(param.values)] for param in params]
