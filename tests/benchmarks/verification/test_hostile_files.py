@@ -19,6 +19,7 @@ from conservative.benchmarks.verification.recordings.formats.table import chunks
 from ...environments import PATIENCE
 from .made import FREE, T, exact
 
+pytestmark = pytest.mark.usefixtures("unnamed")
 R, W = exact(FREE)
 TURNS = Rotation.from_matrix(R)
 VECTORS = TURNS.as_rotvec()

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.benchmarks.verification.compare import Compared, allow
-from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import comparison, verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
@@ -23,9 +22,7 @@ SCALE = np.linalg.norm(W, axis=1).max()
 AXIS = np.array([0.6, -0.48, 0.64])
 
 
-@pytest.fixture(autouse=True)
-def no_search(monkeypatch):
-    monkeypatch.setattr(verdict, "diagnose", lambda *_: Diagnosis())
+pytestmark = pytest.mark.usefixtures("unnamed")
 
 
 def verify(R_WB=None, w=None, t=T, scene=SCENE, **about):
