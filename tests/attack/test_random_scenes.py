@@ -1,7 +1,7 @@
 """Random scenes over all that a scene can have, `integrate(error=)` against an independent truth.
 
-A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries four scenes, `pytest --all` ten, `pytest --attack` 400, and
-ATTACK_EFFORT times as many.
+A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries four scenes, `pytest --all` ten,
+`pytest --attack` 400, and ATTACK_EFFORT times as many.
 """
 
 from __future__ import annotations
