@@ -23,6 +23,7 @@ from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
 from conservative.references.worker.client import close_workers
 
 from ..environments import PATIENCE
+from ..sampling import sampled
 from .foreign_engines import Fast, Harmful, Slow
 from .generic_study import SCENE, truth
 
@@ -106,7 +107,9 @@ def test_a_method_that_cannot_be_sent_runs_here():
     assert isinstance(attempt_within(PATIENCE, Case("any", SCENE, Held(), grid_for(SCENE, 0.05))), Success)
 
 
-@pytest.mark.parametrize("name", ["paper", "convergence", "speed", "work_precision", "long_runs", "motion", "stability"])
+@pytest.mark.parametrize(
+    "name", sampled(["paper", "convergence", "speed", "work_precision", "long_runs", "motion", "stability"], 3)
+)
 def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     monkeypatch.setattr(study, "HANG_LIMIT", 0.5)
     monkeypatch.setattr(studies.stability, "FIRST_LIMIT", 0.5)

@@ -5,6 +5,8 @@ import pytest
 from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict
 
+from ...shared_reader import reading_worker, shared_reader  # noqa: F401
+
 
 @pytest.fixture
 def unnamed(monkeypatch):
