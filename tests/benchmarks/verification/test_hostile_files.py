@@ -17,6 +17,7 @@ from conservative.benchmarks.verification.recordings import table, verdict
 from conservative.benchmarks.verification.recordings.formats.table import chunks
 
 from ...environments import PATIENCE
+from ...sampling import sampled
 from .made import FREE, T, exact
 
 pytestmark = pytest.mark.usefixtures("unnamed")
@@ -52,7 +53,7 @@ def judged(folder, names, attitudes, rates=W, t=T):
         return verdict.verify_recording(FREE, recording, True, None, lambda *_: None).verdict == "right"
 
 
-@pytest.mark.parametrize("names", ATTITUDES)
+@pytest.mark.parametrize("names", sampled(ATTITUDES, 3, keep=["qw,qx,qy,qz", "axis_x,axis_y,axis_z,axis_angle"]))
 def test_attitudes_of_any_size(names, tmp_path):
     usual = ATTITUDES[names]
     assert judged(tmp_path, names, usual)

@@ -12,7 +12,7 @@ from conservative.references.exact.method import free_body
 from ...sampling import sampled
 
 AXES = Rotation.from_rotvec([0.5, -0.8, 0.4]).as_matrix()
-T = np.linspace(0, 20, 401)
+T = np.linspace(0, 20, 161)
 
 
 def scene(middle=10.0):
