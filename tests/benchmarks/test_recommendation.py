@@ -138,6 +138,7 @@ def satellite():
     return cv.Scene("satellite", cv.RigidBody(inertia), R_WB, (0.008, -0.006, 0.0173), 5400.0, potential=gradient)
 
 
+@pytest.mark.slow
 def test_the_error_asked_for_lies_between_two_probes_that_are_close():
     """On a satellite the first step, 160 s, loses the attitude, and the next one, 20 s, is at round-off."""
     scene = satellite()

@@ -13,6 +13,7 @@ from conservative.benchmarks.verification.recordings import comparison, verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
 
+from ...sampling import sampled
 from .made import exact
 
 SCENE = cv.Scene("tumbler", cv.RigidBody([2e-3, 6e-3, 7e-3]), np.eye(3), [0.2, 2.0, 0.3], 10.0)
@@ -48,8 +49,12 @@ def noise(size, n=501, seed=5):
     return size * SCALE * np.random.default_rng(seed).normal(size=(n, 3))
 
 
-@pytest.mark.parametrize("half", [1e-4, 3e-4])
-@pytest.mark.parametrize(("rows", "sizes"), [(300, (5.4, 6.6)), (slice(None), (2.3, 2.8))], ids=["largest", "mean"])
+LARGEST, MEAN = (300, (5.4, 6.6)), (slice(None), (2.3, 2.8))
+
+
+@pytest.mark.parametrize(
+    ("half", "rows", "sizes"), sampled([(half, *where) for half in (1e-4, 3e-4) for where in (LARGEST, MEAN)], 2)
+)
 def test_half_digits_in_the_largest_error_and_in_the_mean(half, rows, sizes):
     """Six in the largest error, and 1.3 sqrt(3) (1 + 3 / sqrt(n)) = 2.55 in the root of the mean square."""
     for size, expected in zip(sizes, ("right", "wrong"), strict=True):
