@@ -27,6 +27,7 @@ from conservative.references.worker.client import close_workers
 
 from ...environments import PATIENCE
 
+pytestmark = pytest.mark.usefixtures("shared_reader")
 GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
 TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
 

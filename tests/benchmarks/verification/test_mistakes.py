@@ -12,6 +12,7 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.verification.compare import Compared, compare_answers
 from conservative.benchmarks.verification.explain import PROGRAM_KINDS, diagnose
 from conservative.benchmarks.verification.mistakes import BY_KEY, habits, table_of
+from conservative.benchmarks.verification.mistakes.readings import READINGS, Reading
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.trials import compose
 from conservative.references.exact.method import free_body
@@ -207,6 +208,23 @@ def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key, rows):
     assert {name: abs(x) for name, x in found[0].values.items()} == pytest.approx(
         {name: abs(x) for name, x in values.items()}, rel=1e-6, abs=1e-9
     )
+
+
+@pytest.mark.parametrize("key", [each.key for each in READINGS])
+def test_what_a_reading_writes_it_reads_back(key):
+    reading = BY_KEY[key]
+    numbers = np.array([0.3, -0.8, 0.5])[: len(reading.numbers)]
+    written = reading.write(R[:20], W[:20], *numbers)
+    assert any(np.abs(a - b).max() > 0.1 for a, b in zip(written, (R[:20], W[:20]), strict=True))
+    for found, right in zip(reading.read(*written, *numbers), (R[:20], W[:20]), strict=True):
+        np.testing.assert_allclose(found, right, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("key", [key for key in RECORDED if isinstance(BY_KEY[key], Reading)])
+def test_a_reading_writes_the_rows_that_are_written_by_hand(key):
+    make, values = RECORDED[key]
+    for found, expected in zip(BY_KEY[key].write(R, W, *values.values()), make(), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
 
 
 def test_a_band_is_not_larger_than_what_it_removed_shows():
