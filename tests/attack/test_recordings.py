@@ -42,7 +42,7 @@ QUICK = (
     513, 517, 523, 525, 533, 536,
 )  # fmt: skip
 """Seeds of quick files of many kinds."""
-LONG = (3, 13, 20, 42, 50, 56, 63, 508, 517, 523, 525)
+LONG = (3, 13, 20, 32, 39, 42, 50, 56, 59, 63, 508, 510, 517, 523, 525)
 """Those of them that are left to --all."""
 FALSE = ("right called wrong", "wrong called right", "false proof")
 
