@@ -275,7 +275,7 @@ def select(folder, *selections):
 FEW = ("checks/test_one.py::TestFirst", "checks more -k kept", "checks more -m late", "checks more --ignore more/test_three.py")
 
 
-@pytest.mark.parametrize("selections", sampled([FEW, tuple(SELECTIONS)], 1), ids=["few", "all"])
+@pytest.mark.parametrize("selections", sampled([(FEW,), (tuple(SELECTIONS),)], 1), ids=["few", "all"])
 def test_rows_that_are_not_selected_are_not_missing(selections, tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --benchmark-max-time=0.001\nmarkers = late\n")
     for name, text in PARTS.items():
