@@ -41,7 +41,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("name", sampled(FAULTS, leave=[RK4]))
+@pytest.mark.parametrize("name", sampled(FAULTS, leave=[RK4, "body axes"]))
 def test_a_planted_fault_is_named(name):
     plant, values = FAULTS[name]
     found = diagnosed(FREE, *plant(FREE))
@@ -57,9 +57,7 @@ def test_two_mistakes_with_the_same_rows_are_both_named():
     assert {each.name for each in found.details.explaining} == {IMPLICIT, "implicit Euler"}
 
 
-@pytest.mark.parametrize(
-    "name", sampled(["time shift", "damping", "transposed", "body axes"], 2, leave=["damping", "body axes"])
-)
+@pytest.mark.parametrize("name", sampled(["time shift", "damping", "transposed", "body axes"], 1))
 def test_a_planted_fault_in_gravity_is_named(name):
     plant, values = FAULTS[name]
     found = diagnosed(HEAVY, *plant(HEAVY))
