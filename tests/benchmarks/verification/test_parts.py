@@ -193,7 +193,12 @@ LONG = ("torque of attitude", "damping of attitude", "field of time", "torque, f
 """Parts that are Python functions, which each trial motion calls."""
 
 
-@pytest.mark.parametrize("name", sampled(PARTS, 7, keep=("rotor", "damping, jumps", "turning field"), leave=LONG))
+@pytest.mark.parametrize(
+    "name",
+    sampled(
+        PARTS, 5, keep=("motor", "damping, jumps", "turning field", "torque, world", "torque, table with a jump"), leave=LONG
+    ),
+)
 def test_the_right_motion_is_right_from_any_row_and_without_the_part_it_is_wrong(name):
     build, part, missing = PARTS[name]
     R, w = integrate(T, **part)
@@ -216,7 +221,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", sampled(OTHERS, 3, leave=["sign of the rotor"]))
 def test_the_other_sign_and_the_other_axes_are_named(name):
     part, made = OTHERS[name]
     found = judged(PARTS[part][0](), T, *integrate(T, **made))
@@ -229,7 +234,7 @@ def test_missing_parts_are_named_together():
     assert judged(both, T, *integrate(T, **part)).details.explaining[0].name == "without the torque + without the damping"
 
 
-@pytest.mark.parametrize("name", sampled(registry.list_scenes(), 14, keep=["separatrix", "tumbling_satellite"]))
+@pytest.mark.parametrize("name", sampled(registry.list_scenes(), 9, keep=["separatrix", "tumbling_satellite"]))
 def test_the_right_motion_of_every_scene_is_right(name):
     scene = rotation_only(registry.scene(name))
     grid = Grid(min(scene.t_end, 40 / (np.linalg.norm(scene.w_WB_B0) or 1.0)) / 60, 60)

@@ -58,13 +58,12 @@ def keys(found):
 
 OTHER_DESIGNS = (
     "RK4, matrix, world momentum",
-    "splitting, quaternion, momentum",
     "midpoint, quaternion, world momentum, single",
 )
 """Designs that speak the protocol by default; `test_motions.py` compares all designs with the exact motions."""
 
 
-@pytest.mark.parametrize("name", sampled(RIGHT, 3, keep=OTHER_DESIGNS))
+@pytest.mark.parametrize("name", sampled(RIGHT, 2, keep=OTHER_DESIGNS))
 def test_a_right_program_is_right(name):
     found = verified(command(right_programs.__file__, name), "protocol", "motions", "order", "repeatability")
     assert (found.verdict, keys(found)) == (Verdict.RIGHT, {}), found.reason
@@ -74,11 +73,11 @@ def test_a_right_program_is_right(name):
         assert abs(order - RIGHT[name].order) < 0.05  # measured: 0.01 at most
 
 
-IN_PROGRAMS = ("wrong side", "half a step late", "turning of the field", "without the rotor")
+IN_PROGRAMS = ("wrong side", "turning of the field", "without the rotor")
 """Mistakes that are planted in programs by default; `test_mistakes.py` plants mistakes without a program in between."""
 
 
-@pytest.mark.parametrize("name", sampled([name for name in WRONG if name not in NEVER_SENT], 4, keep=IN_PROGRAMS))
+@pytest.mark.parametrize("name", sampled([name for name in WRONG if name not in NEVER_SENT], 3, keep=IN_PROGRAMS))
 def test_a_planted_mistake_is_named(name):
     found = verified(command(wrong_programs.__file__, name), "motions", "order")
     assert found.verdict is Verdict.WRONG
@@ -117,10 +116,10 @@ OF_ORDER_1 = ("half a step late", "rates late", "dt in ms", "gravity along y")
 
 
 CONVENTIONS = [*(("rk4", mistake) for mistake in PLANTED_KEYS), *(("euler", mistake) for mistake in OF_ORDER_1)]
-ONLY_HERE = ("reads x, y, z, w", "reads w0 in world", "wrong turn", "dt in ms", "rates late", "no gravity")
+ONLY_HERE = ("reads x, y, z, w", "reads w0 in world", "wrong turn", "dt in ms")
 
 
-@pytest.mark.parametrize(("order", "mistake"), sampled(CONVENTIONS, 6, keep=[("rk4", mistake) for mistake in ONLY_HERE]))
+@pytest.mark.parametrize(("order", "mistake"), sampled(CONVENTIONS, 4, keep=[("rk4", mistake) for mistake in ONLY_HERE]))
 def test_a_mistake_of_conventions_is_named(order, mistake):
     named = keys(verified(command(PLANTED, order, mistake), "motions"))
     if (order, mistake) == ("euler", "rates late"):  # an error of order 1, which two motions show
