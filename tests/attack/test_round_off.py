@@ -180,7 +180,10 @@ def random_body_in(field, index):
 FIELDS = [("gravity", 26), ("spring", 14), ("attraction", 2), ("fixed_gradient", 1)]
 
 
-@pytest.mark.parametrize(("field", "index", "order"), sampled([(*field, order) for field in FIELDS for order in (2, 6)], 4))
+@pytest.mark.parametrize(
+    ("field", "index", "order"),
+    sampled([(*field, order) for field in FIELDS for order in (2, 6)], 3, leave=[("spring", 14, 6), ("attraction", 2, 6)]),
+)
 def test_fields_walk(field, index, order):
     """The energy of these drifted by 7e-20 to 6e-19 a step, with chances of 1e-148 to 1e-30 of a walk."""
     scene, dt = random_body_in(field, index)

@@ -60,14 +60,20 @@ def test_a_run_in_a_worker_is_the_same_bit_for_bit(scene, name):
 
 
 @pytest.mark.parametrize(
-    ("how", "limit", "kind", "reason"),
-    [
-        ("hang", 0.5, OutcomeKind.TIMEOUT, "after 0.5 s"),
-        ("exit", PATIENCE, OutcomeKind.CRASHED, "exit code 3"),
-        ("abort", PATIENCE, OutcomeKind.CRASHED, "signal 6 (SIGABRT)"),
-    ],
+    ("how", "limit", "kind", "reason", "attempt_so"),
+    sampled(
+        [
+            (*ending, attempt_so)
+            for attempt_so in (attempt_within, attempt_here)
+            for ending in (
+                ("hang", 0.5, OutcomeKind.TIMEOUT, "after 0.5 s"),
+                ("exit", PATIENCE, OutcomeKind.CRASHED, "exit code 3"),
+                ("abort", PATIENCE, OutcomeKind.CRASHED, "signal 6 (SIGABRT)"),
+            )
+        ],
+        3,
+    ),
 )
-@pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
 def test_a_hanging_or_crashing_engine_is_an_outcome(how, limit, kind, reason, attempt_so):
     close_workers()
     before = threading.enumerate()

@@ -135,6 +135,7 @@ def test_what_is_allowed_and_by_what():
     assert allow((1e-5, 1e-5), error=1e-4, by="order").by == ("order", "order")
 
 
+@pytest.mark.slow
 def test_corners_of_a_recorded_torque_are_no_noise():
     """A torque at 100 Hz has a corner in every row. Up to version 0.3 1.9e-5 rad were allowed by noise on exact rows."""
     t = np.arange(301) * 0.01

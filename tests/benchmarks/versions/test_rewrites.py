@@ -52,9 +52,10 @@ def causes(method):
     return tuple(each.key for each in find_causes(lambda scene, grid: method.prepare(scene, grid)(), setting))
 
 
-@pytest.mark.parametrize(
-    "name", sampled(["no gyroscopic term", "sign of the field", "damping", "transposed"], leave=["damping"])
-)
+CAUSES = ["no gyroscopic term", "sign of the field", "damping", "transposed"]
+
+
+@pytest.mark.parametrize("name", sampled(CAUSES, 1, keep=["sign of the field"]))
 def test_a_mistake_has_its_cause(name, method):
     free, heavy = causes(method("-DREAL=float", changes=MISTAKES[name]))
     assert heavy == name
