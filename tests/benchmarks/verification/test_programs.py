@@ -229,6 +229,6 @@ def test_arguments_of_python_are_checked(subjects, options):
 
 def test_one_check_is_a_text_or_a_list(monkeypatch):
     monkeypatch.setattr(programs, "load", lambda: load()[:2])
-    one, two = (verify("textbook:rk4", only=only)[0] for only in ("repeatability", ["repeatability"]))
+    one, two = (verify("mujoco:RK4", only=only)[0] for only in ("repeatability", ["repeatability"]))
     assert one.sentence == two.sentence
     assert {each.check for each in one.findings} == {"repeatability"}
