@@ -269,7 +269,7 @@ def test_another_body_is_one_that_can_exist():
 
 def test_a_table_with_many_corners_is_judged_without_fits(monkeypatch):
     monkeypatch.setattr(explain, "MOST_BREAKS", 5)  # of 50: each corner divides each trial motion
-    monkeypatch.setattr(explain, "EFFORT", 300)  # of 6,000: no mistake explains the second recording
+    monkeypatch.setattr(explain, "EFFORT", 100)  # of 6,000: no mistake explains the second recording
     times = T[::12]
     values = np.random.default_rng(1).normal(size=(11, 3))
     driven = scene(torque=cv.Torque((times, values)))
