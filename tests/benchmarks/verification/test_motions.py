@@ -144,7 +144,8 @@ def test_coarse_tolerances_are_measured_again():
 
 
 def test_signatures_are_computed_again():
-    motions = [CATALOGUE[name] for name in ("damped", "rotor_turned", "torque_strong", "heavy", "orbit")]
+    """Each mistake has a signature in one of these motions, so that none needs the search to be seen."""
+    motions = [CATALOGUE[name] for name in ("damped", "rotor_turned", "torque_strong", "heavy", "orbit", "tiny_fast")]
     for motion, found in zip(motions, signatures(motions), strict=True):
         (allowed,) = (each for each in FILES[motion.name]["tolerance"] if (each["order"], each["angle"]) == (2, 0.01))
         made = files.catches(motion, np.array([allowed[name] for name in programs.QUANTITIES]), found)
