@@ -56,7 +56,7 @@ def complain(case, errors=ERRORS):
 
 @pytest.mark.parametrize(
     "seed",
-    [*sampled(FEW, 2, keep=(1, 7)), *(pytest.param(1000 * SEED + i, marks=pytest.mark.attack) for i in range(count(ALL)))],
+    [*sampled(FEW, 1, keep=(7,)), *(pytest.param(1000 * SEED + i, marks=pytest.mark.attack) for i in range(count(ALL)))],
 )
 def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     wrong, _ = complain(draw(seed), ERRORS if seed >= 1000 else ERRORS[1:2])

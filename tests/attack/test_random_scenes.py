@@ -1,6 +1,6 @@
 """Random scenes over all that a scene can have, `integrate(error=)` against an independent truth.
 
-A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries four scenes, `pytest --all` ten,
+A run that is called ok is as accurate as was asked, and every run ends. `pytest` tries three scenes, `pytest --all` ten,
 `pytest --attack` 400, and ATTACK_EFFORT times as many.
 """
 
@@ -114,7 +114,7 @@ def check(case):
 OTHERS = [pytest.param(seed, marks=pytest.mark.attack) for seed in range(USUAL, count(ALL)) if seed not in FOUND]
 
 
-@pytest.mark.parametrize("seed", [*sampled([*range(USUAL), *FOUND], 4, keep=(2, 4, 6, 394)), *OTHERS])
+@pytest.mark.parametrize("seed", [*sampled([*range(USUAL), *FOUND], 3, keep=(2, 4, 6)), *OTHERS])
 def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     case, what = random_case(seed + (SEED - 1) * 1_000_000)
     print(what)

@@ -113,6 +113,7 @@ def test_estimates_hold_where_steps_are_hard_to_choose(name, error):
     assert true_error(found) < min(error, 2 * found.choice.estimate)  # 1.2 estimates of the chaotic one at 1e-9, else 0.2
 
 
+@pytest.mark.slow
 def test_an_error_below_round_off_is_reported_with_what_round_off_leaves():
     scene = random_body("gradient", 4243, 18)
     with pytest.warns(cv.AccuracyNotReached) as caught:

@@ -134,7 +134,7 @@ CASES = [
 
 SEARCHED_LONG = [("golden_4", "no gyroscopic term + world rates"), ("products", "no gyroscopic term + world rates")]
 FREE = [("golden_9", key) for key in PLANTED if ("golden_9", key) in CASES and key.partition(" + ")[2] != "world rates"]
-HEAVY = [("golden_4", key) for key in (*ONLY["golden_4"], "half a step late", "damping", "inertia of the start", "world y up")]
+HEAVY = [("golden_4", key) for key in (*ONLY["golden_4"], "inertia of the start")]
 TENSOR = [("products", key) for key in (*ONLY["products"], "inverted inertia", "inertia in world axes", "axes y up")]
 
 

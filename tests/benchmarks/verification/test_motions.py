@@ -178,7 +178,7 @@ EVERY = [(1, 1), (1, 7), (2, 1), (2, 11), (4, 5), (4, 23)]
 """Orders, and which designs of each."""
 
 
-@pytest.mark.parametrize(("order", "every"), sampled(EVERY, 2, keep=[(2, 11), (4, 23)]))
+@pytest.mark.parametrize(("order", "every"), sampled(EVERY, 1, keep=[(2, 11)]))
 def test_designs_have_their_order(order, every):
     """Errors of attitudes fall by 10^order from |w| h = 0.1 to 0.01. Measured: exponents within 0.05 of the order."""
     motions = [CATALOGUE["world_tensor"], CATALOGUE["heavy"], CATALOGUE["damped_and_driven"]]

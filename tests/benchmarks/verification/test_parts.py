@@ -267,6 +267,7 @@ def test_another_body_is_one_that_can_exist():
     assert found.details.explaining == () or found.details.explaining[0].name != "another body"
 
 
+@pytest.mark.slow
 def test_a_table_with_many_corners_is_judged_without_fits(monkeypatch):
     monkeypatch.setattr(explain, "MOST_BREAKS", 5)  # of 50: each corner divides each trial motion
     monkeypatch.setattr(explain, "EFFORT", 100)  # of 6,000: no mistake explains the second recording
