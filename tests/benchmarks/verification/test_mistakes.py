@@ -11,6 +11,7 @@ import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.verification.compare import Compared, compare_answers
 from conservative.benchmarks.verification.explain import PROGRAM_KINDS, diagnose
+from conservative.benchmarks.verification.explanation import attempt
 from conservative.benchmarks.verification.mistakes import BY_KEY, habits, table_of
 from conservative.benchmarks.verification.mistakes.readings import READINGS, Reading
 from conservative.benchmarks.verification.motions.motion import load
@@ -146,6 +147,27 @@ def test_a_planted_mistake_of_a_program_is_named(name, key):
     if (case.error.max(axis=1) <= case.allowed).all():
         pytest.skip("the mistake cannot be seen here")
     assert [each.name for each in explaining] == [key]
+
+
+def central(J, motion):
+    """The inertia about the centre of mass."""
+    c, mass = np.array(motion.com_B), motion.weight / 9.81
+    return J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+APPLIED = {
+    ("golden_4", "inertia about the centre of mass"): {"moments": lambda J: central(J, MOTIONS["golden_4"])},
+    ("products", "sign of the products of inertia"): {"moments": lambda J: 2 * np.diag(np.diag(J)) - J},
+    ("golden_9", "start in order xyzw"): {"start": lambda R: from_quaternion(np.roll(to_quaternion(R), 1))},
+}
+"""Further mistakes of scenes, which are applied without a search."""
+
+
+@pytest.mark.parametrize(("name", "key"), APPLIED)
+def test_a_mistake_that_is_applied_leaves_nothing(name, key):
+    found = attempt(answers(MOTIONS[name], **APPLIED[name, key]), compose(BY_KEY[key]))
+    assert found.explains
+    assert max(found.left) < 1e-8 < 1e-3 < max(found.plain)
 
 
 def test_a_key_is_there_once():
