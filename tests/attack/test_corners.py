@@ -14,6 +14,7 @@ import conservative as cv
 from conservative.methods import search, trials
 
 from ..independent import angle_between
+from ..sampling import sampled
 from .corners import draw, truth_of
 from .effort import SEED, count
 
@@ -53,7 +54,10 @@ def complain(case, errors=ERRORS):
     return wrong, needless
 
 
-@pytest.mark.parametrize("seed", [*FEW, *(pytest.param(1000 * SEED + i, marks=pytest.mark.attack) for i in range(count(ALL)))])
+@pytest.mark.parametrize(
+    "seed",
+    [*sampled(FEW, 1, keep=(7,)), *(pytest.param(1000 * SEED + i, marks=pytest.mark.attack) for i in range(count(ALL)))],
+)
 def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     wrong, _ = complain(draw(seed), ERRORS if seed >= 1000 else ERRORS[1:2])
     assert not wrong
@@ -63,8 +67,7 @@ def test_an_order_that_is_presumed_is_found(monkeypatch):
     """The negative control: the differences of corners are divided as if functions were smooth, and are not adapted to."""
     monkeypatch.setattr(trials, "presumed_smooth", lambda scene: True)
     monkeypatch.setattr(search, "parts_for", lambda scene: 2)
-    wrong = [each for seed in (1, 11, 21, 31) for each in complain(draw(seed), (1e-3,))[0]]
-    assert wrong
+    assert any(complain(draw(seed), (1e-3,))[0] for seed in (1, 11, 21, 31))
 
 
 @pytest.mark.attack

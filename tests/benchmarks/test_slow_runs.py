@@ -15,6 +15,7 @@ from conservative.benchmarks.studies.time_limit import TRIAL, find_trial, is_qui
 from conservative.grid import Grid, grid_for
 from conservative.outcome import OutcomeKind
 
+from ..sampling import sampled
 from .foreign_engines import Slow
 from .generic_study import SCENE
 
@@ -89,7 +90,7 @@ def test_a_short_run_tells_the_cost_once():
     assert find_trial(1e-6, 60.0, Case("any", scene_of(functions), cv.Splitting(), Grid(0.02, 1000))).grid.n_steps == 1
 
 
-@pytest.mark.parametrize("name", ["paper", "motion", "long_runs"])
+@pytest.mark.parametrize("name", sampled(["paper", "motion", "long_runs"], 1))
 def test_slow_runs_are_rows_with_a_reason_and_the_others_are_measured(name, costs):
     functions = Counted()
     costs |= {"reduced": 1.0, "splitting": 0.01}  # 50 steps in a duration: 50 s and 0.5 s
@@ -122,7 +123,7 @@ def test_a_motion_of_ten_durations_falls_back_to_one(costs):
     assert {each.t[-1] for each in found if getattr(each, "quantity", "") == "q_w" and each.role == "ours"} == {1.0}
 
 
-@pytest.mark.parametrize("name", ["convergence", "work_precision"])
+@pytest.mark.parametrize("name", sampled(["convergence", "work_precision"], 1))
 def test_lines_of_slow_runs_have_the_points_that_they_can_afford(name, costs):
     """12 and 24 steps take 0.24 and 0.48 s of 0.8 s, more have to take at most 0.1 s."""
     costs["splitting"] = 0.02

@@ -20,6 +20,7 @@ from conservative.outcome import OutcomeKind
 from conservative.references.truth import Disagreement, Truth, reference
 from conservative.registry import method
 
+from ..sampling import sampled
 from .generic_study import SCENE, Broken, truth
 
 ABSENT = Missing("mujoco", error=cv.MissingEngine("MuJoCo", "mujoco"))
@@ -124,7 +125,7 @@ def test_work_precision_pairs_error_and_time():
     assert timed == {row.series for row in measured.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
 
 
-@pytest.mark.parametrize("name", CROSSING)
+@pytest.mark.parametrize("name", sampled(CROSSING, 5))
 def test_nothing_is_dropped_silently(name):
     measured = rows(name, *BROKEN, ABSENT, skip_missing=True)
     for broken in BROKEN:
@@ -144,7 +145,7 @@ def test_a_missing_engine_is_an_error_unless_skipped(name):
         list(studies.findings(Study(name, (SCENE,), (ABSENT,), truth=truth)))
 
 
-@pytest.mark.parametrize("name", [*CROSSING, "motion"])
+@pytest.mark.parametrize("name", sampled([*CROSSING, "motion"], 4))
 def test_a_scene_without_a_reference_solution_loses_no_other_scene(name):
     asked = []
 
@@ -225,7 +226,7 @@ def test_a_bug_of_our_own_is_not_an_outcome():
         rows("paper", Ours("raises"))
 
 
-@pytest.mark.parametrize("name", [*CROSSING, "motion"])
+@pytest.mark.parametrize("name", sampled([*CROSSING, "motion"], 4))
 def test_progress_counts_up_to_the_whole(name):
     seen = []
     study = Study(name, (SCENE, SCENE.rename("again")), (cv.Reduced(),), quick=True, truth=truth)

@@ -21,6 +21,7 @@ from conservative.grid import grid_for
 from conservative.outcome import OK
 from conservative.references.truth import Truth
 
+from ..sampling import sampled
 from .generic_study import SCENE
 from .versions.made_up import TIMED, Side
 
@@ -92,7 +93,7 @@ def assert_over(t_end):
     assert [end for motions in timed.values() for end, _ in motions] == pytest.approx([t_end] * sum(map(len, timed.values())))
 
 
-@pytest.mark.parametrize("name", [name for name, each in studies.STUDIES.items() if each.timed])
+@pytest.mark.parametrize("name", sampled([name for name, each in studies.STUDIES.items() if each.timed], leave=["long_time"]))
 def test_a_study_times_the_motion_that_it_credits(name):
     declared = studies.STUDIES[name]
     few = {"quick": True, "bodies": 1, **({"sizes": (1,)} if "sizes" in declared.options else {})}

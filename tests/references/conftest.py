@@ -7,6 +7,7 @@ from conservative import deferred_imports
 from conservative.attitude import rotation_about
 from conservative.references.environments import folders
 
+from ..shared_reader import reading_worker, shared_reader  # noqa: F401
 from . import trial_engine
 from .local_wheels import write_numpy, write_wheel
 from .trial_engine import make_environment

@@ -1,6 +1,7 @@
 """The errors of the automatic choice against an independent reference solution, over random bodies and initial states."""
 
 import warnings
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 from conservative.scenes.random_body import random_body
 
+from ..sampling import sampled
 from .exact_trials import random_rotation
 
-SCENES = 100
+SCENES = 40
 KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
 
 
@@ -52,7 +54,7 @@ def test_true_errors_are_at_most_ten_times_the_target():
         measured = true_error(trajectory)
         if measured > 10 * error:
             worse.append((scene.name, error, measured, trajectory.choice))
-    assert len(worse) <= 0.02 * SCENES, worse  # measured 0 of 200, and no true error above 3 times the target
+    assert not worse, worse  # measured 0 of 200, and no true error above 3 times the target
 
 
 def test_estimates_that_are_too_small_are_detected(monkeypatch):
@@ -99,8 +101,10 @@ HARD = {
 }
 
 
-@pytest.mark.parametrize("error", [1e-4, 1e-6, 1e-9])
-@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize(
+    ("name", "error"),
+    sampled(product(HARD, [1e-4, 1e-6, 1e-9]), 5, keep=[("chaotic", 1e-9)], leave=[("chaotic", 1e-4), ("chaotic", 1e-6)]),
+)
 def test_estimates_hold_where_steps_are_hard_to_choose(name, error):
     build, times = HARD[name]
     scene = build()
@@ -109,6 +113,7 @@ def test_estimates_hold_where_steps_are_hard_to_choose(name, error):
     assert true_error(found) < min(error, 2 * found.choice.estimate)  # 1.2 estimates of the chaotic one at 1e-9, else 0.2
 
 
+@pytest.mark.slow
 def test_an_error_below_round_off_is_reported_with_what_round_off_leaves():
     scene = random_body("gradient", 4243, 18)
     with pytest.warns(cv.AccuracyNotReached) as caught:

@@ -21,6 +21,7 @@ from conservative.references.worker.client import EngineCrashed, EngineTimeout, 
 from conservative.references.worker.program import MAGIC, PREFIX
 
 from ..environments import PATIENCE, run_python, wait_until
+from ..sampling import sampled
 
 
 def hang():
@@ -228,7 +229,7 @@ time.sleep(1800)
 """
 
 
-@pytest.mark.parametrize("how", ["idle", "busy"])
+@pytest.mark.parametrize("how", sampled(["busy", "idle"], 1))
 def test_the_process_does_not_outlive_a_parent_that_is_killed(how, start):
     parent = start([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     process = psutil.Process(int(parent.stdout.readline()))

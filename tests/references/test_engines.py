@@ -5,6 +5,7 @@ name the measured version.
 """
 
 from importlib.metadata import version
+from itertools import product
 from types import SimpleNamespace
 
 import mujoco
@@ -33,6 +34,7 @@ from conservative.scenes.tops import cone
 from conservative.trajectory import Counters
 
 from ..bodies import impossible_body
+from ..sampling import sampled
 
 # Attitude and rates; measured beside: the largest over the four scenes.
 TIGHT = [
@@ -345,9 +347,14 @@ def test_a_planar_body_with_its_weight_in_its_plane_has_a_mass_model():
     assert engine.unsupported_reason(scene) is None
 
 
-@pytest.mark.parametrize("n", [1, 9, 40])  # by rollout, and by `mj_step`
-@pytest.mark.parametrize("name", ["mujoco:RK4", "mujoco:Euler", "pinocchio:RK4", "pinocchio:Euler"])
-@pytest.mark.parametrize("scene", ["asymmetric_top", "attracted_body", "thrown_box"])
+LOOPS = product(
+    ["asymmetric_top", "attracted_body", "thrown_box"],
+    ["mujoco:RK4", "mujoco:Euler", "pinocchio:RK4", "pinocchio:Euler"],
+    [1, 9, 40],  # by rollout, and by `mj_step`
+)
+
+
+@pytest.mark.parametrize(("scene", "name", "n"), sampled(LOOPS, 12))
 def test_the_timed_loop_ends_in_the_state_of_the_run(scene, name, n):
     """It starts from the initial state at each call, and installs the callback of a field by itself."""
     scene = registry.scene(scene)

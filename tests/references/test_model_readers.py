@@ -188,8 +188,8 @@ def test_reading_has_limits_of_time_memory_and_size(tmp_path, monkeypatch):
     bomb = tmp_path / "bomb.xml"
     bomb.write_text(mjcf("<freejoint/>" + copies))
     with monkeypatch.context() as patch:
-        patch.setattr(readers, "SECONDS", 2.0)
-        with pytest.raises(BadInput, match=r"reading ended|error"):
+        patch.setattr(readers, "SECONDS", 1.0)  # it filled the machine's memory, or took minutes
+        with pytest.raises(BadInput, match=r"reading ended.* 2 GiB|error"):
             read_files([bomb], tmp_path)
     large = tmp_path / "large.urdf"
     with large.open("wb") as stream:

@@ -9,6 +9,8 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.methods import between
 from conservative.references.precise import Precise
 
+from ..sampling import sampled
+
 INERTIA = np.array([[1.0, 0.1, 0.05], [0.1, 1.6, -0.2], [0.05, -0.2, 2.1]])
 FIELDS = {
     "free": None,
@@ -31,7 +33,7 @@ def truth_at(scene, times):
     return [np.array(values) for values in zip(*start, *((run.R_WB[-1], run.w_WB_B[-1]) for run in runs), strict=True)]
 
 
-@pytest.fixture(scope="module", params=FIELDS)
+@pytest.fixture(scope="module", params=sampled(FIELDS, 2, keep=["free", "spring"]))
 def case(request):
     scene = scene_in(request.param)
     return scene, *truth_at(scene, TIMES)

@@ -14,6 +14,8 @@ from conservative.references.precise import Precise
 from conservative.references.solvers.heyoka import FRAMES, Heyoka
 from conservative.references.solvers.scipy import SciPy
 
+from ..sampling import sampled
+
 
 @pytest.mark.parametrize(
     ("method", "package", "setting"),
@@ -131,7 +133,7 @@ EDGES = [
 ]
 
 
-@pytest.mark.parametrize(("inertia", "w", "moment"), EDGES)
+@pytest.mark.parametrize(("inertia", "w", "moment"), sampled(EDGES, 4))
 def test_degenerate_scenes(inertia, w, moment):
     field = None if moment is None else cv.UniformGravity(1, moment)
     scene = cv.Scene("edge", cv.RigidBody(inertia), np.eye(3), w, 1.0, field)

@@ -47,6 +47,7 @@ def track(index, no_environments):
     return run
 
 
+@pytest.mark.slow
 def test_changes_between_versions_are_reported_and_written(track, tmp_path):
     files = ("--out", tmp_path / "page", "--junit", tmp_path / "junit.xml", "--markdown", tmp_path / "track.md")
     code, text, words = track("1.0", "1.1", "1.2", *files)

@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from contextlib import nullcontext
+from itertools import product
 
 import numpy as np
 import psutil
@@ -29,6 +30,7 @@ from conservative.references.worker.client import EngineCrashed, Worker, time_li
 
 from ..declared import ENGINES
 from ..environments import PATIENCE, run_python, wait_until
+from ..sampling import sampled
 from . import trial
 from .trial_engine import Trial
 
@@ -87,7 +89,7 @@ def test_a_crash_is_an_outcome_and_the_next_run_succeeds(do, at):
     assert np.array_equal(run("integrate").R_WB, before.R_WB)
 
 
-@pytest.mark.parametrize("do", ["hang", "spin", "lock"])
+@pytest.mark.parametrize("do", sampled(["spin", "hang", "lock"], 1))
 def test_an_engine_that_hangs_is_ended_after_its_limit(do):
     trajectory = run(do, limit=0.5)
     assert str(trajectory.outcome) == "timeout (after 0.5 s)"
@@ -145,14 +147,14 @@ def test_a_process_that_is_killed_while_it_runs_is_a_crash():
 def test_wall_time_grows_with_the_number_of_calls():
     timed = Trial("rest").prepare(SCENE, grid_for(SCENE, DT))  # for 0.05 s in each call
     assert timed.wall_time(1) >= 0.05
-    assert timed.wall_time(20) >= 1.0
+    assert timed.wall_time(8) >= 0.4
 
 
 def test_renewing_a_run_is_not_measured():
     renewed = Trial("renew").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
     start = time.perf_counter()
-    measured = renewed.wall_time(4)
-    assert time.perf_counter() - start - measured >= 2.0  # four times 0.5 s
+    measured = renewed.wall_time(2)
+    assert time.perf_counter() - start - measured >= 1.0  # twice 0.5 s
 
 
 def test_the_loop_is_measured_instead_of_the_run():
@@ -265,8 +267,7 @@ def rows(name, *methods):
 
 
 @pytest.mark.usefixtures("short_limits")
-@pytest.mark.parametrize("name", ENGINES)
-@pytest.mark.parametrize("do", ENDS)
+@pytest.mark.parametrize(("name", "do"), sampled(product(ENGINES, ENDS), 1))
 def test_a_crash_or_a_hang_is_a_row(name, do):
     table = rows(name, Trial(do), registry.method("pinocchio"), Trial())
     measured = [row for row in table if row.measure in (Measure.ATTITUDE_MAX, Measure.TIME)]
@@ -319,7 +320,7 @@ def test_an_unknown_name_names_the_nearest():
         registry.method("reduced@1.0")
 
 
-@pytest.mark.parametrize("how", ["close", "crash", "kill"])
+@pytest.mark.parametrize("how", sampled(["close", "crash", "kill"], leave=["crash"]))
 def test_what_a_program_has_forked_ends_with_it(how, tmp_path):
     code = """
 import json, os, subprocess, sys

@@ -18,6 +18,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 
 from ...environments import PATIENCE
+from ...sampling import sampled
 
 SUITE = Path(suite.__file__).parent
 INI = "[pytest]\naddopts = -p no:cacheprovider --benchmark-max-time=0.001\n"
@@ -273,20 +274,24 @@ def select(folder, *selections):
     return json.loads((folder / "ended.json").read_text())
 
 
-def test_rows_that_are_not_selected_are_not_missing(tmp_path):
+FEW = ("checks/test_one.py::TestFirst", "checks more -k kept", "checks more -m late", "checks more --ignore more/test_three.py")
+
+
+@pytest.mark.parametrize("selections", sampled([(FEW,), (tuple(SELECTIONS),)], 1), ids=["few", "all"])
+def test_rows_that_are_not_selected_are_not_missing(selections, tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --benchmark-max-time=0.001\nmarkers = late\n")
     for name, text in PARTS.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    found = select(tmp_path, "more checks", *SELECTIONS)
+    found = select(tmp_path, "more checks", *selections)
     assert found.pop("more checks") == [2, sorted(ALL), []]  # no baseline
-    assert found == {words: [0 if rows else 2, sorted(rows), []] for words, rows in SELECTIONS.items()}
+    assert found == {words: [0 if rows else 2, sorted(rows), []] for words, rows in SELECTIONS.items() if words in selections}
     plain = "    def test_in(self):\n        pass\n"
     changed = PARTS["checks/test_one.py"].replace(', "removed"', "").partition("    @pytest.mark.late")[0] + plain
     (tmp_path / "checks/test_one.py").write_text(changed)
     (tmp_path / "more/test_three.py").unlink()
     some = ("checks more", "more/test_two.py", "checks/test_one.py::TestFirst", "checks more -k kept", "checks more --lf")
-    for words, (code, rows, missing) in select(tmp_path, *some).items():
+    for words, (code, rows, missing) in select(tmp_path, *(some if selections != FEW else some[::2])).items():
         read = "test_one" if words.startswith("checks") else "nothing"
         read = "test_mine" if "TestFirst" in words else read  # its node id leaves out the other class
         assert missing == sorted({"test_three.py::test_three"} | {name for name in GONE if read in name}), words

@@ -27,7 +27,9 @@ from conservative.references.model_files.readers import read_here
 from conservative.references.worker.client import close_workers
 
 from ...environments import PATIENCE
+from ...sampling import sampled
 
+pytestmark = pytest.mark.usefixtures("shared_reader")
 GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
 TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
 
@@ -326,14 +328,17 @@ def test_a_program_is_right_or_its_mistake_is_named(register, tmp_path):
 
 @pytest.mark.parametrize(
     ("formats", "accelerations", "words"),
-    [
-        ((), None, "expected a program with the request `load`, which PROTOCOL.md describes"),
-        (5, None, "its answer to `hello` cannot be used"),
-        (("urdf",), [[1, 2, 3]] * 24, "its `accelerations` are not numbers (24, 6)"),
-        (("urdf",), [[1], [1, 2]], "its `accelerations` are not numbers (24, 6)"),
-        (("urdf",), [["nan"] * 6] * 24, "accelerations that are not finite"),
-        (("urdf",), "none", "answers `load` with `accelerations`: 'none'; expected an array of numbers"),
-    ],
+    sampled(
+        [
+            ((), None, "expected a program with the request `load`, which PROTOCOL.md describes"),
+            (5, None, "its answer to `hello` cannot be used"),
+            (("urdf",), [[1, 2, 3]] * 24, "its `accelerations` are not numbers (24, 6)"),
+            (("urdf",), [[1], [1, 2]], "its `accelerations` are not numbers (24, 6)"),
+            (("urdf",), [["nan"] * 6] * 24, "accelerations that are not finite"),
+            (("urdf",), "none", "answers `load` with `accelerations`: 'none'; expected an array of numbers"),
+        ],
+        4,
+    ),
 )
 def test_a_program_without_usable_accelerations_is_described(formats, accelerations, words, register, tmp_path):
     answers = [GREETING | {"engine": {"formats": formats}}, {"accelerations": accelerations}]

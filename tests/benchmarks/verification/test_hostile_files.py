@@ -16,8 +16,10 @@ from conservative.benchmarks.verification.recordings import table, verdict
 from conservative.benchmarks.verification.recordings.formats.table import chunks
 
 from ...environments import PATIENCE
+from ...sampling import sampled
 from .made import FREE, T, exact
 
+pytestmark = pytest.mark.usefixtures("unnamed")
 R, W = exact(FREE)
 TURNS = Rotation.from_matrix(R)
 VECTORS = TURNS.as_rotvec()
@@ -50,7 +52,7 @@ def judged(folder, names, attitudes, rates=W, t=T):
         return verdict.verify_recording(FREE, recording, True, None, lambda *_: None).verdict == "right"
 
 
-@pytest.mark.parametrize("names", ATTITUDES)
+@pytest.mark.parametrize("names", sampled(ATTITUDES, 2, keep=["qw,qx,qy,qz", "axis_x,axis_y,axis_z,axis_angle"]))
 def test_attitudes_of_any_size(names, tmp_path):
     usual = ATTITUDES[names]
     assert judged(tmp_path, names, usual)

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.benchmarks.verification.compare import Compared, allow
-from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import comparison, verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
 
+from ...sampling import sampled
 from .made import exact
 
 SCENE = cv.Scene("tumbler", cv.RigidBody([2e-3, 6e-3, 7e-3]), np.eye(3), [0.2, 2.0, 0.3], 10.0)
@@ -23,9 +23,7 @@ SCALE = np.linalg.norm(W, axis=1).max()
 AXIS = np.array([0.6, -0.48, 0.64])
 
 
-@pytest.fixture(autouse=True)
-def no_search(monkeypatch):
-    monkeypatch.setattr(verdict, "diagnose", lambda *_: Diagnosis())
+pytestmark = pytest.mark.usefixtures("unnamed")
 
 
 def verify(R_WB=None, w=None, t=T, scene=SCENE, **about):
@@ -51,8 +49,12 @@ def noise(size, n=501, seed=5):
     return size * SCALE * np.random.default_rng(seed).normal(size=(n, 3))
 
 
-@pytest.mark.parametrize("half", [1e-4, 3e-4])
-@pytest.mark.parametrize(("rows", "sizes"), [(300, (5.4, 6.6)), (slice(None), (2.3, 2.8))], ids=["largest", "mean"])
+LARGEST, MEAN = (300, (5.4, 6.6)), (slice(None), (2.3, 2.8))
+
+
+@pytest.mark.parametrize(
+    ("half", "rows", "sizes"), sampled([(half, *where) for half in (1e-4, 3e-4) for where in (LARGEST, MEAN)], 2)
+)
 def test_half_digits_in_the_largest_error_and_in_the_mean(half, rows, sizes):
     """Six in the largest error, and 1.3 sqrt(3) (1 + 3 / sqrt(n)) = 2.55 in the root of the mean square."""
     for size, expected in zip(sizes, ("right", "wrong"), strict=True):
@@ -133,6 +135,7 @@ def test_what_is_allowed_and_by_what():
     assert allow((1e-5, 1e-5), error=1e-4, by="order").by == ("order", "order")
 
 
+@pytest.mark.slow
 def test_corners_of_a_recorded_torque_are_no_noise():
     """A torque at 100 Hz has a corner in every row. Up to version 0.3 1.9e-5 rad were allowed by noise on exact rows."""
     t = np.arange(301) * 0.01

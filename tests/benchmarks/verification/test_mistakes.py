@@ -11,10 +11,14 @@ import conservative as cv
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.benchmarks.verification.compare import Compared, compare_answers
 from conservative.benchmarks.verification.explain import PROGRAM_KINDS, diagnose
+from conservative.benchmarks.verification.explanation import attempt
 from conservative.benchmarks.verification.mistakes import BY_KEY, habits, table_of
+from conservative.benchmarks.verification.mistakes.readings import READINGS, Reading
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.trials import compose
 from conservative.references.exact.method import free_body
+
+from ...sampling import sampled
 
 MOTIONS = {each.name: each for each in load()}
 NAMES = ("golden_9", "golden_4", "products")
@@ -129,7 +133,13 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "key"), CASES)
+SEARCHED_LONG = [("golden_4", "no gyroscopic term + world rates"), ("products", "no gyroscopic term + world rates")]
+FREE = [("golden_9", key) for key in PLANTED if ("golden_9", key) in CASES and key.partition(" + ")[2] != "world rates"]
+HEAVY = [("golden_4", key) for key in (*ONLY["golden_4"], "inertia of the start")]
+TENSOR = [("products", key) for key in (*ONLY["products"], "inverted inertia", "inertia in world axes", "axes y up")]
+
+
+@pytest.mark.parametrize(("name", "key"), sampled(CASES, 0, keep=[*FREE, *HEAVY, *TENSOR], leave=SEARCHED_LONG))
 def test_a_planted_mistake_of_a_program_is_named(name, key):
     case = answers(MOTIONS[name], **PLANTED[key])
     found = diagnose(case, kinds=PROGRAM_KINDS)
@@ -137,6 +147,27 @@ def test_a_planted_mistake_of_a_program_is_named(name, key):
     if (case.error.max(axis=1) <= case.allowed).all():
         pytest.skip("the mistake cannot be seen here")
     assert [each.name for each in explaining] == [key]
+
+
+def central(J, motion):
+    """The inertia about the centre of mass."""
+    c, mass = np.array(motion.com_B), motion.weight / 9.81
+    return J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+APPLIED = {
+    ("golden_4", "inertia about the centre of mass"): {"moments": lambda J: central(J, MOTIONS["golden_4"])},
+    ("products", "sign of the products of inertia"): {"moments": lambda J: 2 * np.diag(np.diag(J)) - J},
+    ("golden_9", "start in order xyzw"): {"start": lambda R: from_quaternion(np.roll(to_quaternion(R), 1))},
+}
+"""Further mistakes of scenes, which are applied without a search."""
+
+
+@pytest.mark.parametrize(("name", "key"), APPLIED)
+def test_a_mistake_that_is_applied_leaves_nothing(name, key):
+    found = attempt(answers(MOTIONS[name], **APPLIED[name, key]), compose(BY_KEY[key]))
+    assert found.explains
+    assert max(found.left) < 1e-8 < 1e-3 < max(found.plain)
 
 
 def test_a_key_is_there_once():
@@ -182,18 +213,39 @@ RECORDED = {
 }
 
 
-@pytest.mark.parametrize("key", RECORDED)
-def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key):
+ALL_ROWS, SOME = slice(None), slice(0, 301)
+QUICK = ["no gyroscopic term", "held rows", "one component in some rows", "order xyzw in some rows", "frozen motion"]
+BOTH = [*((key, SOME) for key in QUICK), ("sleep", ALL_ROWS)]
+
+
+@pytest.mark.parametrize(("key", "rows"), sampled([(key, rows) for key in RECORDED for rows in (ALL_ROWS, SOME)], 0, BOTH))
+def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key, rows):
     make, values = RECORDED[key]
     data, allowed = make(), np.full(2, 1e-9)
     scale = float(np.linalg.norm(W, axis=1).max())
     case = Compared(SCENE, T, data, 0.0, scale, allowed, np.full(2, 1e-13)).read(*data)
-    for some in (case, case.take(slice(0, 301))):
-        found = diagnose(some).named
-        assert [each.name for each in found if each.explains] == [key]
-        assert {name: abs(x) for name, x in found[0].values.items()} == pytest.approx(
-            {name: abs(x) for name, x in values.items()}, rel=1e-6, abs=1e-9
-        )
+    found = diagnose(case.take(rows)).named
+    assert [each.name for each in found if each.explains] == [key]
+    assert {name: abs(x) for name, x in found[0].values.items()} == pytest.approx(
+        {name: abs(x) for name, x in values.items()}, rel=1e-6, abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("key", [each.key for each in READINGS])
+def test_what_a_reading_writes_it_reads_back(key):
+    reading = BY_KEY[key]
+    numbers = np.array([0.3, -0.8, 0.5])[: len(reading.numbers)]
+    written = reading.write(R[:20], W[:20], *numbers)
+    assert any(np.abs(a - b).max() > 0.1 for a, b in zip(written, (R[:20], W[:20]), strict=True))
+    for found, right in zip(reading.read(*written, *numbers), (R[:20], W[:20]), strict=True):
+        np.testing.assert_allclose(found, right, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("key", [key for key in RECORDED if isinstance(BY_KEY[key], Reading)])
+def test_a_reading_writes_the_rows_that_are_written_by_hand(key):
+    make, values = RECORDED[key]
+    for found, expected in zip(BY_KEY[key].write(R, W, *values.values()), make(), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
 
 
 def test_a_band_is_not_larger_than_what_it_removed_shows():

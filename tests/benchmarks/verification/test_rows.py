@@ -112,7 +112,7 @@ SEEN = {
 
 
 @pytest.mark.parametrize("name", SEEN)
-def test_what_looks_like_an_attitude_and_is_not_compared_forbids_right(name, tmp_path):
+def test_what_looks_like_an_attitude_and_is_not_compared_forbids_right(name, tmp_path, unnamed):
     columns, expected = SEEN[name]
     found = verify(tmp_path, {"t": T} | columns | RATES)
     assert found.verdict == expected

@@ -5,13 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative.benchmarks.verification.explain import Diagnosis
 from conservative.benchmarks.verification.recordings import verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
 
+from ...sampling import sampled
+
 AXES = Rotation.from_rotvec([0.5, -0.8, 0.4]).as_matrix()
-T = np.linspace(0, 20, 401)
+T = np.linspace(0, 20, 161)
 
 
 def scene(middle=10.0):
@@ -31,18 +32,16 @@ def noisy(R, w, size):
     return Recording(T, (turned, w + 10 * size * random.normal(size=w.shape)), rows=len(T))
 
 
-@pytest.mark.parametrize(("make", "size"), [(rounded, 1e-3), (rounded, 1e-4), (noisy, 1e-3)], ids=["3", "4", "noise"])
-def test_few_digits_and_noise_are_not_wrong(make, size, monkeypatch):
+@pytest.mark.parametrize(("make", "size"), sampled([(rounded, 1e-3), (rounded, 1e-4), (noisy, 1e-3)], 1))
+def test_few_digits_and_noise_are_not_wrong(make, size, unnamed):
     """The first row alone is off by 3.1 rad. Right with 3 digits and with noise; no start is found with 4 digits."""
-    monkeypatch.setattr(verdict, "diagnose", lambda *_: Diagnosis())
     near = scene()
     found = verdict.verify_recording(near, make(*free_body(near.body, near.R_WB0, near.w_WB_B0, T), size))
     assert found.verdict in ("right", "undecided"), found.sentence
     assert found.details.first_row[0] > 5 * found.details.allowed[0]
 
 
-def test_another_body_stays_wrong(monkeypatch):
-    monkeypatch.setattr(verdict, "diagnose", lambda *_: Diagnosis())
+def test_another_body_stays_wrong(unnamed):
     near, other = scene(), scene(9.0)
     found = verdict.verify_recording(near, rounded(*free_body(other.body, near.R_WB0, near.w_WB_B0, T), 1e-4))
     assert found.verdict == "wrong", found.sentence

@@ -207,6 +207,7 @@ def test_a_file_without_a_table(content, tmp_path):
         load(tmp_path / "run.csv")
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_rows(tmp_path):
     n = 400_000
     pd.DataFrame({"time": np.arange(n), "w_x_rad_s": 1.0, "w_y_rad_s": 2.0, "w_z_rad_s": 3.0}).to_csv(
