@@ -61,6 +61,7 @@ assert bodies.ok.all()"""
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
 
 
+@pytest.mark.slow
 def test_a_program_runs_in_a_process_of_its_own(tmp_path):
     program = ROOT / "tests" / "references" / "programs" / "engine.py"
     places = {name: str(tmp_path) for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME")}

@@ -302,6 +302,7 @@ def test_the_page_follows_the_counts_and_intervals(of_bodies):
     assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-2 | 1.39")
 
 
+@pytest.mark.slow
 def test_the_scripts_of_the_table_of_calls_end_in_the_states_of_the_timed_runs(monkeypatch):
     calls = load("calls")
     found = calls.measure_calls(rounds=1)

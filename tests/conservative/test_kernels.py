@@ -24,6 +24,7 @@ from conservative.kernels.protocol import Result, Workspace
 from conservative.registry import list_families
 
 from ..environments import run_python
+from ..sampling import sampled
 
 SHORT_RUNS = Path(__file__).with_name("short_runs.py")
 PACKAGE = Path(cv.__file__).parent
@@ -70,7 +71,7 @@ print(REGISTER)
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a processor of this kind")
-@pytest.mark.parametrize("method", ["taylor:order=8", "reduced"])
+@pytest.mark.parametrize("method", sampled(["taylor:order=8", "reduced"], 1))
 def test_registers_of_four_and_of_eight_floats_agree(method: str, tmp_path: Path) -> None:
     """Measured: the same bits."""
     own, short = tmp_path / "own.npy", tmp_path / "short.npy"
@@ -131,7 +132,7 @@ print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
 """
 
 
-@pytest.mark.parametrize("setting", ["__pycache__", "NUMBA_CACHE_DIR"])
+@pytest.mark.parametrize("setting", sampled(["__pycache__", "NUMBA_CACHE_DIR"], 1))
 def test_an_edit_of_an_inner_function_runs_new_code(tmp_path: Path, setting: str) -> None:
     """The file of the outer kernel and the modification time of the edited file do not change."""
     packages = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")

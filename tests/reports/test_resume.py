@@ -19,8 +19,8 @@ from conservative import BadInput, NotConverged, Torque
 from conservative.benchmarks.measures.measurement import Samples
 from conservative.method import Role
 from conservative.reports import report
-from conservative.reports.cli.main import main
 from conservative.reports.charts import style
+from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
 from conservative.reports.run import measure as measurements
 from conservative.reports.run.measure import measure
