@@ -40,10 +40,11 @@ def python(arguments: list[str], **environment: str) -> str:
 
 
 @pytest.mark.late
-def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])  # every third run calls all functions, too
+def test_plain_python_and_machine_code_agree_on_every_kernel(every: int, tmp_path: Path) -> None:
     plain, compiled = tmp_path / "plain.npz", tmp_path / "compiled.npz"
-    not_called = python([str(SHORT_RUNS), str(plain)], NUMBA_DISABLE_JIT="1")
-    python([str(SHORT_RUNS), str(compiled)], NUMBA_DISABLE_JIT="")
+    not_called = python([str(SHORT_RUNS), str(plain), str(every)], NUMBA_DISABLE_JIT="1")
+    python([str(SHORT_RUNS), str(compiled), str(every)], NUMBA_DISABLE_JIT="")
     assert not_called == ""
     with np.load(plain) as ours, np.load(compiled) as theirs:
         assert set(ours) == set(theirs)
