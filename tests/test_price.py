@@ -23,6 +23,7 @@ def found(tmp_path_factory):
     return {side: [price.measure_side(side, *pair, cache)] for side in (price.OURS, price.HEYOKA)}
 
 
+@pytest.mark.slow
 def test_both_sides_reach_the_error(found):
     assert found[price.HEYOKA][0]["error"] < price_program.ERROR / 10  # measured 1.1e-10
     assert found[price.OURS][0]["error"] < price_program.ERROR  # measured 1.2e-8

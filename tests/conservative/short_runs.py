@@ -1,7 +1,7 @@
 """Short runs of every kernel, and the names of the kernels that a run in plain Python reaches.
 
-`python short_runs.py FILE [N]` stores the trajectories of every Nth run in FILE (npz), and with NUMBA_DISABLE_JIT=1 prints the functions of
-`conservative.kernels` that were not called.
+`python short_runs.py FILE [N]` stores the trajectories of every Nth run in FILE (npz), and with NUMBA_DISABLE_JIT=1 prints the
+functions of `conservative.kernels` that were not called.
 """
 
 from __future__ import annotations

@@ -631,10 +631,8 @@ def test_noise_is_what_no_scan_resolves(function, expected):
     assert bent(lambda t: np.array((function(t), 0.0, 0.0))).smoothness().noise is expected
 
 
-ASKED = product(
-    ("torque", "attitude", "motor", "factor", "potential"),
-    ("error", "samples of an error", "dt", "t_eval", "adaptive", "scipy"),
-)
+WAYS = ("error", "samples of an error", "dt", "t_eval", "adaptive", "scipy")
+ASKED = product(("torque", "attitude", "motor", "factor", "potential"), WAYS)
 
 
 @pytest.mark.parametrize(("kind", "how"), sampled(ASKED, 6, [("motor", "samples of an error")]))

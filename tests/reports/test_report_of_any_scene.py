@@ -133,6 +133,7 @@ def test_a_scene_whose_reference_solutions_disagree_has_drifts(tmp_path, without
     assert failed_parts(document.blocks) == []
 
 
+@pytest.mark.slow  # `watch` shows the beginning of the same motions, in `test_animation`
 def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_files):
     path = write_file(tmp_path / "long.toml", replace(ROWS[Feature.ROTOR].without, t_end=1000.0))
     path.write_text("dt = 0.5\n" + path.read_text())
@@ -146,7 +147,7 @@ def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_fil
     assert f"Only the first {exact.t[-1]:.3g} s" in (tmp_path / "report.md").read_text()
 
 
-@pytest.mark.slow  # the spacing of the samples is checked above, too
+@pytest.mark.slow
 def test_samples_of_an_animation_are_close_enough_to_be_joined(tmp_path, without_files):
     path = write_file(tmp_path / "fast.toml", replace(ROWS[Feature.ROTOR].without, t_end=170.0))  # 300 rad
     path.write_text("dt = 0.1\n" + path.read_text())
