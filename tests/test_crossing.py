@@ -402,7 +402,7 @@ ENTRIES = (
 )
 SLOW = (dask, report, study, recommend, verify_and_explain, integrate_many_error)
 NEVER = (integrate, integrate_samples, integrate_error, pickled, keys, truth, run, run_odd_step, watch, verify)
-NEVER += (verify_and_explain, verify_later)
+NEVER += (verify_and_explain, verify_later, gate)
 """Columns that take every part: a refusal is a failure there."""
 columns = [*ENTRIES, *(column for each in COMMANDS.values() for column in each)]
 METHODS = registry.list_methods()

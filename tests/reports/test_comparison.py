@@ -131,11 +131,14 @@ def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     options = [text for name, path in files.items() for text in (f"--{name}", path)]
     code, text = gate("--against", "main", *options)
     assert code == 1
-    assert text.splitlines() == [block.text for block in SLOWER.brief[:1]] + [f"  {each}" for each in SLOWER.failures]
-    assert files["markdown"].read_text() == text_of(SLOWER, "markdown")
-    assert files["html"].read_text() == text_of(SLOWER, "html")
-    assert files["junit"].read_text() == text_of(SLOWER, "junit")
-    assert gate("--against", "main", ended=document())[0] == 0
+    summary, violation = text.splitlines()
+    assert "1 violation" in summary
+    for content in (violation, *(path.read_text() for path in files.values())):
+        assert all(part in content for part in ("brick_flip", "reduced", "1.100"))  # the row, and how much longer it takes
+    assert ElementTree.parse(files["junit"]).find("testsuite").get("failures") == "1"
+    code, text = gate("--against", "main", ended=document())
+    assert code == 0
+    assert text.splitlines() == ["gate: passed, 1 row, 1 timed, 0 violations"]
 
 
 @pytest.mark.parametrize("options", [("--update", "why"), ("--baseline", "kept.json"), ("results.json",)])
