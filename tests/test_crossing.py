@@ -424,10 +424,13 @@ def check(cell: Cell, column: Any, may_refuse: bool = True) -> None:
 
 VARYING = {Feature.TURNING, Feature.TIME, Feature.MOTOR, Feature.TORQUE}
 """Parts that depend on time."""
+IN_FILES = {feature for feature in Feature if ROWS[feature].in_file}
 DEFAULT = {
     integrate_corners: {Feature.TURNING, Feature.MOTOR, Feature.TORQUE, Feature.ATTITUDE, Feature.FLIGHT},
     run_odd_step: {Feature.GRAVITY, Feature.FLIGHT, *VARYING},
     verify_later: {Feature.ROTOR, *VARYING},
+    watch: IN_FILES,
+    sweep: IN_FILES,
     **{column: set() for column in SLOW},
 }
 """Parts of the default run, in columns that do not have all: other cells of `SLOW` take seconds, of the others they repeat."""

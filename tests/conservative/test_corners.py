@@ -93,7 +93,8 @@ def test_errors_have_the_order_of_the_method_beside_many_corners():
 
 
 @pytest.mark.filterwarnings("ignore::conservative.LoadNotResolved")
-@pytest.mark.parametrize("part", sampled(["rotor", "factor", "frame"], 1, ["factor"]))  # the crossing has them too
+@pytest.mark.slow  # the crossing has them, too
+@pytest.mark.parametrize("part", ["rotor", "factor", "frame"])
 def test_tables_of_other_parts_have_more_corners_than_steps(part):
     times = np.unique(draw_times("anywhere", 40))
     values = np.random.default_rng(3).normal(size=(len(times), 3))
@@ -199,6 +200,7 @@ def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t
         assert 0 < each.message.step < 0.01  # measured: 0.0015 and 0.0049
 
 
+@pytest.mark.slow
 def test_adaptive_steps_see_a_pulse_after_the_end_of_the_scene():
     torque = cv.Torque(lambda t: (np.exp(-(((t - 1.5) / 0.01) ** 2)), 0, 0))
     scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (0.01, 0.005, 0.003), 0.2, None, torque=torque)

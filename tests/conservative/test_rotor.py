@@ -98,11 +98,10 @@ def supported(kind: str, method: str) -> bool:
 
 
 DIAGONAL = [
-    *(("free", "reduced"), ("free", "gauss"), ("gravity", "taylor"), ("spring", "reduced:order=6")),
-    *(("attraction", method) for method in ("splitting", "splitting:order=2", "no_squish:order=4")),
+    *(("gravity", "taylor"), ("spring", "reduced:order=6"), ("attraction", "splitting")),
     *(("gradient", "taylor:tolerance=1e-12"), ("fixed_gradient", "projected")),
 ]
-"""Each field and each method, with few kernels: compiling one takes 2 s."""
+"""Each field with one method: compiling a kernel takes 2 s. The crossing has a rotor without a field, with all methods."""
 
 
 @pytest.mark.parametrize("method", LARGEST)
@@ -113,7 +112,7 @@ def test_a_method_supports_the_fields_that_it_declares(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "method"), sampled([pair for pair in product(KINDS, LARGEST) if supported(*pair)], 9, DIAGONAL)
+    ("kind", "method"), sampled([pair for pair in product(KINDS, LARGEST) if supported(*pair)], 5, DIAGONAL)
 )
 def test_a_method_is_accurate_and_conserves(kind: str, method: str) -> None:
     found, drift = errors(method, kind, 1, 1000)
@@ -124,7 +123,7 @@ def test_a_method_is_accurate_and_conserves(kind: str, method: str) -> None:
 ENGINES = ("heyoka", "heyoka:frame=base_vectors", "heyoka:frame=lean", "scipy")
 
 
-@pytest.mark.parametrize(("kind", "method"), sampled(product(("free", "gravity", "gradient"), ENGINES), 4))
+@pytest.mark.parametrize(("kind", "method"), sampled(product(("free", "gravity", "gradient"), ENGINES), 4, [("free", "scipy")]))
 def test_an_engine_agrees(kind: str, method: str) -> None:
     assert errors(method, kind, 2, 200)[0] < 1e-9
 

@@ -88,7 +88,7 @@ def test_each_part_that_a_scene_can_need_is_carried_along_or_refused():
             assert (refused.value.argument, refused.value.got) == ("scene", f"a scene with {field!r}")
 
 
-SAMPLE = ["rotor", "torque, world", "torque, table", "damping, table", "damping, factor of attitude", "motor", "all"]
+SAMPLE = ["rotor", "torque, world", "torque, table", "damping, factor of attitude", "all"]
 
 
 @pytest.mark.parametrize("name", sampled(PARTS, len(SAMPLE), SAMPLE))
@@ -120,6 +120,16 @@ def test_slower_the_motion_is_the_same(name, slow):
     if scene.loaded:
         units = slow ** np.array([2, 1, 1, 1])
         np.testing.assert_allclose(other.supplied * units, one.supplied, rtol=0, atol=100 * close)
+
+
+@pytest.mark.parametrize("name", ["motor", "motor, function"])
+def test_the_momentum_of_a_motor_is_carried_along(name):
+    scene = plain(**PARTS[name][0])
+    turned, slower, w = in_body_frame(scene, F, "turned"), slow_motion(scene, 3.0), np.array((0.3, -0.4, 0.5))
+    for t in (0.0, 0.4, 0.9, 1.4):
+        momentum = scene.body.momentum(w, t)
+        np.testing.assert_allclose(turned.body.momentum(F @ w, t), F @ momentum, rtol=1e-13)
+        np.testing.assert_allclose(3.0 * slower.body.momentum(w / 3.0, 3.0 * t), momentum, rtol=1e-13)
 
 
 def test_breaks_are_carried_along():

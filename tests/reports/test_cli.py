@@ -109,6 +109,11 @@ def test_a_lost_motion_is_never_ok_without_a_sentence(tmp_path):
     assert run_as_json(*LOST, "--no-truth")["status"] == "ok, but its attitude error is not known"
     watched = conservative("watch", *LOST, "--out", tmp_path / "motion.html")
     assert "reduced: inaccurate: the attitude error is 3" in watched.stdout
+    assert run_as_json("lagrange_top", "--no-truth")["status"] == "ok"  # its error is estimated
+
+
+@pytest.mark.slow
+def test_a_sweep_of_lost_motions_has_a_sentence():
     swept = conservative("sweep", *LOST, "--starts", "2", "--spread", "rate=1%")
     assert "the motions are inaccurate" in swept.stdout
     assert swept.exit_code == 1
@@ -118,7 +123,6 @@ def test_a_lost_motion_is_never_ok_without_a_sentence(tmp_path):
         swept = conservative("sweep", *right, "--starts", "2", "--spread", "rate=1%")
         assert "inaccurate" not in swept.stdout
         assert swept.exit_code == 0
-    assert run_as_json("lagrange_top", "--no-truth")["status"] == "ok"  # its error is estimated
 
 
 def test_a_chaotic_motion_that_no_step_reaches_is_not_ok(tmp_path):
@@ -190,6 +194,7 @@ def test_a_run_says_how_wrong_it_is(scene, allowed):
     assert skipped == {"reason": "not computed (--no-truth)"}
 
 
+@pytest.mark.slow
 def test_a_long_run_without_closed_form_is_compared_when_asked():
     long = ("run", "kovalevskaya_top", "-m", "taylor", "--t-end", "450", "--dt", "0.05", "--json")  # 1,030 rad
     assert "--truth" in json.loads(conservative(*long).stdout)["error"]["reason"]

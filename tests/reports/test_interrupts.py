@@ -59,7 +59,7 @@ def temporaries(folder):
         ("run", signal.SIGTERM),
         pytest.param("run", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("run", signal.SIGHUP, marks=pytest.mark.slow),
-        ("watch", signal.SIGINT),
+        pytest.param("watch", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("watch.gif", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("sweep", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("report", signal.SIGTERM, marks=pytest.mark.slow),
