@@ -19,7 +19,7 @@ from conservative.registry import Name, read_name
 from .environments import ROOT, build, programs
 
 MARKERS = {
-    "slow": "needs kills, builds, clusters, environments or many processes; runs with --all",
+    "slow": "needs kills, builds, clusters, many processes or seconds, or is not in a sample of cases; runs with --all",
     "browser": "needs chromium and its driver; runs with --browser or --all",
     "engine(name)": "needs an engine in an environment of its own; runs with --engines name or --all",
     "attack": "searches for failures at random; runs with --attack",

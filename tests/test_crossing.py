@@ -12,8 +12,11 @@ import re
 import shlex
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count, product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -36,9 +39,10 @@ from conservative.references.truth import reference
 from conservative.reports.cli.main import main
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 
-from .crossing import APART, CORNER_FACTOR, CORNERS, RIGHT, ROWS, STEPS, J, Row, write_file
+from .crossing import APART, CORNER_FACTOR, CORNERS, RIGHT, ROWS, STEPS, J, Row, T, right_motion, write_file
 from .environments import PATIENCE
-from .independent import Case, angle_between, matrix_of, motion, place
+from .independent import Case, angle_between, matrix_of, place
+from .sampling import sampled
 
 
 class Refused(Exception):
@@ -88,29 +92,42 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+NUMBERS = count()
+
+
 @pytest.fixture
-def cell(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: Path) -> Cell:
-    """Return the cell of a member of `Feature`; scenes that no file can have are registered for the time of the test."""
-    row, names = ROWS[request.param], []
+def make_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: Path) -> Callable[[Row], Cell]:
+    """Return a function that makes cells; scenes that no file can have are registered for the time of the test."""
     monkeypatch.chdir(tmp_path)
-    cases = {"crossed": row.case, "another": row.other, "copy": row.case, "without": row.without}
-    for name, case in cases.items():
-        if row.in_file:
-            names.append(str(write_file(tmp_path / f"{name}.toml", case)))
-        else:
-            names.append(name)
-    known = deferred_imports.list_entries
+    known, made = deferred_imports.list_entries, {}
 
     def list_entries(group: str) -> Any:
         builders = {
-            name: SimpleNamespace(load=lambda n=name: lambda: row.scene(cases[n], n), value="tests", module=__name__)
-            for name in cases
+            name: SimpleNamespace(load=lambda build=build: build, value="tests", module=__name__)
+            for name, build in made.items()
         }
         return known(group) | (builders if group == deferred_imports.SCENES else {})
 
+    def make(row: Row) -> Cell:
+        number, names = next(NUMBERS), []  # a process remembers the scenes of registered names
+        cases = {"crossed": row.case, "another": row.other, "copy": row.case, "without": row.without}
+        for name, case in cases.items():
+            names.append(f"{name}_{number}")
+            if row.in_file:
+                names[-1] = str(write_file(tmp_path / f"{names[-1]}.toml", case))
+            else:
+                made[names[-1]] = partial(row.scene, case, names[-1])
+        return Cell(row, tmp_path, *names, program=program)
+
     monkeypatch.setattr(deferred_imports, "list_entries", list_entries)
     monkeypatch.setattr(registry, "list_entries", list_entries)
-    return Cell(row, tmp_path, *names, program=program)
+    return make
+
+
+@pytest.fixture
+def cell(request: pytest.FixtureRequest, make_cell: Callable[[Row], Cell]) -> Cell:
+    """Return the cell of a member of `Feature`."""
+    return make_cell(ROWS[request.param])
 
 
 # Entry points in Python
@@ -118,7 +135,7 @@ def cell(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
 
 def integrate(cell: Cell) -> None:
     found = cv.integrate(cell.row.scene(), 0.004)
-    cell.check(found.t[::50], found.R_WB[::50])
+    cell.check(found.t[::5], found.R_WB[::5])
     if (flight := cell.row.case.flight) is not None:
         assert flight
         p, v = place(cell.row.case, found.t, found.R_WB, found.w_WB_B)
@@ -135,17 +152,17 @@ def integrate_corners(cell: Cell) -> None:
     case = cell.row.case
     added: dict[str, Any] = {"torque": CORNERS} if case.torque is None else {"damping": 0.3 * J, "factor": CORNER_FACTOR}
     case = replace(case, **added)
-    scene = cell.row.scene(case)
+    row = replace(cell.row, case=case)
+    scene = row.scene()
     method = "projected" if case.flight is None else "reduced"
-    right = motion(case, np.linspace(0, case.t_end, STEPS + 1))[0]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cv.LoadNotResolved)
         alone = cv.integrate(scene, case.t_end / STEPS, method)
         between = cv.integrate(scene, case.t_end / STEPS, method, t_eval=cell.row.t)
-        many = cv.integrate_many(scene, w_WB_B0=starts(case), dt=case.t_end / STEPS, method=method, threads=1)
-    assert angle_between(alone.R_WB, right).max() < 1e-4
-    assert angle_between(between.R_WB, motion(case, cell.row.t)[0]).max() < 1e-4
-    check_many(replace(cell, row=replace(cell.row, case=case)), many)
+        many = cv.integrate_many(scene, w_WB_B0=row.starts[:2], dt=case.t_end / STEPS, method=method, threads=1)
+    assert row.distance(alone.t, alone.R_WB) < 1e-4
+    assert row.distance(between.t, between.R_WB) < 1e-4
+    check_many(row, many)
 
 
 def integrate_error(cell: Cell) -> None:
@@ -154,7 +171,7 @@ def integrate_error(cell: Cell) -> None:
     for case in (row.other, row.without, row.case):
         t = [0.0, 0.7, row.case.t_end]
         found = cv.integrate(row.scene(case), error=1e-7, t_eval=t)
-        off = float(angle_between(found.R_WB, motion(case, t)[0]).max())
+        off = float(angle_between(found.R_WB, right_motion(case, t)[0]).max())
         assert off < 1e-7
         assert found.choice.estimate > 1e-3 * off
 
@@ -183,24 +200,20 @@ def truth(cell: Cell) -> None:
     assert found.agreement_rad < 1e-9
 
 
-def starts(case: Case) -> Any:
-    return np.asarray(case.w0) * np.array([[1.0], [1.1], [0.9]])
-
-
-def check_many(cell: Cell, found: cv.Ensemble) -> None:
+def check_many(row: Row, found: cv.Ensemble) -> None:
     assert not found.failures
-    for i, w0 in enumerate(starts(cell.row.case)):
-        case = replace(cell.row.case, w0=w0)
-        assert angle_between(motion(case, found.t)[0], np.asarray(found.R_WB[i])).max() < RIGHT
+    for case, R_WB in zip(row.started, found.R_WB, strict=False):
+        assert angle_between(right_motion(case, found.t)[0], np.asarray(R_WB)).max() < RIGHT
 
 
 def integrate_many(cell: Cell) -> None:
-    given = {"w_WB_B0": starts(cell.row.case), "dt": 0.005, "sample_every": 100}
-    check_many(cell, cv.integrate_many(cell.row.scene(), **given, threads=1))
+    given = {"w_WB_B0": cell.row.starts, "dt": 0.005, "sample_every": 100}
+    check_many(cell.row, cv.integrate_many(cell.row.scene(), **given, threads=1))
 
 
 def integrate_many_error(cell: Cell) -> None:
-    check_many(cell, cv.integrate_many(cell.row.scene(), w_WB_B0=starts(cell.row.case), error=1e-5, dt=0.5, threads=1))
+    row = cell.row
+    check_many(row, cv.integrate_many(row.scene(), w_WB_B0=row.starts, error=1e-5, dt=0.5, threads=1))
 
 
 def stored(cell: Cell) -> None:
@@ -209,15 +222,15 @@ def stored(cell: Cell) -> None:
     row, path = cell.row, cell.folder / "many.zarr"
 
     def run(case: Case, **options: Any) -> cv.Ensemble:
-        given = {"w_WB_B0": starts(row.case), "dt": 0.005, "sample_every": 100, "threads": 1, "method": method}
+        given = {"w_WB_B0": row.starts, "dt": 0.02, "sample_every": 25, "threads": 1, "method": method}
         return cv.integrate_many(row.scene(case), **given, path=path, **options)
 
-    method = "reduced" if cv.Reduced().unsupported(row.scene()) is None else "projected"
+    method = "reduced:order=4" if cv.Reduced().unsupported(row.scene()) is None else "projected"
     run(row.case)
-    check_many(cell, cv.open_ensemble(path, row.scene()))
+    check_many(row, cv.open_ensemble(path, row.scene()))
     if row.in_file:
-        check_many(cell, cv.open_ensemble(path))
-    check_many(cell, run(row.case, resume=True))
+        check_many(row, cv.open_ensemble(path))
+    check_many(row, run(row.case, resume=True))
     for case in (row.other, row.without):
         with pytest.raises(cv.BadInput):
             cv.open_ensemble(path, row.scene(case))
@@ -234,8 +247,8 @@ def dask(cell: Cell) -> None:
         client = stack.enter_context(open_client(address, PATIENCE))
         start(stack, cell.folder, "worker", address, "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
         client.wait_for_workers(1, timeout=PATIENCE)
-        given = {"w_WB_B0": starts(cell.row.case), "dt": 0.005, "sample_every": 100}
-        check_many(cell, cv.integrate_many(cell.row.scene(), **given, client=client))
+        given = {"w_WB_B0": cell.row.starts, "dt": 0.005, "sample_every": 100}
+        check_many(cell.row, cv.integrate_many(cell.row.scene(), **given, client=client))
 
 
 def protocol(cell: Cell) -> None:
@@ -263,7 +276,7 @@ def protocol(cell: Cell) -> None:
         case = replace(case, turning=(rate, numbers["turn"] / rate))
     case = replace(case, rotor=numbers.get("rotor"))
     assert numbers["free"] == (case.field is None)
-    cell.check(cell.row.t, motion(case, cell.row.t)[0] @ axes.R_BF.T, 1e-9)
+    cell.check(cell.row.t, right_motion(case, cell.row.t)[0] @ axes.R_BF.T, 1e-9)
 
 
 def gate(cell: Cell) -> None:
@@ -320,7 +333,8 @@ def verify(cell: Cell) -> None:
 
 
 def verify_and_explain(cell: Cell) -> None:
-    for (R_WB, w), right in ((motion(cell.row.case, T), True), (motion(cell.row.without, T), False)):
+    for case, right in ((cell.row.case, True), (cell.row.without, False)):
+        R_WB, w = right_motion(case, T)
         write_motion(cell.folder / "run.csv", R_WB, w)
         found = cell.call("verify", "run.csv", "--body", cell.name, codes=(0, 1, 3))
         assert (found["verdict"] == "right") is right, found["subjects"]
@@ -329,14 +343,11 @@ def verify_and_explain(cell: Cell) -> None:
 
 def verify_later(cell: Cell) -> None:
     """A file that begins after t = 0 is compared at its own times."""
-    R_WB, w = motion(cell.row.case, T)
+    R_WB, w = right_motion(cell.row.case, T)
     write_motion(cell.folder / "run.csv", R_WB, w, 50)
     with patch("conservative.benchmarks.verification.recordings.verdict.diagnose", return_value=Diagnosis()):
         found = cell.call("verify", "run.csv", "--body", cell.name, codes=(0, 1, 3))
     assert found["verdict"] == "right", found["subjects"]
-
-
-T = np.linspace(0, 2, 201)
 
 
 def write_motion(path: Path, R_WB: Any, w: Any, first: int = 0) -> None:
@@ -391,7 +402,7 @@ ENTRIES = (
 )
 SLOW = (dask, report, study, recommend, verify_and_explain, integrate_many_error)
 NEVER = (integrate, integrate_samples, integrate_error, pickled, keys, truth, run, run_odd_step, watch, verify)
-NEVER += (verify_and_explain, verify_later)
+NEVER += (verify_and_explain, verify_later, gate)
 """Columns that take every part: a refusal is a failure there."""
 columns = [*ENTRIES, *(column for each in COMMANDS.values() for column in each)]
 METHODS = registry.list_methods()
@@ -411,30 +422,71 @@ def check(cell: Cell, column: Any, may_refuse: bool = True) -> None:
     assert not refusal or re.search(words, refusal), f"a refusal that does not name the part: {refusal}"
 
 
-@pytest.mark.parametrize("cell", Feature, indirect=True, ids=lambda feature: feature.name)
+VARYING = {Feature.TURNING, Feature.TIME, Feature.MOTOR, Feature.TORQUE}
+"""Parts that depend on time."""
+IN_FILES = {feature for feature in Feature if ROWS[feature].in_file}
+DEFAULT = {
+    integrate_corners: {Feature.TURNING, Feature.MOTOR, Feature.TORQUE, Feature.ATTITUDE, Feature.FLIGHT},
+    run_odd_step: {Feature.GRAVITY, Feature.FLIGHT, *VARYING},
+    verify_later: {Feature.ROTOR, *VARYING},
+    watch: IN_FILES,
+    sweep: IN_FILES,
+    **{column: set() for column in SLOW},
+}
+"""Parts of the default run, in columns that do not have all: other cells of `SLOW` take seconds, of the others they repeat."""
+
+
+def marks(column: Any, feature: Feature) -> list[pytest.MarkDecorator]:
+    return [] if feature in DEFAULT.get(column, set(Feature)) else [pytest.mark.slow]
+
+
 @pytest.mark.parametrize(
-    "column",
-    [pytest.param(each, id=each.__name__, marks=[pytest.mark.slow] * (each in SLOW)) for each in columns],
+    ("column", "cell"),
+    [
+        pytest.param(column, feature, id=f"{column.__name__}-{feature.name}", marks=marks(column, feature))
+        for column in columns
+        for feature in Feature
+    ],
+    indirect=["cell"],
 )
 def test_a_part_is_right_or_refused(cell: Cell, column: Any) -> None:
     check(cell, column, column not in NEVER)
 
 
-@pytest.mark.parametrize("cell", Feature, indirect=True, ids=lambda feature: feature.name)
-@pytest.mark.parametrize("method", METHODS)
-def test_prepare_and_check_are_right_or_refuse(cell: Cell, method: str) -> None:
-    scene, grid = cell.row.scene(), cv.Grid(0.005, 400, 50)
-    chosen = registry.method(method)
+def supported(method: str, feature: Feature) -> bool:
+    return registry.method(method).unsupported(ROWS[feature].scene()) is None
 
-    if chosen.unsupported(scene) is None:
-        found = chosen.check(scene, grid, chosen.prepare(scene, grid)())
-        assert found.ok, found.outcome
-        cell.check(cell.row.t, found.R_WB, 0.1)  # methods of order 1 and 2
-        return
-    with pytest.raises(cv.Unsupported) as refusal:
-        chosen.prepare(scene, grid)
-    for feature in scene.features - chosen.supports:
-        assert feature.value in str(refusal.value)
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_method_refuses_to_prepare_what_it_does_not_support(method: str) -> None:
+    for feature in Feature:
+        scene, chosen = ROWS[feature].scene(), registry.method(method)
+        if not supported(method, feature):
+            with pytest.raises(cv.Unsupported) as refusal:
+                chosen.prepare(scene, cv.Grid(0.005, 400, 50))
+            for each in scene.features - chosen.supports:
+                assert each.value in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("method", "feature"),
+    sampled([pair for pair in product(METHODS, Feature) if supported(*pair)], 22, [("scipy", Feature.TORQUE)]),
+)
+def test_prepare_and_check_are_right(method: str, feature: Feature) -> None:
+    row, grid, chosen = ROWS[feature], cv.Grid(0.005, 400, 50), registry.method(method)
+    found = chosen.check(row.scene(), grid, chosen.prepare(row.scene(), grid)())
+    assert found.ok, found.outcome
+    assert row.distance(row.t, found.R_WB) < 0.1  # methods of order 1 and 2
+
+
+@pytest.mark.parametrize("feature", Feature, ids=lambda feature: feature.name)
+def test_a_gate_that_ignores_a_part_is_seen(feature: Feature, make_cell: Callable[[Row], Cell]) -> None:
+    """Every cell of the column `gate` fails if the scenes of the gate are without the part, or without its value."""
+    row = ROWS[feature]
+    gate(make_cell(row))
+    for wrong in (replace(row, case=row.without), replace(row, other=row.case)):
+        with pytest.raises(AssertionError):
+            gate(make_cell(wrong))
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -447,8 +499,8 @@ def test_every_part_has_a_row() -> None:
     for feature, row in ROWS.items():
         assert feature in row.scene().features
         assert feature not in row.scene(row.without).features
-        assert row.distance(row.t, row.wrong_motion[0]) > APART  # measured: from 0.39
-        assert row.distance(row.t, motion(row.other, row.t)[0]) > 10 * RIGHT  # measured: from 0.21
+        assert row.distance(row.t, right_motion(row.without, row.t)[0]) > APART  # measured: from 0.39
+        assert row.distance(row.t, right_motion(row.other, row.t)[0]) > 10 * RIGHT  # measured: from 0.21
 
 
 def test_a_jump_of_all_components_is_a_break() -> None:
@@ -467,8 +519,8 @@ def test_a_wrong_motion_is_not_called_right(tmp_path: Path) -> None:
     """The check of the cells sees a motion without the part."""
     row = ROWS[Feature.ROTOR]
     cell = Cell(row, tmp_path, "", "")
-    cell.check(row.t, row.motion[0])
+    cell.check(row.t, right_motion(row.case, row.t)[0])
     with pytest.raises(AssertionError):
-        cell.check(row.t, row.wrong_motion[0])
+        cell.check(row.t, right_motion(row.without, row.t)[0])
     with pytest.raises(AssertionError, match="does not name"):
         check(cell, lambda cell: (_ for _ in ()).throw(cv.BadInput("scene", "something", "something else")))

@@ -152,7 +152,10 @@ sys.modules["other"] = importlib.util.module_from_spec(spec)
 """
 
 
-@pytest.mark.parametrize(("program", "doubles"), [(EVERYTHING, ""), (TWICE, "['conservative.version', 'other']")])
+@pytest.mark.parametrize(
+    ("program", "doubles"),
+    [(EVERYTHING, ""), pytest.param(TWICE, "['conservative.version', 'other']", marks=pytest.mark.slow)],
+)
 def test_no_module_is_imported_under_two_names(program, doubles):
     code, out, error = run_python(program + DOUBLES, str(ROOT))
     assert (code, out.strip()) == (0, doubles), error

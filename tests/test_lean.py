@@ -65,7 +65,7 @@ def test_a_lean_environment_integrates():
 @pytest.mark.parametrize(
     ("program", "messages"),
     [
-        ("import pandas", ["No module named 'pandas'"]),
+        pytest.param("import pandas", ["No module named 'pandas'"], marks=pytest.mark.slow),
         (LOOK + SHOWN, ["Trajectory.to_pandas needs pandas", "pip install 'conservative-rotation[report]'"]),
     ],
     ids=["import", "table"],

@@ -19,7 +19,7 @@ child.wait()
 """
 
 
-@pytest.mark.parametrize("parent_ends", [False, True])
+@pytest.mark.parametrize("parent_ends", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_children_of_a_program_end_with_the_test(parent_ends):
     with programs() as start:
         code = PARENT.replace("child.wait()", "") if parent_ends else PARENT

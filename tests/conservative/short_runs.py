@@ -1,7 +1,7 @@
 """Short runs of every kernel, and the names of the kernels that a run in plain Python reaches.
 
-`python short_runs.py FILE` stores the trajectories in FILE (npz), and with NUMBA_DISABLE_JIT=1 prints the functions of
-`conservative.kernels` that were not called.
+`python short_runs.py FILE [N]` stores the trajectories of every Nth run in FILE (npz), and with NUMBA_DISABLE_JIT=1 prints the
+functions of `conservative.kernels` that were not called.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import pkgutil
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -140,8 +141,8 @@ def functions() -> dict[str, str]:
     return found
 
 
-def main(file: str) -> None:
-    """Store all trajectories; print the functions that nothing called."""
+def main(file: str, every: int = 1) -> None:
+    """Store the trajectories of every such run; print the functions that nothing called."""
     called: set[str] = set()
 
     def note(frame, event, _) -> None:
@@ -150,7 +151,7 @@ def main(file: str) -> None:
 
     if not kernels.COMPILED:
         sys.setprofile(note)
-    found = {name: numbers(run()) for name, run in runs()}
+    found = {name: numbers(run()) for name, run in islice(runs(), 0, None, every)}
     sys.setprofile(None)
     np.savez(file, **found)
     if not kernels.COMPILED:
@@ -158,4 +159,4 @@ def main(file: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1], *map(int, sys.argv[2:]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from zlib import crc32
 
 import numpy as np
@@ -21,6 +21,7 @@ from conservative.methods.pieces import count_most_steps, list_pieces
 from conservative.methods.search import begin
 
 from ..independent import Case, angle_between, matrix_of, motion
+from ..sampling import sampled
 
 BASE = Case(
     (1.0, 2.0, 2.5),
@@ -58,9 +59,7 @@ KINDS = ("anywhere", "first step", "last step", "middle", "at steps", "jumps", "
 
 
 @pytest.mark.filterwarnings("ignore::conservative.LoadNotResolved")
-@pytest.mark.parametrize("n", [8, 20, 60])
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("method", ["reduced", "projected", "scipy"])
+@pytest.mark.parametrize(("method", "kind", "n"), sampled(product(LARGEST, KINDS, (8, 20, 60)), 8))
 def test_samples_of_divided_steps_are_right(method, kind, n):
     case = made(kind, n)
     scene, at = case.scene(), np.random.default_rng(n).uniform(0, 1, 9)
@@ -94,6 +93,7 @@ def test_errors_have_the_order_of_the_method_beside_many_corners():
 
 
 @pytest.mark.filterwarnings("ignore::conservative.LoadNotResolved")
+@pytest.mark.slow  # the crossing has them, too
 @pytest.mark.parametrize("part", ["rotor", "factor", "frame"])
 def test_tables_of_other_parts_have_more_corners_than_steps(part):
     times = np.unique(draw_times("anywhere", 40))
@@ -200,6 +200,7 @@ def test_a_warning_is_about_the_time_of_the_run_and_not_of_the_scene(of_scene, t
         assert 0 < each.message.step < 0.01  # measured: 0.0015 and 0.0049
 
 
+@pytest.mark.slow
 def test_adaptive_steps_see_a_pulse_after_the_end_of_the_scene():
     torque = cv.Torque(lambda t: (np.exp(-(((t - 1.5) / 0.01) ** 2)), 0, 0))
     scene = cv.Scene("late", cv.RigidBody((3, 2, 1)), np.eye(3), (0.01, 0.005, 0.003), 0.2, None, torque=torque)
@@ -319,7 +320,7 @@ def test_a_recording_that_ends_with_the_run_is_integrated_at_the_default_step(t_
 
 
 @pytest.mark.filterwarnings("ignore::conservative.LoadNotResolved")
-@pytest.mark.parametrize("method", ["projected", "scipy"])
+@pytest.mark.parametrize("method", sampled(["projected", "scipy"], 1))
 def test_samples_between_steps_see_each_jump_at_its_time(method):
     """Jumps between the step and the sample, at both, and just beside them; a jump of damping as well."""
     times = np.array([0.0, 0.1, 0.1, 0.23, 0.23, 0.231, 0.231, 0.35, 0.35, 0.36, 0.72, 0.72, 1.0])
@@ -337,7 +338,7 @@ def test_samples_between_steps_see_each_jump_at_its_time(method):
     assert np.array_equal(beside.R_WB[0], found.R_WB[5])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", sampled(range(3), 1))
 def test_a_search_beside_break_points_compares_runs_that_differ(seed):
     """Steps are so short that runs at one and two times the step differ between all break points, or the estimate is 0."""
     random = np.random.default_rng(seed)

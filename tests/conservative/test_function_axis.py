@@ -1,6 +1,7 @@
 """Functions with a named axis: energy and the momentum about it, both to round-off, whatever the function and the method."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
 
+from ..sampling import sampled
 from .one_body import body_in_axes, drift
 
 B = np.array([0.3, 0.1, 0.4])
@@ -58,25 +60,30 @@ def in_field(field, w=(1, 0.6, 2), t_end=1.0):
 SCENES = {"quartic": in_field(QUARTIC), "other rows": in_field(other_rows(B, 4, 20, 3))} | {
     f"polynomial {seed}": polynomial(seed) for seed in range(3)
 }
-scenes = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+scenes = pytest.mark.parametrize("name", sampled(SCENES, 1, ["polynomial 1"]))
 
 
-@scenes
-@pytest.mark.parametrize("method", [*map(cv.Reduced, (2, 4, 10)), cv.Convected(tol=1e-13)], ids=lambda m: m.name)
-def test_energy_and_momentum_about_the_axis_are_conserved(scene, method):
+METHODS = {method.name: method for method in (cv.Reduced(), cv.Reduced(order=4), cv.Convected(tol=1e-13))}
+
+
+@pytest.mark.parametrize(("name", "method"), sampled(product(SCENES, METHODS), 3, [("polynomial 0", "reduced:order=4")]))
+def test_energy_and_momentum_about_the_axis_are_conserved(name, method):
+    scene, method = SCENES[name], METHODS[method]
     trajectory = cv.integrate(scene, 0.05, method, t_end=10.0)
     assert len(scene.invariants) == 2
     assert drift(trajectory) < (2e-14 if isinstance(method, cv.Reduced) else 1e-13)  # measured 3e-15, 2.3e-14
 
 
 @scenes
-def test_convected_and_reduced_are_the_same_map(scene):
+def test_convected_and_reduced_are_the_same_map(name):
+    scene = SCENES[name]
     convected, reduced = (cv.integrate(scene, 0.05, method) for method in (cv.Convected(tol=1e-13), cv.Reduced()))
     assert angle_between(convected.R_WB, reduced.R_WB).max() < 5e-13  # measured 5e-14
 
 
 @scenes
-def test_order_two_and_four_against_a_method_without_finite_derivative(scene):
+def test_order_two_and_four_against_a_method_without_finite_derivative(name):
+    scene = SCENES[name]
     truth = cv.integrate(scene, 0.005, cv.Projected()).R_WB[-1]
     for order, steps, tolerance in ((2, (160, 320), 0.01), (4, (20, 40), 0.1)):  # measured 3e-4 and 0.037
         coarse, fine = (angle_between(truth, cv.integrate(scene, 1.0 / n, cv.Reduced(order=order)).R_WB[-1]) for n in steps)
@@ -84,14 +91,15 @@ def test_order_two_and_four_against_a_method_without_finite_derivative(scene):
 
 
 @scenes
-def test_the_step_is_symmetric(scene):
+def test_the_step_is_symmetric(name):
+    scene = SCENES[name]
     there = cv.integrate(scene, 0.1, cv.Reduced())
     returning = scene.rename("back", R_WB0=there.R_WB[-1], w_WB_B0=-there.w_WB_B[-1])
     back = cv.integrate(returning, 0.1, cv.Reduced())
     assert angle_between(back.R_WB[-1], scene.R_WB0) < 1e-14  # measured 1.5e-15
 
 
-@pytest.mark.parametrize("exponent", [*range(1, 17, 2), math.inf])
+@pytest.mark.parametrize("exponent", sampled([*range(1, 17, 2), math.inf], 3, [math.inf]))
 def test_a_spin_about_the_axis_with_any_disturbance(exponent):
     # The axis hardly moves in the body, or not at all. The difference of energies is then round-off, here of 100 J, and must
     # not be divided by that motion.

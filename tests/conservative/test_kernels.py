@@ -22,6 +22,7 @@ from conservative.kernels.protocol import Result, Workspace
 from conservative.registry import list_families
 
 from ..environments import run_python
+from ..sampling import sampled
 
 SHORT_RUNS = Path(__file__).with_name("short_runs.py")
 PACKAGE = Path(cv.__file__).parent
@@ -37,10 +38,11 @@ def python(arguments: list[str], **environment: str) -> str:
 
 
 @pytest.mark.late
-def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])  # every third run calls all functions, too
+def test_plain_python_and_machine_code_agree_on_every_kernel(every: int, tmp_path: Path) -> None:
     plain, compiled = tmp_path / "plain.npz", tmp_path / "compiled.npz"
-    not_called = python([str(SHORT_RUNS), str(plain)], NUMBA_DISABLE_JIT="1")
-    python([str(SHORT_RUNS), str(compiled)], NUMBA_DISABLE_JIT="")
+    not_called = python([str(SHORT_RUNS), str(plain), str(every)], NUMBA_DISABLE_JIT="1")
+    python([str(SHORT_RUNS), str(compiled), str(every)], NUMBA_DISABLE_JIT="")
     assert not_called == ""
     with np.load(plain) as ours, np.load(compiled) as theirs:
         assert set(ours) == set(theirs)
@@ -68,6 +70,7 @@ print(REGISTER)
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a processor of this kind")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["taylor:order=8", "reduced"])
 def test_registers_of_four_and_of_eight_floats_agree(method: str, tmp_path: Path) -> None:
     """Measured: the same bits."""
@@ -134,7 +137,7 @@ print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
 """
 
 
-@pytest.mark.parametrize("setting", ["__pycache__", "NUMBA_CACHE_DIR"])
+@pytest.mark.parametrize("setting", sampled(["__pycache__", "NUMBA_CACHE_DIR"], 1))
 def test_an_edit_of_an_inner_function_runs_new_code(tmp_path: Path, setting: str) -> None:
     """The file of the outer kernel and the modification time of the edited file do not change."""
     packages = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")

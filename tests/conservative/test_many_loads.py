@@ -14,6 +14,8 @@ from conservative.integration.shared_choice import pick_hardest
 from conservative.invariants import sizes
 from conservative.pickling import dump, load
 
+from ..sampling import sampled
+
 BODY = cv.RigidBody([[13, 0.5, 0.2], [0.5, 5, 0.3], [0.2, 0.3, 10]], rotor_momentum=(3.0, -4.0, 2.0))
 GRAVITY = cv.UniformGravity(3.0, (0.1, 0.2, 0.3))
 ORBIT = cv.Orbit(0.3, (0, 1, 0)).gravity_gradient(BODY.inertia, (1, 0, 0))
@@ -57,6 +59,8 @@ RUNS = {
     "motor, gravity": (scene(GRAVITY, body=cv.RigidBody(BODY.inertia, lambda t: (3 * t, 0, 9 * np.cos(t)))), "projected"),
     "scipy": (scene(GRAVITY, TABLE, STEPPED), "scipy"),
 }
+SAMPLE = sampled(RUNS, 3, ["functions, turning", "jump", "scipy"])
+"""The crossing of parts and commands has all parts; they are kept here for balances and bits, and with --all."""
 N = 5
 STEPS = {"dt": 0.05, "sample_every": 4}
 
@@ -77,7 +81,7 @@ def require_same(one, other):
         assert np.array_equal(getattr(one, name), getattr(other, name))
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", SAMPLE)
 def test_each_body_is_that_of_integrate_bit_for_bit_with_its_balances(name, monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 2)
     found = run(name, threads=2)
@@ -94,7 +98,7 @@ def test_each_body_is_that_of_integrate_bit_for_bit_with_its_balances(name, monk
     assert found.drifts["orthonormality"].max() < 1e-9  # SciPy, measured 1.4e-11
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", SAMPLE)
 def test_a_batch_of_one_is_integrate(name):
     given, method = RUNS[name]
     found, alone = cv.integrate_many(given, method=method, **STEPS), cv.integrate(given, 0.05, method, sample_every=4)
@@ -118,7 +122,10 @@ def test_a_work_and_an_impulse_that_are_wrong_by_a_millionth_show_in_the_drifts(
         assert found.drifts[name].min() > 1e-8  # measured 6e-8
 
 
-@pytest.mark.parametrize("name", ["tables", "functions, turning", "jump", "attitude", "motor", "motor, gravity", "scipy"])
+STORED = ("tables", "functions, turning", "jump", "attitude", "motor", "motor, gravity", "scipy")
+
+
+@pytest.mark.parametrize("name", sampled(STORED, 1, ["functions, turning"]))
 def test_a_store_has_what_was_supplied_and_is_resumed_to_the_same(name, tmp_path, monkeypatch):
     pytest.importorskip("zarr")
     monkeypatch.setattr(blocks, "MOST_BODIES", 2)
@@ -160,7 +167,7 @@ def test_a_run_with_other_loads_is_not_resumed(change, tmp_path):
         cv.integrate_many(other, *starts(), method=method, **STEPS, path=tmp_path / "a.zarr", resume=True)
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", SAMPLE)
 def test_a_block_is_sent_to_another_process(name):
     given, method = RUNS[name]
     bodies, grid = read_bodies(given, *starts(), None, None), cv.Grid(0.05, 30)
@@ -172,7 +179,7 @@ def test_a_block_is_sent_to_another_process(name):
         np.testing.assert_array_equal(getattr(there, name), getattr(here, name))
 
 
-@pytest.mark.parametrize("name", ["constant", "tables", "attitude"])
+@pytest.mark.parametrize("name", sampled(["constant", "tables", "attitude"], 1, ["tables"]))
 def test_an_error_is_reached_with_the_loads_of_each_body(name):
     given, inertia = RUNS[name][0], BODY.inertia * np.linspace(0.3, 1, N)[:, None, None]
     found = cv.integrate_many(given, *starts(), inertia=inertia, error=1e-7)

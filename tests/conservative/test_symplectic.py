@@ -1,5 +1,7 @@
 """Splittings, RATTLE and the variational integrator: their parts, their truth in every field, order, relations and energy."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.optimize import root
@@ -13,6 +15,7 @@ from conservative.methods.coefficients.splittings import SEQUENCES
 from conservative.methods.symplectic import convert, find_coefficients
 
 from ..bodies import impossible_body
+from ..sampling import sampled
 from .one_body import BODY, FIELDS, HOOK, START, free, in_field, torque
 
 METHODS = [cv.Splitting, cv.NoSquish, cv.Rattle, cv.LieVariational]
@@ -33,15 +36,20 @@ def error_of(method, scene, n, truth):
     return angle_between(truth.R_WB[-1], method.solve(scene, cv.Grid(scene.t_end / n, n, n)).R_WB[-1])
 
 
-@pytest.mark.parametrize("kind", METHODS, ids=lambda kind: kind.family)
-@pytest.mark.parametrize("field", POTENTIALS)
-def test_agrees_with_methods_that_share_no_code(field, kind):
-    scene = in_any_field(field)
+KINDS = {kind.family: kind for kind in METHODS}
+
+
+@pytest.mark.parametrize(("field", "family"), sampled(product(POTENTIALS, KINDS), 7))
+def test_agrees_with_methods_that_share_no_code(field, family):
+    scene, kind = in_any_field(field), KINDS[family]
     other = cv.Projected() if field in ("growing", "satellite") else cv.Reduced(order=8)
     truth, found = cv.integrate(scene, 0.01, other), cv.integrate(scene, 0.02, kind(10))
     allowed = 4e-14 if kind is cv.NoSquish else 2e-14  # measured up to 1.3e-14, whose sums are not compensated, and 8e-15
     assert angle_between(truth.R_WB[-1], found.R_WB[-1]) < allowed
     assert np.abs(truth.w_WB_B[-1] - found.w_WB_B[-1]).max() < allowed
+
+
+ORDERS = [("rattle", 6), *(("splitting", order) for order in COMPOSITIONS)]
 
 
 def slope_of(method, n):
@@ -51,14 +59,13 @@ def slope_of(method, n):
     return np.log2(error_of(method, scene, n, truth) / error_of(method, scene, 2 * n, truth))
 
 
-@pytest.mark.parametrize("kind", METHODS, ids=lambda kind: kind.family)
-@pytest.mark.parametrize("order", COMPOSITIONS)
-def test_order(kind, order):
+@pytest.mark.parametrize(("family", "order"), sampled(product(KINDS, COMPOSITIONS), 6, ORDERS))
+def test_order(family, order):
     n = {2: 40, 4: 40, 6: 20, 8: 20, 10: 10}[order]
-    assert slope_of(kind(order), n) == pytest.approx(order, abs=0.6)  # measured 2.04, 3.86, 6.22, 7.75, 10.50 at most
+    assert slope_of(KINDS[family](order), n) == pytest.approx(order, abs=0.6)  # measured 2.04, 3.86, 6.22, 7.75, 10.50 at most
 
 
-@pytest.mark.parametrize("order", SEQUENCES)
+@pytest.mark.parametrize("order", sampled(SEQUENCES, 1))
 def test_sequences_have_their_order_and_a_wrong_digit_loses_it(order, monkeypatch):
     sequence = SEQUENCES[order]
     method, n = cv.Splitting(order), 80 if order == 4 else 20
@@ -92,7 +99,7 @@ def test_free_rotation_is_exact():
     assert np.abs(free_step(np.array((1, 1.4, 2)), (0.0, 0.0, 0.0), 1.0)[1]).max() == 0
 
 
-@pytest.mark.parametrize("J", [(0.005, 1.0, 1.003), (0.04, 1.0, 1.02), (1.0, 1.4, 2.0)], ids=str)
+@pytest.mark.parametrize("J", [(0.005, 1.0, 1.003), (1.0, 1.4, 2.0)], ids=str)
 def test_rotations_of_any_length_are_exact(J):
     # Spins about the long axis, where parts have to be short compared with the nutation, which is as fast as the rotation.
     scene, worst = cv.Scene("long axis", cv.RigidBody(J), np.eye(3), (1.0, 0.03, -0.04), 1.0), 0.0
@@ -224,7 +231,9 @@ def test_without_a_field_both_are_the_moser_veselov_map():
         assert angle_between(method.solve(scene, grid).R_WB[-1], truth.R_WB[-1]) < 1e-14  # measured 2.4e-15
 
 
-@pytest.mark.parametrize("method", [cv.Splitting(4), *(kind(2) for kind in METHODS)], ids=lambda method: method.name)
+@pytest.mark.parametrize(
+    "method", sampled([cv.Splitting(4), *(kind(2) for kind in METHODS)], 3), ids=lambda method: method.name
+)
 def test_energy_does_not_drift(method):
     # 1e5 steps, 11,000 rad. `Reduced` conserves this energy; a method without structure would lose it.
     run = cv.integrate(in_field("gravity"), 0.05, method, t_end=5000.0, sample_every=4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.features import FIELDS, IN_TIME, Feature
 from conservative.invariants import Invariant, momentum_W, sizes
 from conservative.scenes.transforms import in_body_frame, slow_motion
+
+from ..sampling import sampled
 
 BODY = cv.RigidBody([[13, 0.5, 0.2], [0.5, 5, 0.3], [0.2, 0.3, 10]])
 GRAVITY = cv.UniformGravity(20.0, (0.1, 0.2, 0.3))
@@ -85,7 +88,10 @@ def test_each_part_that_a_scene_can_need_is_carried_along_or_refused():
             assert (refused.value.argument, refused.value.got) == ("scene", f"a scene with {field!r}")
 
 
-@pytest.mark.parametrize("name", PARTS)
+SAMPLE = ["rotor", "torque, world", "torque, table", "damping, factor of attitude", "all"]
+
+
+@pytest.mark.parametrize("name", sampled(PARTS, len(SAMPLE), SAMPLE))
 def test_in_another_body_frame_the_motion_is_the_same(name):
     scene, part = plain(**PARTS[name][0]), PARTS[name][1]
     turned = in_body_frame(scene, F, "turned")
@@ -99,8 +105,10 @@ def test_in_another_body_frame_the_motion_is_the_same(name):
         np.testing.assert_allclose(other.supplied, one.supplied, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("name", PARTS)
-@pytest.mark.parametrize("slow", [4.0, 3.0])
+SLOWER = [("torque, function", 3.0), *((name, slow) for name, slow in zip(SAMPLE, [4.0, 3.0] * 4, strict=False))]
+
+
+@pytest.mark.parametrize(("name", "slow"), sampled(product(PARTS, (4.0, 3.0)), len(SLOWER), SLOWER))
 def test_slower_the_motion_is_the_same(name, slow):
     scene, part = plain(**PARTS[name][0]), PARTS[name][1]
     slower = slow_motion(scene, slow)
@@ -112,6 +120,16 @@ def test_slower_the_motion_is_the_same(name, slow):
     if scene.loaded:
         units = slow ** np.array([2, 1, 1, 1])
         np.testing.assert_allclose(other.supplied * units, one.supplied, rtol=0, atol=100 * close)
+
+
+@pytest.mark.parametrize("name", ["motor", "motor, function"])
+def test_the_momentum_of_a_motor_is_carried_along(name):
+    scene = plain(**PARTS[name][0])
+    turned, slower, w = in_body_frame(scene, F, "turned"), slow_motion(scene, 3.0), np.array((0.3, -0.4, 0.5))
+    for t in (0.0, 0.4, 0.9, 1.4):
+        momentum = scene.body.momentum(w, t)
+        np.testing.assert_allclose(turned.body.momentum(F @ w, t), F @ momentum, rtol=1e-13)
+        np.testing.assert_allclose(3.0 * slower.body.momentum(w / 3.0, 3.0 * t), momentum, rtol=1e-13)
 
 
 def test_breaks_are_carried_along():

@@ -138,13 +138,15 @@ def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     )
     assert gate.asked == {"base": ("main", ("numpy",)), "head": ("v2", ("numpy",)), "scenes": ["brick_flip"], "processes": 3}
     assert code == 1
-    assert "gate: FAILED, 1 row, 1 timed, 1 violation" in text
-    assert "time of a step, brick_flip, reduced: was 1e-06 s, is 1.100 times as long" in text
-    assert "| brick_flip | reduced | ✗ slower | 1.100 |" in files["markdown"].read_text()
-    assert "<title>conservative gate" in files["html"].read_text()
-    assert ElementTree.fromstring(files["junit"].read_text()).find("testsuite").get("failures") == "1"
+    summary, violation = (line for line in text.splitlines() if "violation" in line or "1.100" in line)
+    assert "1 violation" in summary
+    for content in (violation, *(path.read_text() for path in files.values())):
+        assert all(part in content for part in ("brick_flip", "reduced", "1.100"))  # the row, and how much longer it takes
+    assert ElementTree.parse(files["junit"]).find("testsuite").get("failures") == "1"
     assert gate("--against", "main", "--accept-slower", "reduced=1.2x: more digits")[0] == 0
-    assert gate("--against", "main", measured=answer())[0] == 0
+    code, text = gate("--against", "main", measured=answer())
+    assert code == 0
+    assert text.splitlines()[2:] == ["gate: passed, 1 row, 1 timed, 0 violations"]
 
 
 @pytest.mark.parametrize("options", [("--update", "why"), ("--baseline", "kept.json"), ("results.json",)])

@@ -24,6 +24,7 @@ from conservative.registry import read_name
 from conservative.reports.cli.main import main
 
 from .. import conftest
+from ..sampling import sampled
 
 TAKEN = ("methods", "engines", "engine", "names", "command", "subjects")
 """Parameters of commands that take names of engines."""
@@ -75,7 +76,12 @@ CELLS = [
     for parameter in command.params
     if parameter.name in TAKEN and (name, parameter.name) != COMMAND_LINE
 ]
-cells = pytest.mark.parametrize(("name", "command", "parameter"), CELLS)
+
+
+def crossed(texts, size):
+    """Cells with texts: all cells and all texts are in the sample."""
+    all_of = [pytest.param(*cell.values, text, id=f"{cell.id} {text}") for cell in CELLS for text in texts]
+    return sampled(all_of, size)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -152,8 +158,7 @@ def test_every_command_with_an_engine_is_known():
     assert {each.values[0] for each in CELLS} == set(CAPTURED)
 
 
-@cells
-@pytest.mark.parametrize("engine", ["double@1.0", "mujoco@0.1"])
+@pytest.mark.parametrize(("name", "command", "parameter", "engine"), crossed(["double@1.0", "mujoco@0.1"], len(CELLS)))
 def test_both_spellings_of_a_version_select_the_same(monkeypatch, name, command, parameter, engine):
     found, settings = ask(monkeypatch, name, command, parameter, engine)
     assert (found, settings) == ask(monkeypatch, name, command, parameter, engine.replace("@", "=="))
@@ -169,8 +174,7 @@ REFUSED = ["mujoco=3.12.0", "mujoco@", "@3", "mujoco @3.12.0", "MuJoCo@3.12.0", 
 REFUSED += ["mujoco@0.2", "double@2.0"]  # versions that are not there
 
 
-@cells
-@pytest.mark.parametrize("text", REFUSED)
+@pytest.mark.parametrize(("name", "command", "parameter", "text"), crossed(REFUSED, 2 * len(CELLS)))
 def test_a_name_of_nothing_is_refused_by_name(monkeypatch, name, command, parameter, text):
     refusal, settings = ask(monkeypatch, name, command, parameter, text)
     assert (refusal, settings) == ask(monkeypatch, name, command, parameter, text.replace("@", "=="))

@@ -16,6 +16,7 @@ from conservative.reports.run import single_study
 from conservative.reports.run.measure import Measurements
 from conservative.reports.sections import random_bodies, scenes
 
+from ..sampling import sampled
 from . import made_up
 from .test_random_ratios import SLOWER, TWICE
 
@@ -49,7 +50,7 @@ def written(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", sampled(COMMANDS, 2))
 def test_a_command_writes_what_it_measured(name, tmp_path, monkeypatch):
     words, kept, lost = COMMANDS[name]
     monkeypatch.chdir(tmp_path)

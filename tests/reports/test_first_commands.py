@@ -21,6 +21,7 @@ from conservative.reports.cli.main import main
 
 from ..independent import Case, angle_between, motion
 from ..pages import ROOT, shell_lines
+from ..sampling import sampled
 
 BLOCK = (ROOT / "README.md").read_text(encoding="utf-8").partition("## On the command line")[2].partition("## Read on")[0]
 COMMANDS = {
@@ -106,8 +107,7 @@ def verify(shown):
 
 
 CHECKS = {"new": new, "run": run, "watch": watch, "sweep": sweep, "verify run.csv": verify, "verify my_body.urdf": verify}
-SLOW = {"recommend": recommend, "verify my_engine": verify}
-CHECKS |= {"engines add": add} | SLOW
+CHECKS |= {"engines add": add, "recommend": recommend, "verify my_engine": verify}
 ELSEWHERE = {"engines install", "gate"}
 """The first is below, the second in `test_versions`, where a package with two commits is."""
 
@@ -117,7 +117,10 @@ def test_every_command_of_the_block_is_checked():
     assert len(COMMANDS) == 11
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in CHECKS])
+DEFAULT = ["run", "watch", "verify run.csv", "verify my_body.urdf", "engines add"]
+
+
+@pytest.mark.parametrize("name", sampled(CHECKS, len(DEFAULT), DEFAULT))
 def test_a_command_of_readme_ends_well_and_shows_a_right_motion(name, folder):
     if name == "verify run.csv":
         invoke(*COMMANDS["run"])

@@ -3,6 +3,7 @@
 import pytest
 
 from ..environments import run_python
+from ..sampling import sampled
 
 TWICE = """
 import conservative as cv
@@ -19,6 +20,7 @@ print(sum(moser_veselov.enter.stats.cache_hits.values()), sum(moser_veselov.ente
 """
 
 
+@pytest.mark.slow
 def test_kernels_are_compiled_once_before_the_studies(tmp_path):
     code, out, err = run_python(TWICE, NUMBA_CACHE_DIR=str(tmp_path))
     assert code == 0, err
@@ -70,7 +72,7 @@ except KeyboardInterrupt: print("interrupted")
 """
 
 
-@pytest.mark.parametrize("what", [DURING_A_COMPILATION, BETWEEN_TWO])
+@pytest.mark.parametrize("what", sampled([DURING_A_COMPILATION, BETWEEN_TWO], 1))
 def test_an_interrupt_does_not_wait_for_a_compilation(what, tmp_path):
     """Otherwise the process waits for the sleeping one until the time limit of this test."""
     code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))

@@ -21,6 +21,7 @@ from conservative.reports.terminal import interrupts
 from conservative.reports.terminal.interrupts import Interrupted, handle_signals
 
 from ..environments import PATIENCE, ROOT, programs, variables, wait_until
+from ..sampling import sampled
 
 CLI = [sys.executable, "-m", "conservative"]
 SWEEP = ["sweep", "brick_flip", "--spread", "rate=1%", "--starts", "1e5", "--t-end", "600", "--dt", "1e-3", "--out", "s.zarr"]
@@ -55,10 +56,10 @@ def temporaries(folder):
 @pytest.mark.parametrize(
     ("command", "number"),
     [
-        ("run", signal.SIGINT),
         ("run", signal.SIGTERM),
-        ("run", signal.SIGHUP),
-        ("watch", signal.SIGINT),
+        pytest.param("run", signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param("run", signal.SIGHUP, marks=pytest.mark.slow),
+        pytest.param("watch", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("watch.gif", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("sweep", signal.SIGINT, marks=pytest.mark.slow),
         pytest.param("report", signal.SIGTERM, marks=pytest.mark.slow),
@@ -110,7 +111,7 @@ def test_work_in_another_process_ends_with_its_command(tmp_path):
         assert psutil.wait_procs([worker], timeout=PATIENCE)[1] == []
 
 
-@pytest.mark.parametrize("closed", ["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
+@pytest.mark.parametrize("closed", sampled(["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"], 1, ["0<&- 1>&- 2>&-"]))
 def test_a_command_with_closed_streams_ends_normally(closed, tmp_path):
     shell = ["sh", "-c", f'exec "$0" -m conservative run nonsense {closed}', sys.executable]
     assert subprocess.run(shell, cwd=tmp_path, env=variables(PYTHONPATH=str(ROOT)), timeout=PATIENCE).returncode == 2

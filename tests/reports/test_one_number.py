@@ -42,7 +42,7 @@ CASES = {  # no step divides the durations
 }
 
 
-USUAL = ("free", "torque", "balance")  # the others take multi-precision, which compiles for seconds
+USUAL = ("free",)  # each of the others takes seconds
 
 
 @pytest.fixture(scope="module", params=[pytest.param(name, marks=[pytest.mark.slow] * (name not in USUAL)) for name in CASES])

@@ -10,7 +10,7 @@ import pytest
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
-from conservative.reports.charts import figures
+from conservative.reports.charts import figures, style
 from conservative.reports.document import SVG_MARK
 from conservative.reports.document.cells import tolerance
 from conservative.reports.document.model import Section, Table, walk
@@ -245,7 +245,8 @@ def test_random_bodies_come_before_the_scenes(folder, file, first, then):
     assert (folder / "random_bodies.svg").read_text(encoding="utf-8").startswith(f"{SVG_MARK}\n<svg")
 
 
-def test_a_report_without_random_bodies_does_not_mention_them(tmp_path):
+def test_a_report_without_random_bodies_does_not_mention_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
     without = plan_report(["brick_flip"], METHODS, quick=True)
     render(built(without), tmp_path, png=False)
     assert not any(first in (tmp_path / file).read_text() for file, first, _ in PLACES)

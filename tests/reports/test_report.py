@@ -140,6 +140,7 @@ def test_methods_of_other_packages_are_part_of_the_default_report(monkeypatch):
     ]
 
 
+@pytest.mark.slow
 def test_a_quick_report_with_random_bodies_ends_well(tmp_path):
     options = ["--quick", "--scenes", "brick_flip", "--methods", "taylor:order=12,scipy", "--bodies", "1"]
     done = CliRunner().invoke(main, ["report", *options, "--out", str(tmp_path / "report")])
@@ -150,6 +151,7 @@ def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
     commits = iter(["before", "after"])
     monkeypatch.setattr(report, "provenance", lambda: replace(provenance([]), commit=next(commits)))
     monkeypatch.setattr(report, "measure", lambda plan, step, progress: measurements())
+    monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
     written = report.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
     assert written.data["commit"] == "before"
 

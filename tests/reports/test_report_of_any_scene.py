@@ -30,6 +30,7 @@ from conservative.reports.sections import advice, scenes, tumbling
 from conservative.reports.sections.report import build
 
 from ..crossing import ROWS, write_file
+from ..sampling import sampled
 from . import made_up
 
 PARTS = [feature for feature, row in ROWS.items() if row.in_file]
@@ -78,7 +79,7 @@ def check(document, scene, folder):
     assert (folder / "index.html").stat().st_size > 1e5
 
 
-@pytest.mark.parametrize("seed", [0, 7, 8])  # gravity, a torque, damping on a body from a URDF file
+@pytest.mark.parametrize("seed", sampled([0, 7, 8], 1, [8]))  # gravity, a torque, damping on a body from a URDF file
 def test_a_page_of_a_file_without_a_step(seed, tmp_path, without_files):
     path = random_file(tmp_path, seed)
     names = methods(str(path))
@@ -132,6 +133,7 @@ def test_a_scene_whose_reference_solutions_disagree_has_drifts(tmp_path, without
     assert failed_parts(document.blocks) == []
 
 
+@pytest.mark.slow  # `watch` shows the beginning of the same motions, in `test_animation`
 def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_files):
     path = write_file(tmp_path / "long.toml", replace(ROWS[Feature.ROTOR].without, t_end=1000.0))
     path.write_text("dt = 0.5\n" + path.read_text())
@@ -145,6 +147,7 @@ def test_a_motion_that_turns_too_often_shows_its_beginning(tmp_path, without_fil
     assert f"Only the first {exact.t[-1]:.3g} s" in (tmp_path / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_samples_of_an_animation_are_close_enough_to_be_joined(tmp_path, without_files):
     path = write_file(tmp_path / "fast.toml", replace(ROWS[Feature.ROTOR].without, t_end=170.0))  # 300 rad
     path.write_text("dt = 0.1\n" + path.read_text())
@@ -190,9 +193,11 @@ PLANTED = {  # what fails, and a word of its sentence
 }
 
 
-@pytest.mark.parametrize("what", PLANTED)
+@pytest.mark.parametrize("what", sampled(PLANTED, 2, ["section", "animation"]))
 def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(what, rows_of_a_report, tmp_path, monkeypatch):
     place, name, words = PLANTED[what]
+    if what != "picture":
+        monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
     command = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced"]
     with monkeypatch.context() as patch:
         patch.setattr(place, name, fault)
@@ -225,7 +230,7 @@ def test_an_animation_that_cannot_be_drawn_is_a_sentence(tmp_path):
     assert page.index("trajectories: got []") < page.index("after it")
 
 
-def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, tmp_path, monkeypatch):
+def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, without_files, tmp_path, monkeypatch):
     class Cell:
         def __str__(self):
             raise ZeroDivisionError("planted")

@@ -19,13 +19,16 @@ from conservative import BadInput, NotConverged, Torque
 from conservative.benchmarks.measures.measurement import Samples
 from conservative.method import Role
 from conservative.reports import report
+from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
+from conservative.reports.run import measure as measurements
 from conservative.reports.run.measure import measure
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 
 from ..environments import PATIENCE, programs
+from .made_up import convergence
 from .rows import row
 
 OUTCOME = NotConverged(3, 0.02, 0.5, "why").outcome
@@ -131,10 +134,19 @@ def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypa
     assert (tmp_path / "report.partial.json").read_text() == content
 
 
+@pytest.fixture
+def made_up_rows(monkeypatch):
+    """Reports of made-up rows, without pictures."""
+    monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
+    monkeypatch.setattr(measurements, "compile_kernels", lambda *_: None)
+    found = convergence("moser_veselov:order=2", 2)
+    monkeypatch.setattr(measurements.studies, "findings", lambda study, tell: (row for row in found if row.study == study.name))
+
+
 @pytest.mark.parametrize(
     "content", ['{"format": 99, "studies": {}}', '{"format": 4, "studies": {"paper": {}}}', '{"format": 4, "comm']
 )
-def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch):
+def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch, made_up_rows):
     monkeypatch.chdir(tmp_path)
     kept = tmp_path / "report.partial.json"
     kept.write_text(content)

@@ -13,6 +13,7 @@ from conservative.benchmarks.measures.measurement import Samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
+from conservative.reports.charts import style
 from conservative.reports.document import html
 from conservative.reports.document import json as json_renderer
 from conservative.reports.document.model import Figure, Section, Table, walk
@@ -33,7 +34,8 @@ def classes(base):
 
 @pytest.fixture
 def nothing_is_measured(monkeypatch):
-    """Make every method that is about to run, and every process that is about to start, an error."""
+    """Make every method that is about to run, and every process that is about to start, an error. Pictures are empty files."""
+    monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
 
     def integrate(self, scene, grid):
         pytest.fail(f"{self.name} runs on {scene.name}")
