@@ -91,7 +91,7 @@ def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = L
         given = settings["times" if "times" in settings else "time"]  # a setting that was not timed has NaN in both
         processes = list(zip_longest(*(each if isinstance(each, tuple) else (each,) for each in given), fillvalue=math.nan))
         for error in errors:
-            times = tuple(cost(measured, each, error) for each in processes)
+            times = tuple(cost(measured, process, error) for process in processes)
             if known := [math.log(time) for time in times if not math.isnan(time)]:
                 rows.append((*key, error, math.exp(math.fsum(known) / len(known)), times))
     return pd.DataFrame(rows, columns=[*line, "error", "time", "times"])
@@ -197,27 +197,30 @@ class Ratios:
     @cached_property
     def both(self) -> list[SpeedRatio]:
         """Cases in which both sides reach the error, smallest ratio first."""
-        return sorted((each for each in self.speed_ratios if each.ours and each.theirs), key=lambda each: each.ratio)
+        return sorted(
+            (speed_ratio for speed_ratio in self.speed_ratios if speed_ratio.ours and speed_ratio.theirs),
+            key=lambda each: each.ratio,
+        )
 
     @property
     def only_ours(self) -> int:
         """Number of bodies on which only our side reaches the error."""
-        return sum(each.theirs is None and each.ours is not None for each in self.speed_ratios)
+        return sum(speed_ratio.theirs is None and speed_ratio.ours is not None for speed_ratio in self.speed_ratios)
 
     @property
     def only_theirs(self) -> int:
         """Number of bodies on which only the other side reaches the error."""
-        return sum(each.ours is None and each.theirs is not None for each in self.speed_ratios)
+        return sum(speed_ratio.ours is None and speed_ratio.theirs is not None for speed_ratio in self.speed_ratios)
 
     @property
     def won(self) -> int:
         """Number of bodies on which ours is faster beyond the interval of the body, or alone in reaching the error."""
-        return sum(each.won for each in self.speed_ratios)
+        return sum(speed_ratio.won for speed_ratio in self.speed_ratios)
 
     @property
     def lost(self) -> int:
         """The same for theirs."""
-        return sum(each.lost for each in self.speed_ratios)
+        return sum(speed_ratio.lost for speed_ratio in self.speed_ratios)
 
     @property
     def open(self) -> int:

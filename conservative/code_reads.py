@@ -78,11 +78,11 @@ def reads_of(code: CodeType) -> Reads:
 
 def _list_steps(code: CodeType) -> Iterator[tuple[str, Any]]:
     """Yield names and arguments of instructions. Those that are two in one, such as LOAD_FAST_LOAD_FAST, are divided."""
-    for each in dis.get_instructions(code):
-        if isinstance(each.argval, tuple) and (two := _TWO.fullmatch(each.opname)):
-            yield from zip(two.groups(), each.argval, strict=True)
-        elif each.opname not in _SKIPPED:
-            yield each.opname, each.argval
+    for instruction in dis.get_instructions(code):
+        if isinstance(instruction.argval, tuple) and (two := _TWO.fullmatch(instruction.opname)):
+            yield from zip(two.groups(), instruction.argval, strict=True)
+        elif instruction.opname not in _SKIPPED:
+            yield instruction.opname, instruction.argval
 
 
 def _list_imports(steps: list[tuple[str, Any]]) -> tuple[dict[str, Read], list[Read]]:

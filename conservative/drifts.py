@@ -89,7 +89,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
     if scene.symmetry_axis_B is not None:
         rows[:, 7] = np.nan_to_num(bodies.symmetry_axes_B) / momentum[:, None]
         rows[:, 8, 2] = np.einsum("ni,ni->n", rows[:, 7], L_B)
-    own = [each for each in scene.invariants if each not in scene.extra_invariants]
+    own = [invariant for invariant in scene.invariants if invariant not in scene.extra_invariants]
     if any(each.unit == "J" for each in own):
         V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], w[:, None])
         rows[:, 8, 0], rows[:, 8, 1] = kinetic + (V[:, 0] if len(V) else 0.0), 1 / scale
@@ -103,7 +103,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
     """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
-    return (ORTHONORMALITY, *(each.name for each in bodies.scene.rotation_only.invariants))
+    return (ORTHONORMALITY, *(invariant.name for invariant in bodies.scene.rotation_only.invariants))
 
 
 def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -114,16 +114,16 @@ def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -
     """
     n, m = w_WB_B.shape[:2]
     scene, columns = bodies.scene, [measured[:, 0]]
-    for each in scene.rotation_only.invariants:
-        if each in scene.extra_invariants:
-            start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
-            values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
-            drift = (values - start[:, None]) / each.scale
+    for invariant in scene.rotation_only.invariants:
+        if invariant in scene.extra_invariants:
+            start = invariant.evaluate(bodies.R_WB0, bodies.w_WB_B0)
+            values = invariant.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
+            drift = (values - start[:, None]) / invariant.scale
             columns.append(sizes(drift.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1))
-        elif each.name == AXIAL_MOMENTUM:
+        elif invariant.name == AXIAL_MOMENTUM:
             columns.append(np.where(np.isnan(bodies.symmetry_axes_B[:, 0]), np.nan, measured[:, 3]))
         else:
-            columns.append(measured[:, 2 if each.unit == MOMENTUM_UNIT else 1])
+            columns.append(measured[:, 2 if invariant.unit == MOMENTUM_UNIT else 1])
     return np.stack(columns, axis=1)
 
 

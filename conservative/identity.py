@@ -181,7 +181,7 @@ class _Walk:
         return text
 
     def _all(self, values: Iterable[Any]) -> list[str]:
-        return [self.follow(each) for each in values]
+        return [self.follow(value) for value in values]
 
     def _follow_array(self, value: Any) -> str:
         if value.dtype.hasobject:
@@ -272,7 +272,7 @@ class _Walk:
                 continue
             if found is MISSING and (read.imported or "." in name):  # not yet imported, or made by the module when it is read
                 raise _NotFollowed(f"{code.co_name}, which reads {name}")
-            self.makes |= any(found is each for each in _MAKERS)
+            self.makes |= any(found is maker for maker in _MAKERS)
             self.reads += not (found is MISSING or _library_name(found) is not None)
             if isinstance(found, ModuleType) and not self.in_library:
                 raise _NotFollowed(f"{code.co_name}, which passes on the module {name}")
@@ -284,8 +284,10 @@ class _Walk:
         for name, read in reads.bound.items():
             if name in code.co_cellvars:
                 inside[name] = resolve(read, known, cells, _is_pure)[0]
-        for each in code.co_consts:
-            parts.append(self._follow_code(each, known, inside) if isinstance(each, CodeType) else self.follow(each))
+        for constant in code.co_consts:
+            parts.append(
+                self._follow_code(constant, known, inside) if isinstance(constant, CodeType) else self.follow(constant)
+            )
         return _hash(parts)
 
     def _list_of_keeper(self, value: Any) -> Iterator[Any]:
@@ -296,7 +298,7 @@ class _Walk:
         reads, self.reads = self.reads, 0
         text = self.follow(function)
         defaults = *(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()
-        if self.reads or function.__closure__ or not all(type(each) in _NUMBERS for each in defaults):
+        if self.reads or function.__closure__ or not all(type(default) in _NUMBERS for default in defaults):
             raise _NotFollowed(f"{function.__name__}, which keeps earlier values of what it reads ({type(value).__name__})")
         self.reads += reads
         yield text
@@ -311,7 +313,9 @@ class _Walk:
         yield [self._follow_class(base, called) for base in value.__bases__]
         left_out = _NOT_OF_BEHAVIOUR if called else _NOT_OF_BEHAVIOUR | _OF_CONSTRUCTION
         if "__dataclass_fields__" in vars(value):
-            described = [(each.name, each.init, each.kw_only, each.default, each.default_factory) for each in fields(value)]
+            described = [
+                (field.name, field.init, field.kw_only, field.default, field.default_factory) for field in fields(value)
+            ]
             yield [self._all(each) for each in described]
             left_out |= {name for name, each in vars(value).items() if _is_generated(each)}
         own = ((name, each) for name, each in sorted(vars(value).items()) if name not in left_out)
@@ -360,7 +364,7 @@ class _Walk:
             make, arguments, state, *others = (*reduced, None, None, None)[:5]
             yield ["its class" if each is kind else self.follow(each) for each in (make, *arguments)]
             yield self.follow(state)
-            yield [self.follow(list(each)) for each in others if each is not None]
+            yield [self.follow(list(other)) for other in others if other is not None]
         self.in_library = before
 
 
@@ -409,4 +413,4 @@ def _derived_names(kind: Any) -> frozenset[str]:
     if not _is_dataclass(kind) or not kind.__dataclass_params__.frozen:
         return frozenset()
     cached = {name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property)}
-    return frozenset(cached | {each.name for each in fields(kind)} - {*fields_of_motion(kind)})
+    return frozenset(cached | {field.name for field in fields(kind)} - {*fields_of_motion(kind)})

@@ -162,7 +162,7 @@ def with_balances(*names: str) -> frozenset[str]:
 
 def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
     """Return the energy or, in a turning field, the Jacobi integral among invariants; None if neither is conserved."""
-    return next((each for each in invariants if each.name in ("energy", JACOBI_INTEGRAL)), None)
+    return next((invariant for invariant in invariants if invariant.name in ("energy", JACOBI_INTEGRAL)), None)
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
@@ -172,7 +172,9 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     near rest.
     """
     most = largest_momentum(scene.body, scene.energy_scale)
-    of_motion = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
+    of_motion = (
+        invariant for invariant in scene.invariants if invariant.name in kept and invariant not in scene.extra_invariants
+    )
     return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in of_motion}
 
 

@@ -381,4 +381,4 @@ def _copy(value: Any) -> Any:
     """Return a copy of a frozen dataclass of this package, and of those in it, without caches; another value itself."""
     if not is_dataclass(value) or not type(value).__module__.startswith(f"{__package__}."):
         return value
-    return replace_unchecked(value, **{each.name: _copy(getattr(value, each.name)) for each in fields(value)})
+    return replace_unchecked(value, **{field.name: _copy(getattr(value, field.name)) for field in fields(value)})

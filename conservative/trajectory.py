@@ -226,7 +226,7 @@ class Trajectory:
             ("samples", f"{len(self)} to {self._end}"),
             ("work", ", ".join(f"{count} {name}" for name, count in self.work.items())),
         ]
-        drifts = ((each.name, sizes(self.drift(each)).max(initial=0.0)) for each in self.scene.invariants)
+        drifts = ((invariant.name, sizes(self.drift(invariant)).max(initial=0.0)) for invariant in self.scene.invariants)
         rows += [(f"drift of {name}", f"{presentation.rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
         return presentation.html_table("Trajectory", rows)
 

@@ -35,17 +35,17 @@ def methods() -> str:
 
 def _method_row(kind: Any) -> list[str]:
     default, variants = kind(), dict(zip(kind.method_info.variants, kind.settings_for("variants"), strict=True))
-    orders = sorted({each.order for each in variants.values() if each.order})
+    orders = sorted({variant.order for variant in variants.values() if variant.order})
     order = [" to ".join(str(each) for each in dict.fromkeys([*orders[:1], *orders[-1:]]))] if orders else []
-    if None in {each.order for each in variants.values()}:
+    if None in {variant.order for variant in variants.values()}:
         order += ["exact"] if kind.method_info.exact else ["adaptive"] if orders else ["–"]
     structures = {text: kind.method_info.structure(each) for text, each in variants.items()}
-    found = [each for each in structures.values() if each]
+    found = [structure for structure in structures.values() if structure]
     kept = [word for word in ("energy", "momentum", "axial momentum") if any(map(_is(word), default.conserves))]
     how = "imposed" if any(each.imposed for each in found) else "inherited"
     symmetric = _which({text: each.symmetric for text, each in structures.items() if each})
     symplectic = _which({text: each.symplectic for text, each in structures.items() if each})
-    settings = ", ".join(f"{each.name}={getattr(default, each.name)}" for each in dataclasses.fields(kind))
+    settings = ", ".join(f"{field.name}={getattr(default, field.name)}" for field in dataclasses.fields(kind))
     conserved = ", ".join(kept) + f"; {how}" * bool(kept and found)
     return [f"`{kind.__name__}({settings})`", ", ".join(order), symmetric, symplectic, conserved, summary(kind.__doc__)]
 
@@ -97,9 +97,9 @@ def _engine_row(name: str, kind: Any, page: Path) -> list[str]:
     package = f"{data.package} ≥ {data.oldest}" if apart else data.package if data else name
     origin = {"npm": "npm", "apt": "Debian"}.get(data.kind) if data else None
     texts = [
-        _settings(each.name, each.default, data, _quoted(kind, each.name))
-        for each in dataclasses.fields(kind)
-        if each.name != "precision"
+        _settings(field.name, field.default, data, _quoted(kind, field.name))
+        for field in dataclasses.fields(kind)
+        if field.name != "precision"
     ]
     precision = dict(data.settings).get("precision") if data else None
     bits = "64 or 32" if precision else "32" if data and data.precision == "f32" else "64"

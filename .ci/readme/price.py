@@ -75,7 +75,7 @@ def program(side: str, field: str, index: str) -> None:
 
     scene = random_body(field, index=int(index))
     final = prepare(scene)()
-    times, runs = [perf_counter() - begin], [prepare(random_body(field, index=each)) for each in OTHERS]
+    times, runs = [perf_counter() - begin], [prepare(random_body(field, index=other)) for other in OTHERS]
     for run in runs:
         begin = perf_counter()
         run()

@@ -150,7 +150,7 @@ def chosen_drift(name: str) -> tuple[str, float]:
         warnings.simplefilter("ignore", AccuracyNotReached)  # of a separatrix, whose rounding alone exceeds the error
         run = integrate(scene, error=ERROR)
     assert run.choice is not None
-    return run.choice.method.name, max(float(sizes(run.drift(each)).max()) for each in scene.invariants)
+    return run.choice.method.name, max(float(sizes(run.drift(invariant)).max()) for invariant in scene.invariants)
 
 
 def time_rows(table: pd.DataFrame) -> Iterator[Row]:
@@ -237,7 +237,7 @@ def body_rows(table: pd.DataFrame) -> Iterator[Row]:
     A case is a body at an error. The ratio is the geometric mean over the bodies on which both sides reach the error.
     """
     common = {"name": "random bodies", "unit": "1"}
-    found = [each for each in ratios(with_names(table)) if each.engine == ANY]
+    found = [ratio for ratio in ratios(with_names(table)) if ratio.engine == ANY]
     for each in found:
         yield from (common | {"scene": f"{each.field} {each.error:g} rad"} | row for row in ratio_rows(each))
     every = Ratios(tuple(speed_ratio for each in found for speed_ratio in each.speed_ratios))

@@ -126,7 +126,7 @@ def flat(row: Measurement) -> dict[str, str | float]:
 
 def from_flat(record: Mapping[str, Any]) -> Measurement:
     """Return the row of a record from `flat`; raise `KeyError` or `ValueError` for anything else."""
-    values = {each.name: record[each.name] for each in fields(Measurement)} | {
+    values = {field.name: record[field.name] for field in fields(Measurement)} | {
         "role": Role(record["role"]),
         "measure": Measure.from_text(record["measure"]),
         "outcome": outcome_of(record),
@@ -142,7 +142,7 @@ def flat_samples(samples: Samples) -> dict[str, Any]:
 def samples_from_flat(record: Mapping[str, Any]) -> Samples:
     """Return the samples of a record from `flat_samples`; raise `KeyError` or `ValueError` for anything else."""
     t, value = (np.array(record[name], dtype=float) for name in ("t", "value"))
-    values = {each.name: record[each.name] for each in fields(Samples)}
+    values = {field.name: record[field.name] for field in fields(Samples)}
     return Samples(**values | {"role": Role(record["role"]), "t": t, "value": value})
 
 

@@ -60,7 +60,9 @@ def list_installed() -> tuple[str, ...]:
             with suppress(MissingEngine):
                 here[name] = family().maker.version
     known = registry.list_engines()
-    newest = {each.engine: each for each in list_environments() if each.engine in known}  # older versions come first
+    newest = {
+        environment.engine: environment for environment in list_environments() if environment.engine in known
+    }  # older versions come first
     apart = [each.name for name, each in newest.items() if here.get(name) != each.version]
     return (*here, *apart, *list_programs())
 

@@ -29,13 +29,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the drifts of every method at the scene's step size."""
     tell = study.count(progress, len(study.competitors))
     for scene in study.scenes:
-        cases = [Case(study.name, scene, each, grid_for(scene, scene.dt, end_of(scene))) for each in study.competitors]
+        cases = [
+            Case(study.name, scene, competitor, grid_for(scene, scene.dt, end_of(scene))) for competitor in study.competitors
+        ]
         skipped = study.skip_slow(cases)
         for case in cases:
             tell(f"{scene.name}: {case.method.name}")
             done = skipped.get(case) or study.attempt(case)
             if isinstance(done, Outcome):
-                yield from case.rows((Value(Measure.DRIFT_MAX, math.nan, each.name) for each in scene.invariants), done)
+                yield from case.rows(
+                    (Value(Measure.DRIFT_MAX, math.nan, invariant.name) for invariant in scene.invariants), done
+                )
             else:
                 yield from case.rows(measure_drifts(done.trajectory), detail=f"over {case.grid.t[-1]:g} s")
 

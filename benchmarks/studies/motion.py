@@ -69,7 +69,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
             grid = Grid(scene.t_end / FRAMES, FRAMES)
             yield from _lines(Case(study.name, scene, solver, grid), exact, exact, exact)
         runs = {method: list_runs(study, scene, method, method in drawn) for method in study.competitors}
-        skipped = study.skip_slow([each[-1] for each in runs.values()], [each[0] for each in runs.values() if len(each) > 1])
+        skipped = study.skip_slow([run[-1] for run in runs.values()], [run[0] for run in runs.values() if len(run) > 1])
         for method, cases in runs.items():
             tell(f"{scene.name}: {method.name}")
             first = cases[-1].grid

@@ -96,7 +96,7 @@ def settings(method: Method) -> tuple[Method, ...]:
     if method.role in (Role.OURS, Role.BASELINE):
         approximate = method.method_info.rank is not None and not method.method_info.exact
         variants = (*method.settings_for("candidates"), *filter(tolerance_setting, variants)) if approximate else ()
-    return tuple(each for each in variants if (each.order or ORDER) >= ORDER)
+    return tuple(variant for variant in variants if (variant.order or ORDER) >= ORDER)
 
 
 def select(methods: Iterable[Method]) -> tuple[Method, ...]:

@@ -118,7 +118,7 @@ def tolerance_setting(method: Method) -> str | None:
     """Return the name of the setting that determines the accuracy of an adaptive method, or None."""
     if method.order is not None:
         return None
-    return next((each.name for each in fields(method) if each.name in TOLERANCES), None)
+    return next((field.name for field in fields(method) if field.name in TOLERANCES), None)
 
 
 def takes_exact_steps(method: Method) -> bool:
@@ -153,4 +153,4 @@ def series_setting(method: Method) -> str:
 
 
 def _default(method: Method, setting: str) -> Any:
-    return next(each.default for each in fields(method) if each.name == setting)
+    return next(field.default for field in fields(method) if field.name == setting)

@@ -109,7 +109,7 @@ def diagnose(
 
 def _normalised(found: Explanation) -> bool:
     """Return whether quaternions are normalised. Rates alone do not show it."""
-    return all(each.step.normalised for each in INTEGRATORS if each.key in found.keys)
+    return all(integrator.step.normalised for integrator in INTEGRATORS if integrator.key in found.keys)
 
 
 def _before_divergence(case: Compared) -> Compared:
@@ -145,7 +145,7 @@ Found = Iterator[Explanation | None]
 
 def _known(mistakes: Any) -> list[Any]:
     """Return mistakes without numbers, in the order of their keys."""
-    return sorted((each for each in mistakes if not each.numbers), key=lambda each: each.key)
+    return sorted((mistake for mistake in mistakes if not mistake.numbers), key=lambda each: each.key)
 
 
 def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
@@ -179,8 +179,8 @@ def _changes(case: Compared, asked: _Asked) -> Found:
     trials = [compose(*mistakes) for mistakes in (*known, *(several if "scenes" in asked.kinds else ()))]
     if case.free:  # fits of the start take most of the work: the nearest motions first
         trials = _nearest_first(case, trials)
-    for each in trials:
-        yield attempt(case, each)
+    for trial in trials:
+        yield attempt(case, trial)
 
 
 def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
@@ -230,11 +230,11 @@ def _within_digits(case: Compared, found: Explanation) -> Explanation:
 
 def _units(case: Compared, asked: _Asked) -> Found:
     """Yield times in other units than seconds."""
-    for each in TIMES:
-        if not each.unit or case.turned * each.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
+    for time in TIMES:
+        if not time.unit or case.turned * time.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
             continue
         if case.step is None:
-            found = attempt(case, compose(each))
+            found = attempt(case, compose(time))
             yield found if _moves(case, found) else None
 
 
@@ -262,10 +262,10 @@ def _still(case: Compared) -> tuple[Array, Array]:
 def _times(case: Compared, asked: _Asked) -> Found:
     """Yield the right states at other times: shifted, in proportion, with rows missing, jittered, or rates apart."""
     if case.step is not None:
-        for each in TIMES:
-            if each.of_step or (each.unit and case.turned * each.unit < 2 * LONGEST):
-                found = attempt(case, compose(each))
-                yield found if not each.unit or _moves(case, found) else None
+        for time in TIMES:
+            if time.of_step or (time.unit and case.turned * time.unit < 2 * LONGEST):
+                found = attempt(case, compose(time))
+                yield found if not time.unit or _moves(case, found) else None
         return
     later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
     for each in TIMES:
@@ -281,7 +281,7 @@ def _own_times(case: Compared, gap: float, end: float) -> Found:
     starts = [case]
     if case.free:  # a first row with noise, or jitter that a fit of the start takes for noise
         starts.append(case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0]))
-    found = [one for each in starts if (one := _by_own_times(each, gap, end)) is not None]
+    found = [one for start in starts if (one := _by_own_times(start, gap, end)) is not None]
     yield min(found, key=lambda each: (not each.explains, each.size), default=None)
 
 
@@ -360,8 +360,8 @@ def _attitudes(case: Compared, asked: _Asked) -> Found:
 
 def _habits(case: Compared, asked: _Asked) -> Found:
     """Yield motions whose state is changed after each step, or that stand still."""
-    for each in STANDSTILLS:
-        yield _standstill(case, each)
+    for standstill in STANDSTILLS:
+        yield _standstill(case, standstill)
     w = case.data[1]
     if w is None or len(case.scene.breaks) > MOST_BREAKS:
         return
@@ -443,7 +443,7 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
 
     trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _standstill(other, mistake))
     if R is None or mistake.from_start:  # rates alone do not show when between two rows
-        known = {each.name: stop for each in mistake.numbers}
+        known = {number.name: stop for number in mistake.numbers}
         found = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
         return None if found is None else replace(found, trial=trial)
     return attempt(case, trial, [stop if k == 0 else float(case.t[k - 1] + case.t[k]) / 2])
@@ -464,12 +464,12 @@ def _rows(case: Compared, asked: _Asked) -> Found:
     near = bool(signs.any()) and all(np.abs(np.flatnonzero(signs) + 1 - k).min() <= 1 for k in places)
     gaps = np.diff(places)
     periodic = len(places) > 2 and np.ptp(gaps) == 0
-    for each in ROWS:
-        if periodic if each.periodic else near:
-            made: Any = each.change(case.exact, case.data, off)
+    for row in ROWS:
+        if periodic if row.periodic else near:
+            made: Any = row.change(case.exact, case.data, off)
             values = {"first": float(places[0] * case.stride + 1)}
-            values |= {"period": float(gaps[0] * case.stride)} if each.periodic else {"rows": float(len(places))}
-            yield explain(fine, Trial((each,), _nowhere), made, values, numbers=len(values) - (not each.periodic) + each.any)
+            values |= {"period": float(gaps[0] * case.stride)} if row.periodic else {"rows": float(len(places))}
+            yield explain(fine, Trial((row,), _nowhere), made, values, numbers=len(values) - (not row.periodic) + row.any)
     if not periodic and not near:
         worst = float(case.error[:, places[0]].max())
         values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
@@ -661,7 +661,7 @@ def _several(case: Compared, asked: _Asked) -> Found:
     if case.step is None or any(each.explains for each in asked.tried):
         return
     moved = [(), *((each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds)]
-    times = [(), *((each,) for each in TIMES if not each.numbers and fits(each, case))] if "times" in asked.kinds else [()]
+    times = [(), *((time,) for time in TIMES if not time.numbers and fits(time, case))] if "times" in asked.kinds else [()]
     readings = [(), *_apply_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
     ranked = []
     start = case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t)

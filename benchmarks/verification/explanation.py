@@ -49,11 +49,11 @@ class Trial:
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the mistakes."""
-        return tuple(each.key for each in self.mistakes)
+        return tuple(mistake.key for mistake in self.mistakes)
 
     def sentence(self, values: Mapping[str, float]) -> str:
         """Return what is wrong, with numbers."""
-        return ". ".join(each.sentence.format(**values) for each in self.mistakes) + self.remark
+        return ". ".join(mistake.sentence.format(**values) for mistake in self.mistakes) + self.remark
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Explanation:
         """The mistakes as the cause of a finding, with the error of attitudes or rates, whichever is larger without them."""
         worst = int(np.argmax(self.plain))
         mistakes = () if self.trial is None else self.trial.mistakes
-        remedies = filter(None, (each.remedy if self.of_program else each.option for each in mistakes))
+        remedies = filter(None, (mistake.remedy if self.of_program else mistake.option for mistake in mistakes))
         values = MappingProxyType(self.values)
         return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
 
@@ -107,7 +107,7 @@ class Explanation:
         motion = self.trial.build(case)
         if motion is None:
             return None
-        values = np.array([self.values[each.name] for each in self.trial.numbers])
+        values = np.array([self.values[number.name] for number in self.trial.numbers])
         R, w = case.evaluate(motion, np.concatenate([np.zeros(6), values])[None])
         made = R[0], w[0]
         if (case.apart(made, case.exact) <= case.allowed).all():
@@ -118,9 +118,9 @@ class Explanation:
         """Return the explanation of another case by the same mistakes, whose numbers are fitted to it from these on."""
         if self.trial is None or self.trial.anew is not None:
             return None
-        fitted = {each.name for each in self.trial.numbers}
+        fitted = {number.name for number in self.trial.numbers}
         known = {name: value for name, value in self.values.items() if name not in fitted}
-        return attempt(case, self.trial, [self.values[each.name] for each in self.trial.numbers], known=known)
+        return attempt(case, self.trial, [self.values[number.name] for number in self.trial.numbers], known=known)
 
 
 def explain(
@@ -183,7 +183,7 @@ def attempt(
         found = _attempt(case.screen, trial, start, small, most, known)
         if found is None or (not found.explains and found.rest > HALF):
             return found
-        start = [found.values[each.name] for each in trial.numbers]
+        start = [found.values[number.name] for number in trial.numbers]
     return _attempt(case, trial, start, small, most, known)
 
 
@@ -193,8 +193,8 @@ def _attempt(
     motion = trial.build(case)
     if motion is None:
         return None
-    units = np.array([each.size(case.scale) for each in trial.numbers])
-    p = np.array([each.start for each in trial.numbers] if start is None else start, float) / units
+    units = np.array([number.size(case.scale) for number in trial.numbers])
+    p = np.array([number.start for number in trial.numbers] if start is None else start, float) / units
 
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
@@ -203,5 +203,5 @@ def _attempt(
     error = case.errors(*made)
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
         _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
-    names = (each.name for each in trial.numbers)
+    names = (number.name for number in trial.numbers)
     return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

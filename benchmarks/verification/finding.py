@@ -146,7 +146,7 @@ class Verification:
     @property
     def verdict(self) -> Verdict:
         """The verdict on the subject."""
-        return join_verdicts(each.verdict for each in self.findings)
+        return join_verdicts(finding.verdict for finding in self.findings)
 
     @property
     def exit_code(self) -> int:

@@ -340,7 +340,7 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
         elif name in lower:
             findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=lower[name]))
         else:
-            causes = tuple(one.cause for one in explained[name].explanations) if name in explained else ()
+            causes = tuple(explanation.cause for explanation in explained[name].explanations) if name in explained else ()
             findings.append(Finding(subject, "motions", name, Verdict.WRONG, *value, causes=causes, detail=each.ended))
     findings += [
         Finding(subject, "motions", name, Verdict.NOT_TESTED, detail=reason) for name, reason in answers.unsupported.items()
@@ -435,8 +435,8 @@ def verify_method(
 def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
     """Return what decides the verdict, with the number of cases of each check that are right."""
     parts = []
-    for check in dict.fromkeys(each.check for each in findings):
-        some = [each for each in findings if each.check == check and each.verdict is not Verdict.NOT_TESTED]
+    for check in dict.fromkeys(finding.check for finding in findings):
+        some = [finding for finding in findings if finding.check == check and finding.verdict is not Verdict.NOT_TESTED]
         if check == "order":
             parts += [each.detail for each in some]
         elif some and check in ("motions", "pairs", "repeatability"):
@@ -449,7 +449,7 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
                 parts.append(f"in {len(ended)} {ended[0]}")
         else:
             parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
-    failing = sum(each.check == "motions" and each.verdict is Verdict.WRONG for each in findings)
+    failing = sum(finding.check == "motions" and finding.verdict is Verdict.WRONG for finding in findings)
     reasons = [
         f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
         f"(explains {len(each.motions)} of {failing} failing motions)"
@@ -479,8 +479,10 @@ def verify_program(
             method = method or program_class(program, PATIENCE)()
             if "protocol" in checks:
                 findings += protocol.findings(subject, method)
-            if any(each.verdict is Verdict.WRONG for each in findings):
-                return Verification(subject, "program", findings, "; ".join(each.detail for each in findings if each.detail))
+            if any(finding.verdict is Verdict.WRONG for finding in findings):
+                return Verification(
+                    subject, "program", findings, "; ".join(finding.detail for finding in findings if finding.detail)
+                )
             if "times" in checks:
                 findings += protocol.times(subject, method)
             rest = [check for check in checks if check not in ("protocol", "times")]
@@ -493,4 +495,4 @@ def verify_program(
 
 
 def _wrong(findings: Sequence[Finding]) -> list[str]:
-    return [each.detail for each in findings if each.verdict is Verdict.WRONG]
+    return [finding.detail for finding in findings if finding.verdict is Verdict.WRONG]

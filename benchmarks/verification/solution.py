@@ -254,7 +254,7 @@ def _field(potential: Any, t: Array) -> Callable[[Array], Array]:
         R = R if axes is None else axes @ R
         columns = [[R[..., i, j] for i in range(3)] for j in range(3)]
         c, d = law.finite_derivative(columns, columns)
-        return np.moveaxis(cross([sum(r * x for r, x in zip(each, c, strict=True)) for each in columns], d), 0, -1)
+        return np.moveaxis(cross([sum(r * x for r, x in zip(column, c, strict=True)) for column in columns], d), 0, -1)
 
     return torque
 

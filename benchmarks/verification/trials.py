@@ -28,12 +28,12 @@ from .solution import Equations, truth
 
 SLOWEST, FASTEST = 0.5, 1.1  # times are scaled by at least, and at most
 AHEAD = 8  # steps that a motion runs ahead of a habit
-_DEFAULTS = {each.name: each.default for each in fields(Equations) if each.name not in ("scene", "tolerance", "most")}
+_DEFAULTS = {field.name: field.default for field in fields(Equations) if field.name not in ("scene", "tolerance", "most")}
 
 
 def compose(*mistakes: Mistake, remark: str = "") -> Trial:
     """Return the trial of readings, times, scenes and equations with mistakes, all at once."""
-    numbers = tuple(number for each in mistakes for number in each.numbers)
+    numbers = tuple(number for mistake in mistakes for number in mistake.numbers)
     return Trial(mistakes, lambda case: _build(mistakes, case), numbers, remark)
 
 
@@ -55,11 +55,11 @@ def equations_of(
 ) -> Equations | None:
     """Return the equations with mistakes in the scene and in the equations; None if a mistake makes no difference."""
     changes: dict[str, Any] = {}
-    for each in mistakes:
-        numbers = [values[number.name] for number in each.numbers]
-        if isinstance(each, SceneMistake):
+    for mistake in mistakes:
+        numbers = [values[number.name] for number in mistake.numbers]
+        if isinstance(mistake, SceneMistake):
             try:
-                other = each.change(scene, *numbers)
+                other = mistake.change(scene, *numbers)
             except BadInput:  # a number that no scene has
                 return None
             if other is None and not numbers:
@@ -75,14 +75,14 @@ def equations_of(
 
 
 def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
-    if not all(fits(each, case) for each in mistakes):
+    if not all(fits(mistake, case) for mistake in mistakes):
         return None
-    readings = [each for each in mistakes if isinstance(each, Reading)]
-    time = next((each for each in mistakes if isinstance(each, Time)), None)
-    moved = [each for each in mistakes if isinstance(each, SceneMistake | EquationsMistake)]
-    own = any(each.numbers for each in mistakes if isinstance(each, SceneMistake))
-    numbers = [number for each in mistakes for number in each.numbers]
-    starts = any(isinstance(each, SceneMistake) and each.start for each in mistakes)
+    readings = [mistake for mistake in mistakes if isinstance(mistake, Reading)]
+    time = next((mistake for mistake in mistakes if isinstance(mistake, Time)), None)
+    moved = [mistake for mistake in mistakes if isinstance(mistake, SceneMistake | EquationsMistake)]
+    own = any(mistake.numbers for mistake in mistakes if isinstance(mistake, SceneMistake))
+    numbers = [number for mistake in mistakes for number in mistake.numbers]
+    starts = any(isinstance(mistake, SceneMistake) and mistake.start for mistake in mistakes)
     exactly = case.equations()
 
     def equations(p: Array) -> Equations | None:
@@ -90,8 +90,8 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
                             tolerance=exactly.tolerance, most=exactly.most)  # fmt: skip
 
     probe = np.array([number.start + 0.5 for number in numbers])  # at the start the scene does not change
-    if any(each.numbers and each.change(case.scene, *(number.start + 0.5 for number in each.numbers)) is None
-           for each in mistakes if isinstance(each, SceneMistake)) or equations(probe) is None:  # fmt: skip
+    if any(mistake.numbers and mistake.change(case.scene, *(number.start + 0.5 for number in mistake.numbers)) is None
+           for mistake in mistakes if isinstance(mistake, SceneMistake)) or equations(probe) is None:  # fmt: skip
         return None
     plain = exact(case) if not moved and time is None else None
     flows: list[Any] = []  # of a start that is not fitted: other times of the same motion
@@ -118,11 +118,11 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
             R, w = (np.broadcast_to(x, y.shape) for x, y in ((equations.scene.R_WB0, R), (equations.scene.w_WB_B0, w)))
         if time is None:
             return equations.solve(case.start, R, w, case.t[:n])
-        return _at_times(time, case, equations, R, w, p[:, [numbers.index(each) for each in time.numbers]], n, flows)
+        return _at_times(time, case, equations, R, w, p[:, [numbers.index(number) for number in time.numbers]], n, flows)
 
     def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
-        for each in reversed(readings) if case.from_row else ():
-            R, w = read(each, p, R, w, True)
+        for reading in reversed(readings) if case.from_row else ():
+            R, w = read(reading, p, R, w, True)
         R, w = solve(R, w, p, n)
         for each in readings:
             R, w = read(each, p, R, w, False)

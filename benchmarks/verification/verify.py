@@ -190,8 +190,8 @@ def verify(
 
         results += verify_files(files, engines, tell, search)
     recordings = [each for each in found if each.kind is Kind.RECORDING]
-    if tables := [each.path for each in recordings if each.path]:
-        together = len(tables) == 2 and not any(each.in_folder for each in recordings)
+    if tables := [recording.path for recording in recordings if recording.path]:
+        together = len(tables) == 2 and not any(recording.in_folder for recording in recordings)
         results += _verify_recordings(tables, together, body, start, error, tell, reading)
     for each in found:
         if each.kind is Kind.PROGRAM:

@@ -126,7 +126,7 @@ def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
     An order depends a little on the steps that it is fitted to. A version with too few steps for a fit does not limit the steps
     of the others.
     """
-    reached = [{p.case.grid.dt for p in each.points if p.outcome.kind not in NO_TIME} for each in observations]
+    reached = [{p.case.grid.dt for p in observation.points if p.outcome.kind not in NO_TIME} for observation in observations]
     enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
     steps = set.intersection(*enough) if enough else set()
     fitted = []
@@ -215,7 +215,7 @@ def compare_engine(sides: Sequence[EngineSide], tell: Progress) -> EngineCompari
             for side, seen in zip(sides, line.results, strict=True)
             if seen is not None and seen.outcome.ok
         }
-        results = fit_orders([each for each in line.results if each])
+        results = fit_orders([result for result in line.results if result])
         lines.append(replace(line, results=results, times=time_versions(study, scenes[line.scene], good)))
     return replace(made, lines=tuple(lines))
 
@@ -241,4 +241,4 @@ def _repeat(study: Study, ready: Mapping[str, Success], seeds: range) -> dict[st
     runs = {version: own_loop(done.run) for version, done in ready.items()}
     repeats = [time_interleaved(runs, ROUNDS, CALL, study.timing_budget, seed) for seed in seeds]
     steps = {version: done.trajectory.counters.steps or math.nan for version, done in ready.items()}
-    return {version: tuple(each[version].minimum / steps[version] for each in repeats) for version in ready}
+    return {version: tuple(repeat[version].minimum / steps[version] for repeat in repeats) for version in ready}

@@ -40,9 +40,9 @@ def list_methods(names: list[str], project: str = "") -> Answer:
     """
     families: dict[str, Any] = dict(registry.list_families())
     registered = set()
-    for each in entry_points(group="conservative.methods"):
-        if each.dist and re.sub(r"[-_.]+", "-", each.dist.name).lower() == project:
-            registered.add(each.name)
+    for entry_point in entry_points(group="conservative.methods"):
+        if entry_point.dist and re.sub(r"[-_.]+", "-", entry_point.dist.name).lower() == project:
+            registered.add(entry_point.name)
     with suppress(ImportError):  # a version without programs
         from conservative.programs import list_programs
 

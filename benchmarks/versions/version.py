@@ -119,7 +119,7 @@ class Checkout(Environment):
     def programs(self) -> dict[str, tuple[str, ...]]:
         """Return the hashes of the files in the command line of each program."""
         programs = read_programs(self.folder / "conservative.toml").values()
-        files = {each.name: [Path(word) for word in each.words if Path(word).is_file()] for each in programs}
+        files = {program.name: [Path(word) for word in program.words if Path(word).is_file()] for program in programs}
         return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in every) for name, every in files.items()}
 
 

@@ -115,7 +115,7 @@ class Ensemble:
         if rows == "samples":
             samples = [sample_rows(each) for each in self]
             frame = pd.DataFrame(np.concatenate(samples), columns=columns(self[0]))
-            frame.insert(0, "body", np.repeat(np.arange(len(samples)), [len(each) for each in samples]))
+            frame.insert(0, "body", np.repeat(np.arange(len(samples)), [len(sample) for sample in samples]))
         else:
             outcomes, reached = np.full(len(self), "ok", dtype=object), np.full(len(self), self.t[-1])
             for i, failure in self.failures.items():

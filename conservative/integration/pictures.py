@@ -70,7 +70,7 @@ def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
     y = alt.Y("low:Q", title="angle from the mean, °", scale=scale)
     band = base.mark_area(opacity=0.25, color=BLUE).encode(y=y, y2="high:Q")
     line = base.mark_line(color=BLUE, point=len(t) == 1).encode(
-        y=alt.Y("middle:Q", scale=scale), tooltip=[alt.Tooltip(f"{each}:Q", format=".4g") for each in data.columns]
+        y=alt.Y("middle:Q", scale=scale), tooltip=[alt.Tooltip(f"{column}:Q", format=".4g") for column in data.columns]
     )
     title = alt.Title("Spread of attitude", subtitle="line: median; band: 5 to 95 % of the bodies")
     return (band + line).properties(title=title)

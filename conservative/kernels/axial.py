@@ -165,7 +165,7 @@ class Nutation(NamedTuple):
 
     def find_rows(self, x, angles):
         """Return g, a and w."""
-        (u, slope), turns = x, ((cosine(each), sine(each)) for each in angles)
+        (u, slope), turns = x, ((cosine(angle), sine(angle)) for angle in angles)
         (cp, sp), (cr, sr) = ((c * d - s * t, s * d + c * t) for (c, s), (d, t) in zip(self.turns, turns, strict=True))
         wide = root(fuse(-u, u, 1.0))
         slow, fast = (self.along - self.spin * u) / wide, slope / wide

@@ -258,7 +258,7 @@ def _by_shown_order(
         after = _solve(method, scene, longer)
         differences.append(math.inf if after is None else _largest_difference(before, after))
         before = coarse if after is None else after
-    seen = [each for each in differences if each < ASYMPTOTIC]
+    seen = [difference for difference in differences if difference < ASYMPTOTIC]
     if len(seen) < 2:  # one difference alone may be small by chance
         return math.inf, noisy, False
     if len(seen) == HALVINGS:
@@ -332,7 +332,7 @@ def nearby_scene(scene: Scene, by: float = ROUNDED) -> Scene:
     body, w = scene.body, scene.w_WB_B0
     diagonal = np.array_equal(body.R_BP, np.eye(3))
     sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
-    equal = [_SIGNS[0][int(np.argmax(body.moments == each))] for each in body.moments]  # such as those of a rod stay equal
+    equal = [_SIGNS[0][int(np.argmax(body.moments == moment))] for moment in body.moments]  # such as those of a rod stay equal
     signs = np.diag(equal) if diagonal else _AXES_TOO
     moved = body.R_BP @ (by * sizes * signs) @ body.R_BP.T
     return replace_unchecked(

@@ -58,7 +58,7 @@ class FieldPotential(ABC):
     def vary(self, parameters: Mapping[str, Array]) -> Varied:
         """Return the energies and sizes of n bodies, with numbers (n, ...) of `parameters` in place of its own."""
         numbers = self._fill(parameters, len(next(iter(parameters.values()))))
-        return Varied(self.build_field(None, *(each[:, None] for each in numbers)))
+        return Varied(self.build_field(None, *(number[:, None] for number in numbers)))
 
     def _fill(self, parameters: Mapping[str, Array], n: int) -> list[Array]:
         own = ((name, np.asarray(getattr(self, name), dtype=float)) for name in self.NUMBERS)

@@ -188,7 +188,13 @@ class OfTime(PickledByFields):
             parameters = inspect.signature(self.value).parameters.values()
         except (TypeError, ValueError):  # a function of C without a signature
             return False
-        return sum(each.default is each.empty and each.kind <= each.POSITIONAL_OR_KEYWORD for each in parameters) == 2
+        return (
+            sum(
+                parameter.default is parameter.empty and parameter.kind <= parameter.POSITIONAL_OR_KEYWORD
+                for parameter in parameters
+            )
+            == 2
+        )
 
     def at(self, t: float, R_WB: Array | None = None, window: Window = (-math.inf, math.inf)) -> Array:
         """Return the value at a time, s, and an attitude (3, 3), between two break points. Raise `TorqueFailed` without one.
@@ -243,7 +249,7 @@ class OfTime(PickledByFields):
         if callable(self.value) and not sides and not np.array_equal(values[0], again):
             got = f"a function that returns {values[0].tolist()} and then {again.tolist()} at t = 0 s"
             raise BadInput(self.name, got, "a function that returns the same value each time")
-        return max(float(np.linalg.norm(each)) for each in values)
+        return max(float(np.linalg.norm(value)) for value in values)
 
     @property
     def end(self) -> float:

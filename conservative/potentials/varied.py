@@ -49,8 +49,8 @@ class OneByOne:
 
     def scales(self) -> Array:
         """Return the size of the field, (n,), in J."""
-        return np.array([each.scale() for each in self.potentials])
+        return np.array([potential.scale() for potential in self.potentials])
 
     def axes_W(self) -> Array:
         """Return unit vectors (n, 3), world axes; 0 where there is none."""
-        return np.stack([np.zeros(3) if each.axis_W is None else each.axis_W for each in self.potentials])
+        return np.stack([np.zeros(3) if potential.axis_W is None else potential.axis_W for potential in self.potentials])

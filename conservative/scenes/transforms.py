@@ -91,7 +91,10 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
         potential=field,
         torque=torque and _turn(torque, F, turn if torque.frame == "body" else np.asarray),
         damping=damping and _turn_damping(damping, F),
-        extra_invariants=tuple(replace(each, evaluate=_turn_back(each.evaluate, F)) for each in scene.extra_invariants),
+        extra_invariants=tuple(
+            replace(extra_invariant, evaluate=_turn_back(extra_invariant.evaluate, F))
+            for extra_invariant in scene.extra_invariants
+        ),
         flight=flight,
     )
 

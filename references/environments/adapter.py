@@ -182,7 +182,7 @@ class AdapterMethod(Method):
     def settings(self) -> dict[str, Any]:
         """The settings and their values."""
         value: Any = self
-        return {each.name: getattr(self, each.name) for each in fields(value)}
+        return {field.name: getattr(self, field.name) for field in fields(value)}
 
     @property
     def setting_parts(self) -> dict[str, str]:
@@ -268,7 +268,7 @@ class LocalEngine(AdapterMethod):
             return None
         read = read_many(axes, grid)
         try:
-            run = self._load().prepare_many([SimpleNamespace(**self.settings, **describe(each, grid)) for each in axes])
+            run = self._load().prepare_many([SimpleNamespace(**self.settings, **describe(axis, grid)) for axis in axes])
         except NotImplementedError:
             return None
         return lambda: read(run())

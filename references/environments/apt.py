@@ -41,7 +41,7 @@ class Apt(EnvironmentKind):
         """Return the program, compiled again if its sources have changed. Raise `BadInput` if that fails."""
         adapter = Path(__file__).parents[1] / "engines" / f"{folder.parent.name}{self.suffix}"
         sources = adapter, Path(program.__file__).with_suffix(".hpp")
-        key = hashlib.sha256(b"".join(each.read_bytes() for each in sources)).hexdigest()[:16]
+        key = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
         done = folder / f"program-{key}"
         if not done.is_file():
             new, lock = done.with_suffix(f".{os.getpid()}"), (folder / self.lock_file).read_text(encoding="utf-8")

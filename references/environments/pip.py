@@ -76,7 +76,7 @@ def interpreter_of(folder: Path) -> Path:
 
 def versions_in(lock: str) -> dict[str, str]:
     """Return the versions of all packages in the text of a lock, by their normal names."""
-    return {each["name"]: each["version"] for each in tomllib.loads(lock)["packages"]}
+    return {package["name"]: package["version"] for package in tomllib.loads(lock)["packages"]}
 
 
 def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source: Source) -> Lock:

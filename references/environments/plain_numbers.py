@@ -95,7 +95,7 @@ def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | No
 
 def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
     """Return the numbers of n scenes of one kind. Those named in `rows` have a row for each scene."""
-    return join_numbers([describe(each, grid) for each in axes])
+    return join_numbers([describe(axis, grid) for axis in axes])
 
 
 def join_numbers(every: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -124,7 +124,7 @@ Answer = Mapping[str, Any] | IntegrationFailed
 
 def read_many(axes: Sequence[EngineAxes], grid: Grid) -> Callable[[Answer], Block]:
     """Return a function that converts an answer for n bodies into samples in body axes; it raises a failure."""
-    R_BF = np.array([each.R_BF for each in axes])
+    R_BF = np.array([axis.R_BF for axis in axes])
 
     def read(answer: Answer) -> Block:
         if isinstance(answer, IntegrationFailed):

@@ -58,7 +58,7 @@ class Formulation:
 
 def gather(problems: Sequence[Formulation]) -> Callable[[Array], States]:
     """Return a function that makes states of bodies of one form out of their values (n, s, m)."""
-    R_WD, constants = np.array([each.R_WD for each in problems]), np.array([each.constants for each in problems])
+    R_WD, constants = np.array([problem.R_WD for problem in problems]), np.array([problem.constants for problem in problems])
     return lambda values: States(problems[0].kind, values, R_WD, constants)
 
 

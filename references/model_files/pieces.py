@@ -66,7 +66,7 @@ class Piece:
 
 def rounding_of(moments: Iterable[Any]) -> float:
     """Return the largest rounding error of a sum of three moments, kg m^2, from the digits that they are written with."""
-    exponents = [Decimal(str(each)).normalize().as_tuple().exponent for each in moments if each and np.isfinite(each)]
+    exponents = [Decimal(str(moment)).normalize().as_tuple().exponent for moment in moments if moment and np.isfinite(moment)]
     return 1.5 * 10.0 ** min(map(int, exponents), default=-300)
 
 

@@ -259,7 +259,9 @@ def _urdfdom(path: Path) -> Piece:
         model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
     except ValueError as error:
         raise refuse(path, f"an error ({' '.join(str(error).split())})", "a URDF file that Pinocchio reads") from None
-    bodies = [Piece(each.mass, np.array(each.lever), np.array(each.inertia)) for each in model.inertias if each.mass]
+    bodies = [
+        Piece(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia)) for inertia in model.inertias if inertia.mass
+    ]
     if len(bodies) != 1:
         raise refuse(path, f"{len(bodies)} bodies that have a mass", "one body")
     return bodies[0]

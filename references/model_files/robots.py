@@ -66,7 +66,7 @@ def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[
                 raise refuse(path, f"a joint to {root!r}, which is not there", "joints between links of the file")
             seen.add(root)
         found.setdefault(root, []).append(name)
-    return {root: [root, *(each for each in members if each != root)] for root, members in found.items()}
+    return {root: [root, *(member for member in members if member != root)] for root, members in found.items()}
 
 
 def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
@@ -104,9 +104,9 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
     bodies: Bodies = []
     for name, members in groups.items():
-        joints = [each for each in frames.joints if each.child == name and name in moving]
+        joints = [joint for joint in frames.joints if joint.child == name and name in moving]
         base = np.linalg.inv(frames.place(name))
-        pivots = [(each.kind, np.zeros(3) if urdf else (base @ frames.place(each.name))[:3, 3]) for each in joints]
+        pivots = [(joint.kind, np.zeros(3) if urdf else (base @ frames.place(joint.name))[:3, 3]) for joint in joints]
         copy = _write(folder, _copy(path, model, frames, members, search), path)
         loose = [FREE.format(repr(name))] if not alone and (moving or held) else []
         bodies.append(Body(name, path if alone else copy, notes + loose, pivots, copy if alone else None))
@@ -297,7 +297,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     pivots: dict[str, list[tuple[str, Any]]] = {name: [] for name in names}
     for joint in stage.joints:
         api = physics.Joint(joint)
-        ends = [[str(each) for each in end.GetTargets()] for end in (api.GetBody0Rel(), api.GetBody1Rel())]
+        ends = [[str(target) for target in end.GetTargets()] for end in (api.GetBody0Rel(), api.GetBody1Rel())]
         if joint.IsA(physics.FixedJoint) and all(ends) and all(each[0] in names for each in ends):
             parents[ends[1][0]] = ends[0][0]
             continue
@@ -313,12 +313,12 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     for name, members in groups.items():
         copy = Usd.Stage.Open(stage.stage.Flatten())
         for joint in [each for each in copy.Traverse() if each.IsA(physics.Joint)]:
-            target = [str(each) for each in physics.Joint(joint).GetBody1Rel().GetTargets()]
+            target = [str(target) for target in physics.Joint(joint).GetBody1Rel().GetTargets()]
             if not (joint.IsA(physics.FixedJoint) and set(target).intersection(members[1:])):
                 joint.SetActive(False)
         for other in set(names) - set(members):
             prim = copy.GetPrimAtPath(other)
-            if any(each.startswith(f"{other}/") for each in members):
+            if any(member.startswith(f"{other}/") for member in members):
                 prim.RemoveAPI(physics.RigidBodyAPI)
             elif prim:
                 prim.SetActive(False)

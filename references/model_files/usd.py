@@ -63,7 +63,7 @@ class Stage:
         self.bodies = [prim for prim, api in apis if api.GetRigidBodyEnabledAttr().Get() is not False]
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self.joints = [prim for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get() is not False]
-        children = [each for prim in self.joints for each in UsdPhysics.Joint(prim).GetBody1Rel().GetTargets()]
+        children = [target for prim in self.joints for target in UsdPhysics.Joint(prim).GetBody1Rel().GetTargets()]
         self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are those of the root
 
     def pose(self, prim: Any) -> tuple[Array, Array]:
@@ -127,7 +127,9 @@ class Stage:
         """
         names = ("mass", "density", "centerOfMass", "diagonalInertia", "principalAxes")
         attributes = [prim.GetAttribute(f"physics:{name}") for name in names]
-        mass, density, com, moments, q = (each.Get() if each and each.HasAuthoredValue() else None for each in attributes)
+        mass, density, com, moments, q = (
+            attribute.Get() if attribute and attribute.HasAuthoredValue() else None for attribute in attributes
+        )
         com = None if com is None or not np.isfinite(com).all() else self.metre * np.array(com, float)
         inertia = self.tensor(moments, q) if moments and any(moments) else None
         density = density * self.kilogram / self.metre**3 if density and density > 0 else None
@@ -192,7 +194,7 @@ def read_usd(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
 
 def _link(stage: Stage, body: Any, reading: Reading) -> Link:
     forms, (pose, scale), colliders = [], stage.pose(body), stage.colliders(body)
-    for attribute in [each for prim in dict.fromkeys([body, *colliders]) for each in prim.GetAuthoredAttributes()]:
+    for attribute in [authored for prim in dict.fromkeys([body, *colliders]) for authored in prim.GetAuthoredAttributes()]:
         space, colon, name = attribute.GetName().partition(":")
         if colon and space in ASKS:
             said = f"{attribute.GetPath()} = {attribute.Get()}"

@@ -188,7 +188,7 @@ class Heyoka(Method):
         width = self.width or int(forms.heyoka().recommended_simd_size())
         padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
         rows = (np.array([getattr(each, name) for each in padded]) for name in ("parameters", "start"))
-        parameters, start = (each.reshape(-1, width, each.shape[1]).swapaxes(1, 2).copy() for each in rows)
+        parameters, start = (row.reshape(-1, width, row.shape[1]).swapaxes(1, 2).copy() for row in rows)
         batches = self.integrators(problems[0], width), parameters, start
         march, t = _run_batches if self.driver == "batch" else _run_ensemble, grid.t
         samples, R_BF = formulations.gather(problems), np.array([problem.axes.R_BF for problem in problems])

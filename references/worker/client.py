@@ -101,7 +101,7 @@ def _is_array(value: object) -> bool:
     while rows and set(map(type, rows)) == {list}:
         rows = list(chain.from_iterable(rows))
     return isinstance(value, list) and set(map(type, rows)) <= {int, float, type(None)} and not any(
-        type(each) is int and abs(each) > _LARGEST for each in rows
+        type(row) is int and abs(row) > _LARGEST for row in rows
     )  # fmt: skip
 
 

@@ -153,7 +153,7 @@ class Panel:
         values = {"size": self.solid.size, "tip": self.tip, "q": np.roll(to_quaternion(self.R_WP), -1, axis=1), "L": self.L_W}
         texts = [[self.text(name, frame) for frame in range(len(self.R_WP))] for name in self.sizes]
         starts = [[next(same) for _, same in groupby(enumerate(each), lambda pair: pair[1])] for each in texts]
-        shown = [[(frame, *text) for frame, text in each] for each in starts]
+        shown = [[(frame, *text) for frame, text in start] for start in starts]
         return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {
             "shape": self.solid.shape,
             "sizes": shown,
@@ -181,7 +181,7 @@ def drift_name(invariant: Invariant) -> str:
 
 def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Array]:
     """Return the largest drift of each invariant so far, and the largest attitude error, rad, at the samples (n,), by name."""
-    values = {drift_name(each): sizes(trajectory.drift(each)) for each in trajectory.scene.invariants}
+    values = {drift_name(invariant): sizes(trajectory.drift(invariant)) for invariant in trajectory.scene.invariants}
     if error is not None:
         values[ERROR] = error
     return {name: np.maximum.accumulate(value) for name, value in values.items()}
@@ -190,7 +190,7 @@ def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Arr
 def longest(trajectories: Sequence[Trajectory]) -> float:
     """Return the time, s, up to which the motions can be watched; infinity if all of it."""
     ends = []
-    for each in [each for each in trajectories if each.ok] or trajectories:
+    for each in [trajectory for trajectory in trajectories if trajectory.ok] or trajectories:
         turned = np.cumsum(np.diff(each.t) * np.linalg.norm(each.w_WB_B[1:], axis=1))
         within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # of the angle that `make_panels` takes from a mean rate
         ends.append(math.inf if within == len(turned) else float(each.t[within]))
@@ -205,11 +205,13 @@ def make_panels(
         raise BadInput("trajectories", repr(list(trajectories)), "trajectories with at least one sample")
     if len(labels) != len(trajectories):
         raise BadInput("labels", list(labels), f"one label for each of {len(trajectories)} trajectories")
-    duration = max(float(each.t[-1]) for each in trajectories) or trajectories[0].scene.t_end
-    shared = min((float(each.t[-1]) for each in trajectories if each.ok), default=duration)
-    if all(not each.ok or each.t[-1] - np.diff(each.t).max(initial=0.0) <= shared for each in trajectories):
+    duration = max(float(trajectory.t[-1]) for trajectory in trajectories) or trajectories[0].scene.t_end
+    shared = min((float(trajectory.t[-1]) for trajectory in trajectories if trajectory.ok), default=duration)
+    if all(
+        not trajectory.ok or trajectory.t[-1] - np.diff(trajectory.t).max(initial=0.0) <= shared for trajectory in trajectories
+    ):
         duration = shared or duration  # last steps pass it: all bodies are drawn at one time
-    rate = min(float(np.linalg.norm(each.w_WB_B, axis=1).mean()) for each in trajectories)
+    rate = min(float(np.linalg.norm(trajectory.w_WB_B, axis=1).mean()) for trajectory in trajectories)
     frames = max(FRAMES, math.ceil(rate * duration / TURN) + 1)
     if frames > MOST_FRAMES + 1:
         got = f"{duration:g} s, in which the body turns by {rate * duration:.0f} rad"

@@ -84,7 +84,7 @@ def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
     places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # at the ends they would run into an axis
     halo, plain = ({"stroke": "white", "strokeWidth": 3}, {"color": PALETTE["grey"]})  # over lines of the grid
     labels = [alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, **style) for style in (halo, plain)]
-    return [lines, *(each.encode(x=x, y=y, text="text:N") for each in labels)]
+    return [lines, *(label.encode(x=x, y=y, text="text:N") for label in labels)]
 
 
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:

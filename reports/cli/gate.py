@@ -107,7 +107,7 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
     two_versions = options["against"] is not None
     for name in OF_BASELINE if two_versions else OF_VERSIONS:
         if options[name]:
-            parameter = next(each for each in context.command.params if each.name == name)
+            parameter = next(param for param in context.command.params if param.name == name)
             problem = "cannot be used with --against" if two_versions else "needs --against"
             raise click.UsageError(f"{parameter.get_error_hint(context)} {problem}")
     if not two_versions:
@@ -136,9 +136,9 @@ def _judge(options: dict[str, Any]) -> Document:
     if options["update"] is None:
         before = baseline.read(path)
         verdicts = [decide(before, run) for run in runs]
-        failed = [str(each) for each in verdicts if not each.passed]
-        data = {"passed": not failed, "verdicts": [each.record for each in verdicts]}
-        texts = [Paragraph(str(each)) for each in verdicts]
+        failed = [str(verdict) for verdict in verdicts if not verdict.passed]
+        data = {"passed": not failed, "verdicts": [verdict.record for verdict in verdicts]}
+        texts = [Paragraph(str(verdict)) for verdict in verdicts]
         return Document("conservative gate", "Results against the baseline", texts, data=data, failures=failed)
     old = baseline.read(path, also_with_times=True) if path.exists() else None
     new = baseline.update_baseline(old, runs, options["update"])
@@ -173,7 +173,7 @@ def _compare(options: dict[str, Any]) -> Document:
 
     made = provenance().facts
     source, head = Source(options["find_links"], options["allow_build"]), options["project"] or "."
-    programs = [each.name for each in list_programs().values() if each.file == project_file()]
+    programs = [program.name for program in list_programs().values() if program.file == project_file()]
     if options["build"] and not programs:
         raise BadInput("build", "no program", "one in the project: conservative engines add ./my_engine --project")
     prices = read_prices(options["accept_slower"], project_file())

@@ -88,7 +88,7 @@ class Command(click.Command):
         self.codes = EXIT_CODES | dict(codes or {})
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        names = {str(each.name) for each in self.params}
+        names = {str(param.name) for param in self.params}
         new = {old: long for name, ((long, *_), olds) in VOCABULARY.items() if name in names for old in olds}
         for i, word in enumerate(args[: args.index("--") if "--" in args else None]):
             name, *value = word.split("=", 1)
@@ -103,7 +103,7 @@ class Command(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         super().format_epilog(ctx, formatter)
-        goes_on = "; --resume continues" * any(each.name == "resume" for each in self.params)
+        goes_on = "; --resume continues" * any(param.name == "resume" for param in self.params)
         write_codes(formatter, self.codes | {130: EXIT_CODES[130] + goes_on})
 
 
@@ -186,16 +186,16 @@ class OutputCommand(Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         rest = super().parse_args(ctx, args)
         force = ctx.meta["force"] = ctx.params.pop("force")
-        taken = [Path(word) for each in self.params if not isinstance(each.type, Output) for word in _words(ctx, each)]
+        taken = [Path(word) for param in self.params if not isinstance(param.type, Output) for word in _words(ctx, param)]
         written: dict[str, str] = {}
-        for each in self.params:
-            if isinstance(each.type, Output) and (path := ctx.params.get(str(each.name))) is not None:
-                for name, mark in each.type.marks.items():
-                    require_replaceable(path / name, mark, str(each.name), force, taken)
+        for param in self.params:
+            if isinstance(param.type, Output) and (path := ctx.params.get(str(param.name))) is not None:
+                for name, mark in param.type.marks.items():
+                    require_replaceable(path / name, mark, str(param.name), force, taken)
                     place = os.path.normcase(os.path.realpath(path / name))  # also of a file that does not exist yet
-                    if written.setdefault(place, str(each.name)) != each.name and not is_special(path / name):
+                    if written.setdefault(place, str(param.name)) != param.name and not is_special(path / name):
                         got = f"{str(path / name)!r}, the file of --{written[place]}"
-                        raise BadInput(str(each.name), got, "another file")
+                        raise BadInput(str(param.name), got, "another file")
         return rest
 
 

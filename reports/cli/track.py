@@ -113,7 +113,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         if against is not None:
             tell(f"installing {against}")
             environments += (install_build(engine, against, source).environment,)
-        sides = plan_versions([Version(each.version, "", each) for each in environments], settings, scenes)
+        sides = plan_versions([Version(environment.version, "", environment) for environment in environments], settings, scenes)
         with progress() as step:
             compared = compare_engine(sides, step)
         with progress() as step:

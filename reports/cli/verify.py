@@ -183,7 +183,7 @@ def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
             continue
         users = users_of.get(name, (Kind.RECORDING,))
         if not set(kinds) & set(users):
-            flag = next(each.opts[0] for each in ctx.command.params if each.name == name)
+            flag = next(param.opts[0] for param in ctx.command.params if param.name == name)
             got = f"{flag}, which none of the subjects uses ({', '.join(sorted(kinds))})"
             raise BadInput(flag.lstrip("-"), got, f"a subject of the kind {', '.join(users)}")
         if name not in ("picture", "scripts"):
@@ -206,7 +206,7 @@ def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
 
     (recording,) = found
     details: Any = recording.details
-    limits = {each.name: each.allowed for each in details.quantities if math.isfinite(each.allowed)}
+    limits = {quantity.name: quantity.allowed for quantity in details.quantities if math.isfinite(quantity.allowed)}
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 

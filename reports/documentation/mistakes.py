@@ -133,7 +133,7 @@ def plant(mistake: Mistake, case: Compared) -> Rows | None:
         return None
     else:
         values = {**NUMBERS, **OF_KEY.get(mistake.key, {})}
-        numbers = np.array([[values[each.name] for each in trial.numbers]])
+        numbers = np.array([[values[number.name] for number in trial.numbers]])
         R, w = motion(case.scene.R_WB0[None], case.scene.w_WB_B0[None], numbers, len(case.t))
         made = R[0], w[0]
     return made if made is None or case.errors(*made).max() > SHOWS else None
@@ -294,9 +294,9 @@ def in_program(key: str) -> str:
         return Trajectory(scene, grid.t, *made, "planted")
 
     findings, named, _ = programs.motion_findings("planted", programs.run_motions(solve, 2))
-    if not any(each.verdict == "wrong" for each in findings):
+    if not any(finding.verdict == "wrong" for finding in findings):
         return "no exact motion shows it"
-    keys = [[one.keys for one in each.explanations] for each in named]
+    keys = [[explanation.keys for explanation in each.explanations] for each in named]
     if keys and (key,) in keys[0]:
         return NAMED if len(keys[0]) == 1 else WITH_OTHERS
     return f"as {' + '.join(keys[0][0])}" if keys and len(keys[0]) == 1 else NOT_NAMED

@@ -61,7 +61,7 @@ def trajectories(samples: pd.DataFrame, scene: Scene) -> dict[str, Trajectory]:
 def largest_values(samples: pd.DataFrame, scene: Scene) -> dict[str, dict[str, Array]]:
     """Return the largest drifts and attitude error so far of each method, by the names of `animation.frames`, at its states."""
     rows = samples[(samples["study"] == motion.STUDY.name) & (samples["scene"] == scene.name)]
-    names = {motion.LARGEST + each.name: drift_name(each) for each in scene.invariants} | {motion.ERROR: ERROR}
+    names = {motion.LARGEST + invariant.name: drift_name(invariant) for invariant in scene.invariants} | {motion.ERROR: ERROR}
     found: dict[str, dict[str, Array]] = {}
     for (method, quantity), part in rows.groupby(["method", "quantity"], sort=False):
         if quantity in names:

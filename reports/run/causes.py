@@ -35,12 +35,12 @@ def _find(solve: Solve, setting: Mapping[str, Any], free: bool) -> Explained:
 
     answers = run_motions(solve_some, setting["order"], setting.get("precision") == "f32", principal=True)
     findings, named, _ = motion_findings("", answers)
-    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
     if wrong and not named:
         sentence = next((each.detail for each in wrong if each.detail), UNKNOWN)
         moved = any(math.isfinite(each.error) for each in wrong)  # a run that ended has no motion: its row says so
         return Explained("unknown" if moved else "", sentence)
-    causes = [[one.cause for one in each.explanations] for each in named]
+    causes = [[explanation.cause for explanation in each.explanations] for each in named]
     return Explained(
         "; ".join(" or ".join(cause.key for cause in same) for same in causes),
         "; ".join(" or ".join(cause.sentence for cause in same) for same in causes),

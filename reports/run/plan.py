@@ -72,7 +72,7 @@ class Plan:
     def locks(self) -> tuple[LockedEngine, ...]:
         """The locks of the environments that engines run in, sorted by name."""
         methods = (*self.methods, *self.engines)
-        used = {each.environment.folder: each.environment for each in methods if isinstance(each, EngineMethod)}
+        used = {method.environment.folder: method.environment for method in methods if isinstance(method, EngineMethod)}
         locks = (LockedEngine(f"{each.engine}=={each.version}", each.runtime, each.packages) for each in used.values())
         return tuple(sorted(locks, key=lambda lock: lock.name))
 

@@ -355,7 +355,7 @@ def summarize(trajectory: Trajectory, method: Method, dt: float, typed: str = ""
         "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,
         "outcome": trajectory.outcome,
         "counters": asdict(trajectory.counters),
-        "drift": {each.name: float(sizes(trajectory.drift(each)).max(initial=0.0)) for each in scene.invariants},
+        "drift": {invariant.name: float(sizes(trajectory.drift(invariant)).max(initial=0.0)) for invariant in scene.invariants},
         "orthonormality": float(orthonormality(trajectory.R_WB).max(initial=0.0)),
         "last": {
             "t": float(trajectory.t[-1]),

@@ -37,7 +37,7 @@ def verify_methods(methods: Sequence[Method], step: Step, checks: Sequence[str] 
         if isinstance(method, Missing):
             findings = (Finding(method.name, checks[0], "", Verdict.NOT_TESTED, detail=str(method.error)),)
         else:
-            findings = tuple(each for found in verify(method, only=checks, tell=tell) for each in found.findings)
+            findings = tuple(finding for found in verify(method, only=checks, tell=tell) for finding in found.findings)
         yield Verified(names_of(method), findings)
 
 
@@ -48,12 +48,12 @@ def to_plain(verified: Iterable[Verified]) -> list[dict[str, Any]]:
 
 def from_plain(values: Iterable[Mapping[str, Any]]) -> tuple[Verified, ...]:
     """Return the findings of `to_plain`. Raise `KeyError`, `TypeError` or `ValueError` for other values."""
-    return tuple(Verified(dict(each["names"]), tuple(map(_finding, each["findings"]))) for each in values)
+    return tuple(Verified(dict(value["names"]), tuple(map(_finding, value["findings"]))) for value in values)
 
 
 def _plain(finding: Finding) -> dict[str, Any]:
     causes = [{**vars(cause), "keys": list(cause.keys), "numbers": dict(cause.numbers)} for cause in finding.causes]
-    return {**{each.name: getattr(finding, each.name) for each in fields(Finding)}, "causes": causes}
+    return {**{field.name: getattr(finding, field.name) for field in fields(Finding)}, "causes": causes}
 
 
 def _finding(values: Mapping[str, Any]) -> Finding:

@@ -34,17 +34,17 @@ def section(measured: Measured) -> Section:
         points, general_times = of_scene(measured.points, scene.name), dict[float, float]()
         for kind, found in families.items():
             errors = ERRORS if kind is MethodClass.GENERAL else ERRORS[-1:]
-            for each in sides(costs(points, errors), kind, errors):
-                if each.ours and each.ours.time < general_times.get(each.error, math.inf):  # a closed form has to be faster
-                    general_times[each.error] = each.ours.time
-                    line = points[points["name"] == each.ours.name]
-                    line = line[[error <= each.error for error in credit(line["error"].tolist())]]
+            for side in sides(costs(points, errors), kind, errors):
+                if side.ours and side.ours.time < general_times.get(side.error, math.inf):  # a closed form has to be faster
+                    general_times[side.error] = side.ours.time
+                    line = points[points["name"] == side.ours.name]
+                    line = line[[error <= side.error for error in credit(line["error"].tolist())]]
                     best = line.sort_values("time").iloc[0]
                     found.append((scene.name, str(best["family"])))
-                    engine, cost = each.theirs.name if each.theirs else DASH, numeric(1e6 * each.ours.time)
+                    engine, cost = side.theirs.name if side.theirs else DASH, numeric(1e6 * side.ours.time)
                     argument = shlex.quote(measured.plan.arguments[scene.name])
                     command = f"conservative run {argument} -m {best['method']} --dt {best['dt']:.10g}"
-                    rows.append([scene.name, tolerance(each.error), each.ours.name, cost, engine, ratio_cell(each), command])
+                    rows.append([scene.name, tolerance(side.error), side.ours.name, cost, engine, ratio_cell(side), command])
     general, closed = families.values()
     parts = []
     if general:

@@ -15,7 +15,7 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
     """Return the blocks for verifications of model files: the verdicts, what is not right, the bodies by all readers, notes."""
     from conservative.benchmarks.verification.finding import Verdict
 
-    findings = [finding for each in verifications for finding in each.findings]
+    findings = [finding for verification in verifications for finding in verification.findings]
     engines = list(dict.fromkeys(each.subject for each in findings))
     verdicts = {(each.case, each.subject): each.verdict for each in findings}
     cases = list(dict.fromkeys(each.case for each in findings))
@@ -27,14 +27,16 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
     lead = f"{len(right)} of {len(tested)} answers of {len(engines)} engines are right, for {count}."
     lead += f" {len(undecided)} are undecided." * bool(undecided)
     rows = [[case, *(str(verdicts[case, engine]) for engine in engines)] for case in cases]
-    details: dict[tuple[str, str], Any] = {(body.case, body.subject): body for each in verifications for body in _bodies(each)}
+    details: dict[tuple[str, str], Any] = {
+        (body.case, body.subject): body for verification in verifications for body in _bodies(verification)
+    }
     parties = [
         [each.case, each.subject, *_readings(body.readings), "–" if body.seen is None else _describe(body.seen)]
         for each in [*wrong, *undecided]
         if (body := details.get((each.case, each.subject))) and (body.seen or each in undecided)
     ]
     explained = [each for each in right if each.detail]
-    notes = [Item(note, each.subject) for each in verifications for note in each.notes]
+    notes = [Item(note, verification.subject) for verification in verifications for note in verification.notes]
     return filled(
         Paragraph(lead, Emphasis.LEAD),
         Table(["body", *engines], rows),

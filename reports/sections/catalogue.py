@@ -30,8 +30,14 @@ def build() -> Document:
         Table(
             SCENE_HEADER,
             [
-                (each["name"], f"{each['t_end']:.4g}", f"{each['dt']:.4g}", ", ".join(each["invariants"]), each["source"])
-                for each in members
+                (
+                    member["name"],
+                    f"{member['t_end']:.4g}",
+                    f"{member['dt']:.4g}",
+                    ", ".join(member["invariants"]),
+                    member["source"],
+                )
+                for member in members
             ],
             f"Scenes: {group}",
         )
@@ -42,12 +48,12 @@ def build() -> Document:
             METHOD_HEADER,
             [
                 (
-                    each["name"],
-                    "-" if each["order"] is None else str(each["order"]),
-                    ", ".join(each["conserves"]) or "-",
-                    each["label"] or each["reason"],
+                    member["name"],
+                    "-" if member["order"] is None else str(member["order"]),
+                    ", ".join(member["conserves"]) or "-",
+                    member["label"] or member["reason"],
                 )
-                for each in members
+                for member in members
             ],
             f"Methods: {TITLES[role]}",
         )

@@ -96,7 +96,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
             continue
         order, step = _order(line), number(line.step * 1e6)
         body.append([line.name, *map(bound, line.drifts.values()), angle(line.error), order, step, factor(line.reached * 1e6)])
-    header = ["method", *(each.name for each in scene.invariants), *HEADER]
+    header = ["method", *(invariant.name for invariant in scene.invariants), *HEADER]
     # In the first cell, because a terminal has no room for a column of reasons.
     body += [[f"{', '.join(names)}: {reason}", *[DASH] * (len(header) - 1)] for (_, reason), names in failed.items()]
     return Table(header, body, scene.name)

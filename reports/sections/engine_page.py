@@ -69,7 +69,7 @@ def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict
     found = [each for each in measured.measurements.verified if each.names["engine"] == family]
     if found:
         blocks.append(attempt("The section 'verification'", partial(verified_engines.section, found)))
-    blocks.append(Section("Repeat it", [Paragraph(each) for each in _commands(measured, family, versions)]))
+    blocks.append(Section("Repeat it", [Paragraph(command) for command in _commands(measured, family, versions)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = _title(family, newest)
     lead = Paragraph(f"Rotation of one rigid body in {name}, measured with conservative {VERSION}.", Emphasis.LEAD)
@@ -119,7 +119,7 @@ def _since(family: str, versions: Sequence[str], scenes: dict[str, list[EngineRo
 def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[str]:
     """Return the commands that repeat a page."""
     plan = measured.plan
-    apart = {(each.maker.package, each.maker.version) for each in plan.engines if isinstance(each, EngineMethod)}
+    apart = {(engine.maker.package, engine.maker.version) for engine in plan.engines if isinstance(engine, EngineMethod)}
     own = [f"{family}@{version}" for version in versions if (family, version) in apart]
     names = [*own, *([family] if len(own) < len(versions) else [])]
     install = " ".join(own)

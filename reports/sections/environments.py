@@ -15,7 +15,7 @@ def build() -> Document:
     environments, programs = list_environments(), list_programs()
     lines = [str(program) for program in programs.values()]
     for engine in (name for name in registry.list_engines() if name not in programs):
-        mine = [each for each in environments if each.engine == engine]
+        mine = [environment for environment in environments if environment.engine == engine]
         installed = [f"{each.name}: {each.runtime}, {', '.join(each.packages)}" for each in mine]
         lines += installed or [f"{engine}: no environment"]
     data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}

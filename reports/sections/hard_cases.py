@@ -70,7 +70,7 @@ def _by_method_and_scene(rows: pd.DataFrame) -> dict[tuple[str, str], list[Recor
 
 
 def _values(records: list[Record], measure: Measure) -> list[float]:
-    return [each["value"] for each in records if each["measure"] == measure.text and not math.isnan(each["value"])]
+    return [record["value"] for record in records if record["measure"] == measure.text and not math.isnan(record["value"])]
 
 
 def grades(records: list[Record]) -> Cell:
@@ -84,7 +84,7 @@ def grades(records: list[Record]) -> Cell:
     drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
     if not drifts:
         return _halves(motion, _NOTHING)
-    worst = max(drifts, key=lambda each: each["value"])
+    worst = max(drifts, key=lambda drift: drift["value"])
     return _halves(motion, grade(worst["value"], f"{bound(worst['value'])} {worst['quantity']}"))
 
 
@@ -113,7 +113,7 @@ def _competitors(table: pd.DataFrame, study: str) -> pd.DataFrame:
 
 
 def _longest(records: list[Record]) -> Cell:
-    ends = [each["outcome"] for each in records if each["outcome"] != OutcomeKind.OK]
+    ends = [record["outcome"] for record in records if record["outcome"] != OutcomeKind.OK]
     if not (steps := _values(records, Measure.LONGEST_STEP)):
         return outcome_cell(Outcome(OutcomeKind(ends[0]))) if ends else _NOT_RUN
     text = f"{number(max(steps))} rad"

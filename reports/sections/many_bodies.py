@@ -133,8 +133,8 @@ def as_table(compared: Iterable[BatchRatio]) -> Table:
     rows: list[Row] = []
     for group, engine, statistic, bodies, speed_ratio in compared:
         sides = (speed_ratio.ours, speed_ratio.theirs)
-        times = [numeric(each.time * 1e6, digits=3) if each else DASH for each in sides]
-        names = [each.name if each else "no time" for each in sides]
+        times = [numeric(side.time * 1e6, digits=3) if side else DASH for side in sides]
+        names = [side.name if side else "no time" for side in sides]
         error, count = numeric(speed_ratio.error, tolerance(speed_ratio.error)), numeric(bodies, f"{bodies:,}")
         kind = speed_ratio.scene.replace("_", " ")
         ratio = grade_ratio(speed_ratio.ratio, interval=speed_ratio.interval)

@@ -28,7 +28,7 @@ HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", 
 
 def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     """Return what differs, its reduced descriptions and scripts, and a table by pair and body for each engine."""
-    some = [each for each in findings if isinstance(each, PairFinding)]
+    some = [finding for finding in findings if isinstance(finding, PairFinding)]
     engines = dict.fromkeys(each.subject for each in some)
     groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
@@ -66,10 +66,10 @@ def command(finding: PairFinding) -> str:
 
 
 def _table(engine: str, findings: Sequence[PairFinding]) -> Table:
-    bodies = list(dict.fromkeys(each.body for each in findings))
-    cells = {(each.pair, each.body): _cell(each) for each in findings}
+    bodies = list(dict.fromkeys(finding.body for finding in findings))
+    cells = {(finding.pair, finding.body): _cell(finding) for finding in findings}
     rows = list[Row]()
-    for pair in dict.fromkeys(each.pair for each in findings):
+    for pair in dict.fromkeys(finding.pair for finding in findings):
         row = [cells.get((pair, body), Cell("")) for body in bodies]
         if any(str(cell) not in ("", DASH) for cell in row):
             rows.append([pair, *row])

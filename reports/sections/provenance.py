@@ -30,7 +30,7 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
     facts += [("versions", ", ".join(f"{name} {version}" for name, version in source.compared.items()))]
     versions = Facts([*facts, *(("resumed", part) for part in source.resumed)])
-    ours = [each for each in plan.methods if each.role not in (Role.ENGINE, Role.TRUTH)]
+    ours = [method for method in plan.methods if method.role not in (Role.ENGINE, Role.TRUTH)]
     about = {each.family: (type(each).__doc__ or "").partition("\n")[0] for each in ours}
     methods = Section("Methods of this package", [Facts(list(about.items()))] if about else [], folded=True)
     blocks = filled(Paragraph(words), versions, *details, methods, others, locks)

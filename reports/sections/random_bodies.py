@@ -120,26 +120,26 @@ def as_table(ratios: Iterable[RandomRatios]) -> Table:
     header += ["ours, most often", "engine, most often"]
     rows: list[Row] = [
         [
-            each.field,
-            numeric(each.error, tolerance(each.error)),
-            count_text(each),
-            *(numeric(count, str(count)) for count in (each.won, each.open, each.lost)),
-            grade_ratio(each.ratio, interval=each.interval),
-            *(grade_ratio(body.ratio, interval=body.interval) for body in (*each.both[:1], *each.both[-1:])),
-            *([] if each.both else [DASH, DASH]),
-            str(each.indices[each.both[0].scene]) if each.both else DASH,
-            _most_often(speed_ratio.ours for speed_ratio in each.both),
-            _most_often(speed_ratio.theirs for speed_ratio in each.both),
+            ratio.field,
+            numeric(ratio.error, tolerance(ratio.error)),
+            count_text(ratio),
+            *(numeric(count, str(count)) for count in (ratio.won, ratio.open, ratio.lost)),
+            grade_ratio(ratio.ratio, interval=ratio.interval),
+            *(grade_ratio(body.ratio, interval=body.interval) for body in (*ratio.both[:1], *ratio.both[-1:])),
+            *([] if ratio.both else [DASH, DASH]),
+            str(ratio.indices[ratio.both[0].scene]) if ratio.both else DASH,
+            _most_often(speed_ratio.ours for speed_ratio in ratio.both),
+            _most_often(speed_ratio.theirs for speed_ratio in ratio.both),
         ]
-        for each in ratios
-        if each.engine == ANY
+        for ratio in ratios
+        if ratio.engine == ANY
     ]
     return Table(header, rows, "Random bodies: the fastest engine's time divided by ours", Style.FILTERED)
 
 
 def _most_often(lines: Iterable[Cheapest | None]) -> str:
     """Return the line that is the fastest on most bodies, and on how many if that is not all."""
-    counts = Counter(each.name for each in lines if each)
+    counts = Counter(line.name for line in lines if line)
     if not counts:
         return DASH
     (name, count), total = counts.most_common(1)[0], counts.total()
@@ -148,7 +148,7 @@ def _most_often(lines: Iterable[Cheapest | None]) -> str:
 
 def by_engine(ratios: Iterable[RandomRatios]) -> Table:
     """Return the mean ratio with its interval at `MILESTONES`, a row for each field and engine that supports it."""
-    chosen = {(each.field, each.engine, each.error): each for each in ratios if each.engine != ANY}
+    chosen = {(ratio.field, ratio.engine, ratio.error): ratio for ratio in ratios if ratio.engine != ANY}
     places = dict.fromkeys(key[:2] for key in chosen)
     rows: list[Row] = [[*place, *(_mean(chosen[*place, error]) for error in MILESTONES)] for place in places]
     caption = "Random bodies: each engine's time divided by ours, geometric mean (interval of 95 %)"
@@ -166,20 +166,24 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
     """Return the ratios for JSON: mean with its interval, worst and best, NaN if no body has a ratio."""
     return [
         {
-            **{name: getattr(each, name) for name in ("field", "engine", "error", "only_ours", "won", "open", "lost")},
-            "bodies": len(each.speed_ratios),
-            "both": len(each.both),
-            "only_engine": each.only_theirs,
-            **{"mean": each.ratio, "worst": each.worst, "best": each.best, "mean_interval": each.interval},
-            "worst_scene": each.both[0].scene if each.both else None,
+            **{name: getattr(ratio, name) for name in ("field", "engine", "error", "only_ours", "won", "open", "lost")},
+            "bodies": len(ratio.speed_ratios),
+            "both": len(ratio.both),
+            "only_engine": ratio.only_theirs,
+            **{"mean": ratio.ratio, "worst": ratio.worst, "best": ratio.best, "mean_interval": ratio.interval},
+            "worst_scene": ratio.both[0].scene if ratio.both else None,
         }
-        for each in ratios
+        for ratio in ratios
     ]
 
 
 def chart_points(ratios: Iterable[RandomRatios]) -> pd.DataFrame:
     """Return field, error, mean, worst and best against the fastest engine, where both sides reach the error."""
-    rows = [(each.field, each.error, each.ratio, each.worst, each.best) for each in ratios if each.engine == ANY and each.both]
+    rows = [
+        (ratio.field, ratio.error, ratio.ratio, ratio.worst, ratio.best)
+        for ratio in ratios
+        if ratio.engine == ANY and ratio.both
+    ]
     return pd.DataFrame(rows, columns=["field", "error", "mean", "worst", "best"])
 
 

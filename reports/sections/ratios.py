@@ -46,9 +46,13 @@ def ratio_table(measured: Measured) -> Table:
         for label, reached in runs.items():
             for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
                 speed_ratios = sides(reached, kind)
-                if any(each.ours for each in speed_ratios):
-                    cells = {each.error: ratio_cell(each) for each in speed_ratios}
-                    faster = (each.theirs for each in speed_ratios if each.theirs and cells[each.error].grade is Grade.BAD)
+                if any(speed_ratio.ours for speed_ratio in speed_ratios):
+                    cells = {speed_ratio.error: ratio_cell(speed_ratio) for speed_ratio in speed_ratios}
+                    faster = (
+                        speed_ratio.theirs
+                        for speed_ratio in speed_ratios
+                        if speed_ratio.theirs and cells[speed_ratio.error].grade is Grade.BAD
+                    )
                     names = dict.fromkeys(each.name for each in faster)
                     rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]

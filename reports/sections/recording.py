@@ -37,9 +37,9 @@ def recording_blocks(verification: Verification) -> list[Block]:
     used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
     reasons = sorted(set(details.unused.values()), key=list(details.unused.values()).index)
     unused = [
-        f"Not used: {', '.join(name for name, why in details.unused.items() if why == each)}: {each}." for each in reasons
+        f"Not used: {', '.join(name for name, why in details.unused.items() if why == reason)}: {reason}." for reason in reasons
     ]
-    quantities = [[each.name, bound(each.largest), bound(each.final)] for each in details.quantities]
+    quantities = [[quantity.name, bound(quantity.largest), bound(quantity.final)] for quantity in details.quantities]
     tried = [] if proven else [[each.name, details.show(each.left)] for each in details.tried[:LISTED]]
     return filled(
         Paragraph(" ".join(sentences)) if sentences else None,

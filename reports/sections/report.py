@@ -87,7 +87,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     if isinstance(paper, Paragraph):
         details.append(paper)
         paper = None
-    folded = [replace(each, folded=True) if isinstance(each, Section) else each for each in details]
+    folded = [replace(detail, folded=True) if isinstance(detail, Section) else detail for detail in details]
     blocks: list[Block] = [
         part("motion", lambda: tumbling.section(measured, found())),
         part("speed", lambda: speed.section(measured, summaries())),

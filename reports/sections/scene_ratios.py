@@ -56,7 +56,11 @@ def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
 def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[SpeedRatio]:
     """Return the ratios of one class of ours to all engines, on each scene, at each error that either side reaches."""
     ours, theirs = of_classes(reached, kind), of_classes(reached, *OF_ENGINES)
-    return [each for each in speed_ratios(ours, theirs, reached["scene"].unique(), errors) if each.ours or each.theirs]
+    return [
+        speed_ratio
+        for speed_ratio in speed_ratios(ours, theirs, reached["scene"].unique(), errors)
+        if speed_ratio.ours or speed_ratio.theirs
+    ]
 
 
 def as_table(points: pd.DataFrame, interval: float, each: EachStep | None = None) -> Table:

@@ -43,13 +43,13 @@ def build(
     made, transitions = made or {}, list_transitions(comparison)
     environments = [version.environment for version in comparison.versions]
     engine, names = environments[0].engine, [version.name for version in comparison.versions]
-    lost_last = [each for each in transitions if each.lost and each.now.version == names[-1]]
+    lost_last = [transition for transition in transitions if transition.lost and transition.now.version == names[-1]]
     failures = []
     if gated:
         failures = [changes_text(each) for each in lost_last]
         if not any(line.results[-1] and line.results[-1].outcome.ok for line in comparison.lines):
             failures.append(f"{names[-1]}: {NO_END}")
-    sentences = [text for each in transitions if (text := changes_text(each))]
+    sentences = [text for transition in transitions if (text := changes_text(transition))]
     by_scene: dict[str, list[EngineLine]] = {}
     for line in comparison.lines:
         by_scene.setdefault(line.scene, []).append(line)
@@ -66,33 +66,45 @@ def build(
         verdict = filled(
             Paragraph(f"{now} against {was}: {'FAILED' if failures else 'passed'}", Emphasis.LEAD), Items.of(failures)
         )
-    versions = [(each.version, each.runtime, ", ".join(each.packages)) for each in environments]
+    versions = [(environment.version, environment.runtime, ", ".join(environment.packages)) for environment in environments]
     data = {
         "made": dict(made),
         "engine": engine,
         "passed": not failures,
         "failures": failures,
         **({} if verified is None else {"verified": list(verified)}),
-        "versions": [{name: getattr(each, name) for name in ("version", "runtime", "packages")} for each in environments],
+        "versions": [
+            {name: getattr(environment, name) for name in ("version", "runtime", "packages")} for environment in environments
+        ],
         "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
         "changes": [
             {
-                **{"scene": each.now.scene, "setting": each.now.setting, "from": each.was.version, "to": each.now.version},
-                "sentence": changes_text(each),
-                "lost": bool(each.lost),
+                **{
+                    "scene": transition.now.scene,
+                    "setting": transition.now.setting,
+                    "from": transition.was.version,
+                    "to": transition.now.version,
+                },
+                "sentence": changes_text(transition),
+                "lost": bool(transition.lost),
                 "changes": [
                     {"aspect": c.row.measure, "quantity": c.row.quantity, "allowed": c.allowed, "lost": c.lost}
-                    for c in each.changes
+                    for c in transition.changes
                 ],
             }
-            for each in transitions
-            if each.changes
+            for transition in transitions
+            if transition.changes
         ],
     }
     checks = []  # of each setting, scene and pair of consecutive versions
-    for each in transitions:
-        text, name = changes_text(each), f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
-        checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if gated and each in lost_last else ""))
+    for transition in transitions:
+        text, name = (
+            changes_text(transition),
+            f"{transition.now.setting or 'default'}: {transition.was.version} to {transition.now.version}",
+        )
+        checks.append(
+            Check(transition.now.scene, name, text or NOTHING_CHANGED, text if gated and transition in lost_last else "")
+        )
     if failures and not lost_last:
         checks.append(Check("all", names[-1], failure="\n".join(failures)))
     return Document(
@@ -115,7 +127,7 @@ def build(
 
 
 def _seen(line: EngineLine) -> list[Observation]:
-    return [each for each in line.results if each is not None]
+    return [result for result in line.results if result is not None]
 
 
 def _unfinished(line: EngineLine) -> Iterator[str]:

@@ -134,7 +134,7 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
         changes = "" if math.isnan(change) else f" and its {energy.name if energy else ''} changes by {size}"
         parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong}{changes}.")
         for family in dict.fromkeys((worst.family, best.family)):
-            settings = [each for each in engines if each.family == family]
+            settings = [engine for engine in engines if engine.family == family]
             others |= {each.line: each.error for each in (settings[0], settings[-1]) if each is not worst}
     ours = sorted(ours, key=lambda each: each.error)
     for each, name in zip((*ours[:1], *ours[1:][-1:]), (" of the Python package `conservative`", ""), strict=False):
@@ -147,7 +147,7 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
 
 def table(found: Sequence[Result], scene: Scene) -> Table:
     """Return the results as a table with grades."""
-    header = ["method", "step, s", *(f"drift of {each.name}" for each in scene.invariants)]
+    header = ["method", "step, s", *(f"drift of {invariant.name}" for invariant in scene.invariants)]
     header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
     rows: list[Row] = []
     failed: dict[tuple[str, str], list[Result]] = {}
@@ -162,7 +162,7 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     for alike in failed.values():  # settings that failed in the same way share a row
         names, reason = ", ".join(each.name for each in alike), outcome_cell(alike[0].outcome, reason=True)
         rows.append([names, DASH, reason, *[DASH] * (len(header) - 3)])
-    moments, rate = ", ".join(f"{each:.3g}" for each in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
+    moments, rate = ", ".join(f"{moment:.3g}" for moment in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
     caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
     caption += f"✗ above {tolerance(SMALL)}. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
@@ -172,7 +172,7 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
         caption += f" Ours: {listed(ours)}."
     kept = [each for each in found if each.drifts and all(drift <= CONSERVED for drift in each.drifts.values())]
     if still := [each.line for each in kept if each.error > RIGHT]:
-        names = listed([each.name for each in scene.invariants])
+        names = listed([invariant.name for invariant in scene.invariants])
         caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."
     caption += f" Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit)."
     return Table(header, rows, caption)

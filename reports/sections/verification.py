@@ -46,7 +46,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
     Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
     """
-    order = sorted(verifications, key=lambda each: DECIDING.index(each.verdict))
+    order = sorted(verifications, key=lambda verification: DECIDING.index(verification.verdict))
     models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
     listed_alone = [*others, *(models if len(models) == 1 else ())]
     sentences = [
@@ -63,21 +63,21 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         "conservative verify",
         f"Verified: {', '.join(each.subject for each in verifications)}",
         [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary, [each for each in others if len(order) == 1 or each.verdict is not Verdict.RIGHT]),
+        brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT]),
         data={
-            "verified": [each.subject for each in verifications],
+            "verified": [verification.subject for verification in verifications],
             "verdict": order[0].verdict,
             "made": dict(made or {}),
-            "subjects": [content(each) for each in verifications],
+            "subjects": [content(verification) for verification in verifications],
         },
-        checks=[_check(each.subject, finding) for each in verifications for finding in each.findings],
+        checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
         failures=[f"{each.sentence}." for each in order if each.verdict is Verdict.WRONG],
     )
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:
     """Return the exit code of a command: of a wrong subject if there is one, otherwise of an undecided or untested one."""
-    return EXIT_CODES[min((each.verdict for each in verifications), key=DECIDING.index)]
+    return EXIT_CODES[min((verification.verdict for verification in verifications), key=DECIDING.index)]
 
 
 def content(verification: Verification) -> dict[str, Any]:
@@ -91,10 +91,10 @@ def findings_text(verifications: Iterable[Verification]) -> str:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
     for verification in verifications:
-        for each in verification.findings:
-            mistakes = "; ".join(cause.key for cause in each.causes)
-            plain = [getattr(each, name) for name in COLUMNS[:-2]]
-            writer.writerow([*plain, mistakes, explanation(each)])
+        for finding in verification.findings:
+            mistakes = "; ".join(cause.key for cause in finding.causes)
+            plain = [getattr(finding, name) for name in COLUMNS[:-2]]
+            writer.writerow([*plain, mistakes, explanation(finding)])
     return stream.getvalue()
 
 
@@ -110,7 +110,7 @@ def summary(verification: Verification) -> list[Block]:
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
-    differ = _pair_blocks(pairs) if any(each.verdict is Verdict.WRONG for each in pairs) else []
+    differ = _pair_blocks(pairs) if any(pair.verdict is Verdict.WRONG for pair in pairs) else []
     return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
 
 
@@ -120,7 +120,7 @@ def details(verification: Verification) -> list[Block]:
         return summary(verification)
     pairs, others = _pairs(verification)
     tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
-    right = _pair_blocks(pairs) if all(each.verdict is not Verdict.WRONG for each in pairs) else []
+    right = _pair_blocks(pairs) if all(pair.verdict is not Verdict.WRONG for pair in pairs) else []
     return filled(*summary(verification), *tables, *right)
 
 
@@ -134,13 +134,13 @@ def _pair_blocks(findings: Sequence[Finding]) -> list[Block]:
 
 def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
     """Return the findings on pairs, which have tables of their own, and the others."""
-    pairs = [each for each in verification.findings if each.check == "pairs"]
-    return pairs, [each for each in verification.findings if each.check != "pairs"]
+    pairs = [finding for finding in verification.findings if finding.check == "pairs"]
+    return pairs, [finding for finding in verification.findings if finding.check != "pairs"]
 
 
 def mistakes(findings: Iterable[Finding]) -> Items:
     """Return the wrong cases by what explains them, the explanation of the most cases first."""
-    wrong = [each for each in findings if each.verdict is Verdict.WRONG]
+    wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
     groups = sorted(grouped(wrong, lambda each: (each.check, named_by(each))), key=lambda group: -len(group[1]))
     items = [Item(explanation(some[0]), _named(check, _cases_of(some)), True) for (check, _), some in groups]
     return Items(items)
@@ -152,7 +152,7 @@ def _named(name: str, detail: str) -> str:
 
 def explanation(finding: Finding) -> str:
     """Return the mistakes that explain a finding, or else its detail."""
-    causes = [_cause(each, finding.unit) for each in finding.causes]
+    causes = [_cause(cause, finding.unit) for cause in finding.causes]
     if len(causes) > 1:
         return f"{len(causes)} mistakes explain it equally well: {'; '.join(causes)}"
     if causes:
@@ -173,7 +173,7 @@ def _amount(error: float, unit: str) -> str:
 def _sentence(verifications: Sequence[Verification]) -> str:
     if len(verifications) == 1:
         return f"{verifications[0].sentence}."
-    counts = Counter(each.verdict for each in verifications)
+    counts = Counter(verification.verdict for verification in verifications)
     if len(counts) == 1:
         return f"All {len(verifications)} subjects are {verifications[0].verdict}."
     words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
@@ -183,8 +183,8 @@ def _sentence(verifications: Sequence[Verification]) -> str:
 def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
     """Return findings by their keys, in their order."""
     groups: dict[Key, list[Finding]] = {}
-    for each in findings:
-        groups.setdefault(key(each), []).append(each)
+    for finding in findings:
+        groups.setdefault(key(finding), []).append(finding)
     return list(groups.items())
 
 
@@ -194,22 +194,22 @@ def named_by(finding: Finding) -> str:
 
 
 def _cases_of(findings: Sequence[Finding]) -> str:
-    names = [each.case for each in findings if each.case]
+    names = [finding.case for finding in findings if finding.case]
     more = f" and {len(names) - LISTED} more" * (len(names) > LISTED)
     return ", ".join(names[:LISTED]) + more
 
 
 def _remarks(findings: Sequence[Finding]) -> Items:
     """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
-    told = (each for each in findings if each.verdict is Verdict.RIGHT and each.detail and each.check != "order")
-    undecided = (each for each in findings if each.verdict is Verdict.UNDECIDED)
+    told = (finding for finding in findings if finding.verdict is Verdict.RIGHT and finding.detail and finding.check != "order")
+    undecided = (finding for finding in findings if finding.verdict is Verdict.UNDECIDED)
     groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
     return Items([Item(text, _named(check, _cases_of(some))) for (check, text), some in groups])
 
 
 def numbers(findings: Sequence[Finding]) -> list[str]:
     """Return the numbers of findings with each verdict, in the order of `SIGNS`."""
-    return [str(sum(each.verdict is verdict for each in findings)) for verdict in SIGNS]
+    return [str(sum(finding.verdict is verdict for finding in findings)) for verdict in SIGNS]
 
 
 def _counts(verification: Verification) -> Table | None:
@@ -221,14 +221,14 @@ def _counts(verification: Verification) -> Table | None:
 def _cases(check: str, findings: Sequence[Finding]) -> Table:
     body: list[Row] = [
         [
-            each.case or each.subject,
-            _verdict(each.verdict),
-            Cell(_amount(each.error, each.unit), value=each.error),
-            Cell(_amount(each.allowed, each.unit), value=each.allowed),
-            each.by or DASH,
-            explanation(each) or DASH,
+            finding.case or finding.subject,
+            _verdict(finding.verdict),
+            Cell(_amount(finding.error, finding.unit), value=finding.error),
+            Cell(_amount(finding.allowed, finding.unit), value=finding.allowed),
+            finding.by or DASH,
+            explanation(finding) or DASH,
         ]
-        for each in findings
+        for finding in findings
     ]
     return Table(["case", "verdict", "error", "allowed", "allowed by", "explanation"], body, check.capitalize())
 

@@ -28,7 +28,7 @@ def section(verified: Sequence[Verified]) -> Section:
 
 def _mistakes(findings: Sequence[Finding]) -> str:
     """Return the three mistakes that explain the most of some findings, with their numbers of cases."""
-    found = Counter(each.mistake for each in findings if each.verdict is Verdict.WRONG and each.mistake)
+    found = Counter(finding.mistake for finding in findings if finding.verdict is Verdict.WRONG and finding.mistake)
     return ", ".join(f"{key} ({count})" for key, count in found.most_common(3)) or DASH
 
 
@@ -40,11 +40,11 @@ def changes(versions: Sequence[tuple[str, Sequence[Verified]]]) -> list[str]:
     sentences = []
     for (before, old), (after, new) in pairwise(versions):
         for was, now in zip(old, new, strict=True):
-            verdicts = {(each.check, each.case): each.verdict for each in was.findings}
-            for each in now.findings:
-                pair = {verdicts.get((each.check, each.case)), each.verdict}
+            verdicts = {(finding.check, finding.case): finding.verdict for finding in was.findings}
+            for finding in now.findings:
+                pair = {verdicts.get((finding.check, finding.case)), finding.verdict}
                 if pair == {Verdict.RIGHT, Verdict.WRONG}:
-                    why = f": {text}" if (text := explanation(each)) and each.verdict is Verdict.WRONG else ""
+                    why = f": {text}" if (text := explanation(finding)) and finding.verdict is Verdict.WRONG else ""
                     setting = now.names["setting"] or "default"
-                    sentences.append(f"{setting}: {each.check}, {each.case}, {before} → {after}: {each.verdict}{why}")
+                    sentences.append(f"{setting}: {finding.check}, {finding.case}, {before} → {after}: {finding.verdict}{why}")
     return sentences

@@ -127,7 +127,7 @@ def verify_files(
     """
     names = dict.fromkeys(str(registry.read_name(name, "engines", settings=False)) for name in engines)
     paths = list(dict.fromkeys(files)) or sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
-    installed = {each.engine for each in list_environments()} | {name for name in LOCAL if find_spec(name)}
+    installed = {environment.engine for environment in list_environments()} | {name for name in LOCAL if find_spec(name)}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory()))
         models = read_files(paths, folder, search)

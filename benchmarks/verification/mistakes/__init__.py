@@ -33,10 +33,10 @@ from .times import ROW_TIMES, TIMES
 def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
     """Return mistakes by key."""
     table: dict[str, Mistake] = {}
-    for each in mistakes:
-        if each.key in table:
-            raise ValueError(f"key: got {each.key!r} twice; expected another key for each mistake")
-        table[each.key] = each
+    for mistake in mistakes:
+        if mistake.key in table:
+            raise ValueError(f"key: got {mistake.key!r} twice; expected another key for each mistake")
+        table[mistake.key] = mistake
     return MappingProxyType(table)
 
 

@@ -100,7 +100,7 @@ def _other_angles(factor: float) -> Callable[[Links], Links]:
 
 def _of_scenes(key: str, change: Callable[[Links], Links]) -> BodyMistake:
     """Return a mistake that scenes have as well, with its effect on links."""
-    return BodyMistake(key, next(each.sentence for each in SCENES if each.key == key), change)
+    return BodyMistake(key, next(scene.sentence for scene in SCENES if scene.key == key), change)
 
 
 LOADED: tuple[BodyMistake, ...] = (

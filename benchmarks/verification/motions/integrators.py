@@ -75,27 +75,27 @@ class Bodies:
 
     def __init__(self, motions: Sequence[Motion], attitude: str, variable: str, single: bool = False) -> None:
         kind = np.float32 if single else np.float64
-        self.unit = np.array([each.step for each in motions])
-        size = np.array([np.linalg.eigvalsh(each.inertia_B)[2] for each in motions])
+        self.unit = np.array([motion.step for motion in motions])
+        size = np.array([np.linalg.eigvalsh(motion.inertia_B)[2] for motion in motions])
         self.attitude, self.variable, self.n = attitude, variable, 4 if attitude == "quaternion" else 9
 
         def gather(values: Any, scale: Any = 1.0) -> Array:
             return (np.moveaxis(np.array(values, dtype=float), 0, -1) * scale).astype(kind)
 
         none, square = [0.0] * 3, np.zeros((3, 3))
-        J = np.array([each.inertia_B for each in motions])
+        J = np.array([motion.inertia_B for motion in motions])
         self.J, self.inverse = gather(J, 1 / size), gather(np.linalg.inv(J), size)
         moments, axes = np.linalg.eigh(J)
         self.moments, self.axes = gather(moments, 1 / size), gather(axes)
-        self.rotor = gather([each.rotor_momentum_B or none for each in motions], self.unit / size)
+        self.rotor = gather([motion.rotor_momentum_B or none for motion in motions], self.unit / size)
         torque = self.unit**2 / size
-        self.body = gather([each.torque_B or none for each in motions], torque)
-        self.world = gather([each.torque_W or none for each in motions], torque)
-        self.damping = gather([square if each.damping is None else each.damping for each in motions], self.unit / size)
-        self.arm = gather([each.arm for each in motions], torque)
-        self.orbit = gather([each.orbit or 0.0 for each in motions], self.unit)
-        self.q0 = gather([each.exact["quaternion_wxyz"][0] for each in motions])
-        self.w0 = gather([each.rates for each in motions], self.unit)
+        self.body = gather([motion.torque_B or none for motion in motions], torque)
+        self.world = gather([motion.torque_W or none for motion in motions], torque)
+        self.damping = gather([square if motion.damping is None else motion.damping for motion in motions], self.unit / size)
+        self.arm = gather([motion.arm for motion in motions], torque)
+        self.orbit = gather([motion.orbit or 0.0 for motion in motions], self.unit)
+        self.q0 = gather([motion.exact["quaternion_wxyz"][0] for motion in motions])
+        self.w0 = gather([motion.rates for motion in motions], self.unit)
 
     @property
     def start(self) -> Array:
@@ -369,7 +369,7 @@ class Design:
         `after` is a habit: it changes rates (3, motions), rad/s, after each step. The variable of rotation is then the rates.
         """
         f, step = Bodies(motions, self.attitude, self.variable, self.single), STEPS[self.order][self.step]
-        ends = [[n * each.steps * parts for n in range(1, each.samples + 1)] for each in motions]
+        ends = [[n * motion.steps * parts for n in range(1, motion.samples + 1)] for motion in motions]
         y, past, states = f.start, list[Array](), list[Array]()
         h = np.full(len(motions), 1 / parts, dtype=y.dtype)
         with np.errstate(all="ignore"):
@@ -380,8 +380,8 @@ class Design:
                 if after is not None:
                     y[f.n :] = after(y[f.n :] / f.unit) * f.unit
             states.append(y)
-            R = np.array([f.R(f.normalise(each)) for each in states], dtype=float)
-            w = np.array([f.rates(f.R(each), each[f.n :]) for each in states], dtype=float) / f.unit
+            R = np.array([f.R(f.normalise(state)) for state in states], dtype=float)
+            w = np.array([f.rates(f.R(state), state[f.n :]) for state in states], dtype=float) / f.unit
         for i, rows in enumerate(ends):
             yield R[rows, :, :, i], w[rows, :, i]
 

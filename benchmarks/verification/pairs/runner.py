@@ -94,7 +94,7 @@ class Runner:
 
     def many(self, bodies: Sequence[Description], number: int) -> Samples:
         """Return the samples of one of many bodies that run together. Raise `NotAvailable`."""
-        starts, grid = zip(*((each.R0, each.w0, each.scene.body.inertia) for each in bodies), strict=True), bodies[0].grid
+        starts, grid = zip(*((body.R0, body.w0, body.scene.body.inertia) for body in bodies), strict=True), bodies[0].grid
         R, w, inertia = map(np.array, starts)
         options = {"dt": grid.dt, "t_end": grid.t[-1], "sample_every": grid.every, "method": self.method}
         ensemble = integrate_many(bodies[number].scene, R, w, inertia=inertia, **options)  # its field is the one that counts
@@ -173,7 +173,7 @@ class EngineRunner(Runner):
         if self.method not in self.method.settings_for("many"):
             raise NotAvailable("many bodies at once")
         R, w = self._ask(
-            join_numbers([each.numbers for each in bodies]), (len(bodies), bodies[0].grid.n_samples), self._worker
+            join_numbers([body.numbers for body in bodies]), (len(bodies), bodies[0].grid.n_samples), self._worker
         )()
         return R[number], w[number]
 

@@ -318,7 +318,7 @@ class _Pair:
             return self.finding(Relation.NOT_AVAILABLE, detail=str(error))
         except EngineError as refusal:  # its process goes on
             return self.finding(Relation.REFUSED, detail=f"refused: {refusal.reason}")
-        worst = max(results, key=lambda each: -1.0 if math.isnan(each.value) else each.value / (each.allowed or 1e-300))
+        worst = max(results, key=lambda result: -1.0 if math.isnan(result.value) else result.value / (result.allowed or 1e-300))
         if worst.wrong:
             return self.explain(worst)
         if math.isnan(worst.value):

@@ -249,7 +249,7 @@ def _given(path: Path, names: list[str], text: str) -> dict[str, list[str]]:
     counts = {"time": 1, "rates": 3} | dict(ATTITUDES)
     for part in re.split(r",(?=[^=,]*=)", text):
         short, _, members = part.partition("=")
-        kind, found = kinds.get(short.strip()), [each.strip() for each in members.split(":")]
+        kind, found = kinds.get(short.strip()), [member.strip() for member in members.split(":")]
         found = [
             names[int(each) - 1]
             if each not in names and re.fullmatch("[0-9]{1,9}", each) and 0 < int(each) <= len(names)

@@ -176,7 +176,7 @@ def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_
     Without common times, the departure of the second one from an exact motion is interpolated: it changes slowly where the rows
     themselves do not. What linear interpolation misses in its own rows is allowed.
     """
-    a, b = (each.case for each in rows)
+    a, b = (row.case for row in rows)
     shift = float(a.t[0] - recordings[0].t[0])  # of the file's times to those of the exact motion
     times = recordings[1].t[0] + shift + (b.t - b.t[0])
     if times[0] > a.t[-1] or a.t[0] > times[-1]:
@@ -189,7 +189,7 @@ def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_
     inside = np.flatnonzero((a.t >= times[0]) & (a.t <= times[-1]))
     later = np.clip(np.searchsorted(times, a.t), 1, len(times) - 1)
     nearest = np.where(np.abs(times[later] - a.t) < np.abs(times[later - 1] - a.t), later, later - 1)
-    near = sum(each.digits[0] for each in recordings) + 4 * np.spacing(max(abs(a.t[-1]), abs(times[-1])))
+    near = sum(recording.digits[0] for recording in recordings) + 4 * np.spacing(max(abs(a.t[-1]), abs(times[-1])))
     common = np.flatnonzero(np.abs(times[nearest] - a.t) <= near)
     direct = len(common) >= max(2, 0.1 * min(len(inside), len(times)))
     picked, off = common if direct else inside, np.zeros(2)

@@ -330,10 +330,10 @@ def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
     energy = None if case.scene.potential else find_energy(case.scene.invariants)  # rates alone determine that of a free body
-    for each in case.scene.invariants if w is not None else ():
-        if w is not None and each.supplied is None and (R is not None or each is energy):
+    for invariant in case.scene.invariants if w is not None else ():
+        if w is not None and invariant.supplied is None and (R is not None or invariant is energy):
             R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R
-            drift = Trajectory(case.scene, case.t, R_WB, w, "file").drift(each)
+            drift = Trajectory(case.scene, case.t, R_WB, w, "file").drift(invariant)
             # The initial value is that at t = 0, and the field may have turned until the first row.
-            drifts[f"drift of {each.name}"] = sizes(drift - drift[0] if from_row else drift)
+            drifts[f"drift of {invariant.name}"] = sizes(drift - drift[0] if from_row else drift)
     return drifts

@@ -82,7 +82,7 @@ if COMPILED:
         floats = floats_in_register(kind.width)
         vector, places = ir.VectorType(DOUBLE, floats), [_move(builder, index, i) for i in range(0, kind.width, floats)]
         # The array is aligned to its floats only, not to a register.
-        registers = [builder.load(_place(context, builder, array, each, vector), align=8) for each in places]
+        registers = [builder.load(_place(context, builder, array, place, vector), align=8) for place in places]
         return pack(context, builder, kind, Symbol(builder, registers))
 
     def _of_width(width):
@@ -179,7 +179,7 @@ if COMPILED:
         def build(context, builder, sig, args):
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
             parts = range(0, numbers[0].width // len(numbers[0].registers), FOUR)
-            fours = [[_pick(builder, x, x, range(i, i + FOUR)) for x in each.registers for i in parts] for each in numbers]
+            fours = [[_pick(builder, x, x, range(i, i + FOUR)) for x in number.registers for i in parts] for number in numbers]
             for first in range(0, len(numbers), FOUR):
                 four, at = fours[first : first + FOUR], _move(builder, args[1], first)
                 for registers in zip(*four, strict=True):

@@ -248,7 +248,7 @@ class Series:
         builder.position_at_end(body)
         i = builder.phi(INTEGER)
         i.add_incoming(memory.count_bytes(step), before)
-        phis = [[builder.phi(x.registers[0].type) for x in each] for each in starts]
+        phis = [[builder.phi(x.registers[0].type) for x in start] for start in starts]
         j, loaded = builder.sub(memory.count_bytes(n * step), i), {}
 
         def read(history, byte):

@@ -104,7 +104,7 @@ else:
             """Return the result of an operation on registers, for numbers that may be lanes, single numbers or constants."""
             widest = max((x for x in numbers if isinstance(x, Symbol)), key=lambda x: x.width)
             registers = zip(*(widest.broadcast(x) for x in numbers), strict=True)
-            return Symbol(self.builder, [operation(*each) for each in registers], self.flags)
+            return Symbol(self.builder, [operation(*register) for register in registers], self.flags)
 
         def call(self, name, *numbers):
             """Return the result of an LLVM intrinsic such as "sqrt"."""

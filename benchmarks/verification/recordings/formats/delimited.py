@@ -16,7 +16,7 @@ def read(start: Start) -> Table | None:
     if first is None:
         return None
     separator, fields = _separate(lines[first]) or (",", [])
-    comma = separator != "," and any(re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", each) for each in fields)
+    comma = separator != "," and any(re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", field) for field in fields)
     names, before = list[str](), [line.strip() for line in lines[:first] if line.strip()]
     for line in reversed(before):
         header = words(line.lstrip("#% "), separator)
