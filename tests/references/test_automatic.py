@@ -16,7 +16,7 @@ from conservative.scenes.random_body import random_body
 from ..sampling import sampled
 from .exact_trials import random_rotation
 
-SCENES = 40
+SCENES = 20
 KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
 
 

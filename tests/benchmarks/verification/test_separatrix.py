@@ -9,10 +9,8 @@ from conservative.benchmarks.verification.recordings import verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
 
-from ...sampling import sampled
-
 AXES = Rotation.from_rotvec([0.5, -0.8, 0.4]).as_matrix()
-T = np.linspace(0, 20, 161)
+T = np.linspace(0, 20, 401)
 
 
 def scene(middle=10.0):
@@ -32,7 +30,8 @@ def noisy(R, w, size):
     return Recording(T, (turned, w + 10 * size * random.normal(size=w.shape)), rows=len(T))
 
 
-@pytest.mark.parametrize(("make", "size"), sampled([(rounded, 1e-3), (rounded, 1e-4), (noisy, 1e-3)], 1))
+@pytest.mark.slow  # the search for the start; `test_verdicts.py` has a shorter one by default
+@pytest.mark.parametrize(("make", "size"), [(rounded, 1e-3), (rounded, 1e-4), (noisy, 1e-3)], ids=["3", "4", "noise"])
 def test_few_digits_and_noise_are_not_wrong(make, size, unnamed):
     """The first row alone is off by 3.1 rad. Right with 3 digits and with noise; no start is found with 4 digits."""
     near = scene()
