@@ -46,6 +46,6 @@ def test_only_slower_rows_raise_an_alarm(wheel, tmp_path):
                 side.close()
         alarms.append([method for (_, method), row in found.items() if row.failed])
     print(alarms)
-    for each in alarms:
-        assert not [name for name in each if name.endswith("x1.0")]
-        assert len([name for name in each if name.endswith("x1.2")]) == len(METHODS)
+    for alarm in alarms:
+        assert not [name for name in alarm if name.endswith("x1.0")]
+        assert len([name for name in alarm if name.endswith("x1.2")]) == len(METHODS)

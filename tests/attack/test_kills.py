@@ -159,7 +159,7 @@ def check_results(expected, found):
     """Return the crashes; every other result is the expected one, bit for bit."""
     assert len(found) == len(expected)
     crashes = [each for each in found if isinstance(each, Outcome)]
-    assert all(each.reason.startswith("signal 9") for each in crashes)
+    assert all(crash.reason.startswith("signal 9") for crash in crashes)
     for before, after in zip(expected, found, strict=True):
         assert isinstance(after, Outcome) or (after.trajectory.R_WB == before.trajectory.R_WB).all()
     return crashes

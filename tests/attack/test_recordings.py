@@ -61,7 +61,7 @@ def outcome(seed, folder):
         "seed": seed, "mistake": made.mistake, "layout": made.layout, "noise": "single" if made.single else made.noise,
         "turns": round(made.turns, 2), "rows": made.about["rows"], "expected": made.expected,
         "identifiable": made.identifiable, "size": made.size, "same": sorted(made.same), "verdict": found.verdict,
-        "named": named, "candidates": [each.name for each in found.details.candidates], "undecided": undecided,
+        "named": named, "candidates": [candidate.name for candidate in found.details.candidates], "undecided": undecided,
         "error": found.details.error, "allowed": found.details.allowed, "grain": made.about["grain"],
         "seconds": [round(begun - began, 2), round(time.process_time() - begun, 2)],
     }  # fmt: skip

@@ -49,7 +49,7 @@ def test_every_field_of_motion_has_a_changed_scene():
 def test_another_value_of_a_field_is_another_motion(name):
     base = scene() if name != "flight" else FLYING.scene()
     changed = CHANGED[name]
-    others = {each.name for each in fields(cv.Scene)} - {name, "name", "group", "source", "dt"}
+    others = {field.name for field in fields(cv.Scene)} - {name, "name", "group", "source", "dt"}
     for each in others:  # only this field differs
         one, other = (getattr(made, each) for made in (base, changed))
         assert cv.identity.digest(one) == cv.identity.digest(other), each

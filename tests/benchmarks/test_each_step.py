@@ -41,7 +41,7 @@ def test_both_times_are_of_the_coarsest_setting_that_is_good_enough():
         assert of(measure, "reduced") == []
         for name in errors:
             (row,) = of(measure, name)
-            chosen = next(each for each in errors[name] if each.value <= ERROR)
+            chosen = next(error for error in errors[name] if error.value <= ERROR)
             assert (row.method, row.dt) == (chosen.method, chosen.dt)
             assert row.value > 0
 

@@ -97,7 +97,7 @@ def test_the_table_of_samples_has_a_row_for_each():
 
 def test_the_name_of_a_value_has_the_quantity_of_a_drift():
     assert Value(Measure.DRIFT_MAX, 1.0, "energy").key == "energy drift max"
-    assert [(each.key, each.value == each.value) for each in blanks(Measure.ORDER, Measure.TIME)] == [
+    assert [(blank.key, blank.value == blank.value) for blank in blanks(Measure.ORDER, Measure.TIME)] == [
         ("observed order", False),
         ("time per simulated second", False),
     ]

@@ -38,7 +38,7 @@ class Crashing:
 
 
 def minimums(timings):
-    return [each.minimum for each in timings]
+    return [timing.minimum for timing in timings]
 
 
 def test_every_process_times_every_run():

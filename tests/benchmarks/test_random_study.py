@@ -84,13 +84,13 @@ def test_errors_fall_as_far_as_the_last_decade(rows):
 
 
 def test_all_settings_are_read_at_the_same_instants():
-    times = [case.grid.t for each in METHODS for case in line_of(each)]
+    times = [case.grid.t for method in METHODS for case in line_of(method)]
     assert {len(t) for t in times} == {SAMPLES + 1}
     assert all(np.allclose(t, times[0], rtol=1e-12, atol=0) for t in times)
 
 
 def test_ours_with_a_tolerance_are_among_the_settings():
-    assert [each.tolerance for each in random.settings(cv.Taylor())] == [None, None, None, 1e-9]
+    assert [setting.tolerance for setting in random.settings(cv.Taylor())] == [None, None, None, 1e-9]
     assert not random.settings(cv.MoserVeselov())
 
 
@@ -121,8 +121,8 @@ def test_tolerances_of_ours_are_credited_and_interpolated_as_one_line():
 
 
 def test_both_sides_have_as_many_settings():
-    assert [len(line_of(each)) for each in METHODS] == [17, 17]
-    assert [len(line_of(each, quick=True)) for each in METHODS] == [9, 9]
+    assert [len(line_of(method)) for method in METHODS] == [17, 17]
+    assert [len(line_of(method, quick=True)) for method in METHODS] == [9, 9]
 
 
 def test_a_tolerance_that_an_engine_does_not_take_is_left_out():
@@ -131,7 +131,9 @@ def test_a_tolerance_that_an_engine_does_not_take_is_left_out():
 
 
 def test_the_settings_of_each_family():
-    assert cv.Lame not in {type(each) for each in selection.methods(settings=random.settings)}  # exact, for symmetric bodies
+    assert cv.Lame not in {
+        type(method) for method in selection.methods(settings=random.settings)
+    }  # exact, for symmetric bodies
     chosen = random.select(selection.methods())
     ours = {each.name for each in chosen if each.role == Role.OURS}
     assert {"projected", "gauss", "reduced:order=6"} <= ours

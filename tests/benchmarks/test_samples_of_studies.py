@@ -56,7 +56,7 @@ TUMBLING = Scene(
 @pytest.mark.parametrize("scene", [TUMBLING, registry.scene("lagrange_top:t_end=0.1")], ids=lambda scene: scene.name)
 def test_a_motion_has_the_states_of_its_first_duration_and_a_curve_on_the_unit_sphere(scene):
     rows, lines = findings("motion", cv.Reduced(), scenes=(scene,))
-    largest, drifts = ([kind + each.name for each in scene.invariants] for kind in (motion.LARGEST, motion.SIGNED))
+    largest, drifts = ([kind + invariant.name for invariant in scene.invariants] for kind in (motion.LARGEST, motion.SIGNED))
     quantities = [*motion.STATES, *largest, *drifts, *motion.AXES]
     second = len(quantities)
     with_error = [*motion.STATES, *largest, motion.ERROR, *drifts, *motion.AXES]

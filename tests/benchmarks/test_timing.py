@@ -30,7 +30,7 @@ def test_every_round_takes_each_run_once_and_the_order_changes(rest):
     calls = []
     runs = {name: (lambda name=name: (calls.append(name), rest(1e-3))) for name in "abc"}
     timings = time_interleaved(runs, rounds=6, min_time=1e-4)
-    assert all((each.rounds, each.calls) == (6, 1) for each in timings.values())
+    assert all((timing.rounds, timing.calls) == (6, 1) for timing in timings.values())
     rounds = ["".join(calls[-18:][i : i + 3]) for i in range(0, 18, 3)]
     assert all(sorted(order) == ["a", "b", "c"] for order in rounds)
     assert len(set(rounds)) > 1

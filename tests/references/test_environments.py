@@ -363,7 +363,7 @@ def test_releases_are_installed_once_and_announced(wheels):
     announced = []
     for _ in range(2):
         environments = install_releases("trial", ("1.9", "1.0"), Source(wheels), announced.append)
-        assert [each.version for each in environments] == ["1.9", "1.0"]
+        assert [environment.version for environment in environments] == ["1.9", "1.0"]
     assert announced == ["installing trial@1.9", "installing trial@1.0"]
     with pytest.raises(cv.BadInput, match="engine: got 'trial@; true'; expected NAME"):
         install_releases("trial", ("1.10", "; true"), Source(wheels), announced.append)

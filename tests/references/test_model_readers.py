@@ -39,7 +39,9 @@ RIGHT, WRONG, UNDECIDED = Verdict.RIGHT, Verdict.WRONG, Verdict.UNDECIDED
 def findings(*paths, engines):
     """The findings of engines on files, by the name of the body and of the engine."""
     verified = verify_files(paths, engines)
-    return {(each.case, each.subject.split()[0]): each for verification in verified for each in verification.findings}
+    return {
+        (finding.case, finding.subject.split()[0]): finding for verification in verified for finding in verification.findings
+    }
 
 
 @pytest.fixture
@@ -591,7 +593,7 @@ def test_axes_are_those_of_the_root_of_fixed_bodies(read):
 @pytest.mark.engine("brax")
 def test_armature_damping_and_fluids_do_not_count_against_brax():
     path = CATALOGUE / "joints_and_fluids.xml"
-    assert [each.verdict for each in findings(path, engines=["brax"]).values()] == [RIGHT]
+    assert [finding.verdict for finding in findings(path, engines=["brax"]).values()] == [RIGHT]
 
 
 @pytest.mark.parametrize("shift", [0.01, -0.3])
@@ -710,7 +712,7 @@ def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(ROBOT.replace(joint("fixed", "hip", "foot"), joint("revolute", "hip", "foot")))
     (verified,) = verify_files([path], ["mujoco", "pinocchio"])
-    assert {(each.case, each.subject.split()[0]): each.verdict for each in verified.findings} == {
+    assert {(finding.case, finding.subject.split()[0]): finding.verdict for finding in verified.findings} == {
         ("robot.urdf: a", "mujoco"): RIGHT,
         ("robot.urdf: a", "pinocchio"): RIGHT,
         ("robot.urdf: hip", "mujoco"): RIGHT,  # it refuses the link
@@ -740,7 +742,7 @@ def test_what_a_model_has_beside_mass_does_not_change_the_body_that_mujoco_has(t
     path = tmp_path / "a.xml"
     head = '<option density="1000" viscosity="1" wind="1 2 3"/><default><joint armature="1" damping="1"/></default>'
     path.write_text(mjcf('<joint type="free"/><geom type="box" size="0.1 0.2 0.3"/>', head))
-    assert [each.verdict for each in findings(path, engines=["mujoco", "pinocchio"]).values()] == [RIGHT, RIGHT]
+    assert [finding.verdict for finding in findings(path, engines=["mujoco", "pinocchio"]).values()] == [RIGHT, RIGHT]
 
 
 @pytest.mark.slow
@@ -755,7 +757,7 @@ def test_robots_of_packages(tmp_path):
             files = distribution(package).files or []
         except PackageNotFoundError:
             pytest.skip(f"{package} is not installed")
-        paths = [Path(str(each.locate())) for each in files if str(each).endswith(names)]
+        paths = [Path(str(file.locate())) for file in files if str(file).endswith(names)]
         assert len(paths) == len(names)
         verified = verify_files(paths, ["mujoco", "pinocchio"])
         pairs = [pair for each in verified for pair in zip(each.findings, each.details, strict=True)]

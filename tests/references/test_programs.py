@@ -43,7 +43,7 @@ def test_a_program_is_an_engine_until_it_is_removed(folder):
     assert "mine" in list_installed()
     (method,) = select_engines(["mine"])
     assert (method.label, method.order) == ("mine==1/mine", 4)
-    assert [each.name for each in list_engines(["mine"])] == ["mine"]
+    assert [engine.name for engine in list_engines(["mine"])] == ["mine"]
     code, text = run("run", "brick_flip", "--methods", "mine", "--t-end", "1", "--json")
     assert (code, json.loads(text)["outcome"]["kind"]) == (0, "ok")
     assert run("engines", "list")[1].startswith("mine: ")

@@ -41,8 +41,8 @@ def start():
         return workers[-1]
 
     yield start_worker
-    for each in workers:
-        each.close()
+    for worker in workers:
+        worker.close()
 
 
 def run_of(worker, dt, scene=BRICK, **settings):

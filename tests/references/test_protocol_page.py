@@ -43,7 +43,7 @@ def test_a_sample_is_right(language, tmp_path, monkeypatch):
     (found,) = verify([run])
     close_workers()
     assert found.verdict == "right", found.reason
-    heavy = next(each for each in found.findings if each.case == "heavy")
+    heavy = next(finding for finding in found.findings if finding.case == "heavy")
     assert (heavy.verdict, heavy.detail.count("only free bodies")) == ("not tested", 1)
 
 

@@ -349,7 +349,7 @@ def position_ratio(figure):  # of the centre of mass's error
 
 def flight_energy_error(figure):  # relative to the initial energy
     trajectory = every_step(figure)
-    total = next(each for each in trajectory.scene.invariants if each.name == "total energy")
+    total = next(invariant for invariant in trajectory.scene.invariants if invariant.name == "total energy")
     start = trajectory.scene.initial_value(total)
     return np.abs(trajectory.drift(total)).max() * total.scale / start
 

@@ -211,7 +211,7 @@ DEFAULTS = {
 }
 
 
-@pytest.mark.parametrize("engine", [of(each) for each in DEFAULTS])
+@pytest.mark.parametrize("engine", [of(default) for default in DEFAULTS])
 def test_an_engine_as_installed(engine):
     environment = install(engine).environment
     label, figures = DEFAULTS[engine]

@@ -82,7 +82,7 @@ def against(track, folder, behaviour, release, *more):
 def test_a_build_that_lost_an_order_exits_with_1(track, tmp_path):
     exit_code, text, _ = against(track, tmp_path, ("integrate", 2), "1.1", "--junit", tmp_path / "junit.xml")
     assert exit_code == 1
-    build = next(each.version for each in list_environments("trial") if each.is_build)
+    build = next(environment.version for environment in list_environments("trial") if environment.is_build)
     assert f"{build} against 1.1: FAILED" in text
     assert "order of the attitude 4 → 2; order of the rates 4 → 2" in text
     assert ElementTree.parse(tmp_path / "junit.xml").find("testsuite").get("failures") == "1"
@@ -144,7 +144,7 @@ def test_the_known_changes_between_two_versions_of_mujoco():
     settings = ("--scenes", "brick_flip", "--settings", "RK4,Euler", "--json")
     done = CliRunner().invoke(main, ["track", "mujoco", "3.6.0", "4.0.0", *settings])
     assert done.exit_code == 0
-    texts = {each["setting"]: each["sentence"] for each in json.loads(done.stdout)["changes"]}
+    texts = {load["setting"]: load["sentence"] for load in json.loads(done.stdout)["changes"]}
     assert "3.6.0 → 4.0.0: order of the attitude 2 → 4" in texts["RK4"]
     assert "order" not in texts.get("Euler", "")
 

@@ -39,8 +39,10 @@ RIGHT, WRONG, NOT_TESTED = Verdict.RIGHT, Verdict.WRONG, Verdict.NOT_TESTED
 
 def findings(files, *engines):
     """The findings on files by the name of the engine and of the body."""
-    verified = verify_files([Path(each) for each in files], engines)
-    return {(each.subject.split()[0], each.case): each for verification in verified for each in verification.findings}
+    verified = verify_files([Path(file) for file in files], engines)
+    return {
+        (finding.subject.split()[0], finding.case): finding for verification in verified for finding in verification.findings
+    }
 
 
 def read_links(path):
@@ -228,10 +230,12 @@ def test_a_file_is_as_wrong_as_its_worst_body_in_any_engine():
     assert other.exit_code == EXIT_CODES[NOT_TESTED] == 3
     assert {each.kind for each in (good, bad, other)} == {"model file"}
     assert (bad.subject, len(bad.findings), len(bad.details)) == ("robot.urdf", 6, 6)
-    (wrong,) = (each for each in bad.findings if each.verdict is WRONG)
+    (wrong,) = (finding for finding in bad.findings if finding.verdict is WRONG)
     assert (wrong.subject.split()[0], wrong.case, wrong.check) == ("pinocchio", "robot.urdf: hip", "bodies")
-    assert {(each.subject, each.case) for each in bad.details} == {(each.subject, each.case) for each in bad.findings}
-    assert all(each.error < 1e-12 < each.allowed == 1e-4 for each in good.findings)  # measured: 6e-15
+    assert {(detail.subject, detail.case) for detail in bad.details} == {
+        (finding.subject, finding.case) for finding in bad.findings
+    }
+    assert all(finding.error < 1e-12 < finding.allowed == 1e-4 for finding in good.findings)  # measured: 6e-15
 
 
 def test_a_loader_that_crashes_or_hangs_is_that_engines_answer(monkeypatch, tmp_path):

@@ -147,9 +147,9 @@ def test_signatures_are_computed_again():
     """Each mistake has a signature in one of these motions, so that none needs the search to be seen."""
     motions = [CATALOGUE[name] for name in ("damped", "rotor_turned", "torque_strong", "heavy", "orbit", "tiny_fast")]
     for motion, found in zip(motions, signatures(motions), strict=True):
-        (allowed,) = (each for each in FILES[motion.name]["tolerance"] if (each["order"], each["angle"]) == (2, 0.01))
+        (allowed,) = (file for file in FILES[motion.name]["tolerance"] if (file["order"], file["angle"]) == (2, 0.01))
         made = files.catches(motion, np.array([allowed[name] for name in programs.QUANTITIES]), found)
-        assert [each["mistake"] for each in made] == [each["mistake"] for each in FILES[motion.name]["catches"]]
+        assert [each["mistake"] for each in made] == [file["mistake"] for file in FILES[motion.name]["catches"]]
         for new, old in zip(made, FILES[motion.name]["catches"], strict=True):
             for name in programs.QUANTITIES:
                 assert new[name] == pytest.approx(old[name], rel=0.05)
@@ -199,8 +199,8 @@ def test_all_designs_are_right(order, single):
         [row[name] + single * FILES[motion]["single"] for name in programs.QUANTITIES]
         for motion in CATALOGUE for row in FILES[motion]["tolerance"] if (row["order"], row["angle"]) == (order, 0.01)
     ])  # fmt: skip
-    for each in designs(order, single)[:: 1 if order < 4 else 3]:
-        assert (programs.errors(motions, scale, each.run(motions, 10)) / limits).max() <= 1, each.name
+    for design in designs(order, single)[:: 1 if order < 4 else 3]:
+        assert (programs.errors(motions, scale, design.run(motions, 10)) / limits).max() <= 1, design.name
 
 
 @pytest.mark.parametrize("name", sampled(RIGHT, 10))
@@ -388,7 +388,7 @@ def test_an_engine_that_does_nothing_fails():
     """The files as they are: `simulate` returns the start."""
     R0 = np.array([kept["R_WB0"] for kept in FILES.values()])
     ends = np.array([kept["R_WB"][-1] for kept in FILES.values()])
-    assert angle_between(R0, ends).min() >= 10 * max(each["tolerance"][5]["attitude"] for each in FILES.values())
+    assert angle_between(R0, ends).min() >= 10 * max(file["tolerance"][5]["attitude"] for file in FILES.values())
 
 
 @pytest.mark.skipif(bool(missing("C++")), reason="needs g++")

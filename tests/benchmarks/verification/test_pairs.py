@@ -113,7 +113,7 @@ class Noted(Runner):
         return lambda: (np.tile(one.R0, (n, 1, 1)), np.tile(one.w0 * (1 + fault), (n, 1)))
 
     def many(self, bodies, number):
-        self.requests += [each.numbers for each in bodies]
+        self.requests += [body.numbers for body in bodies]
         return self.model(bodies[number])()
 
 
@@ -160,15 +160,15 @@ def test_requests_are_as_protocol_md_promises(monkeypatch):
         one = replace(BODY, inertia=R @ BODY.inertia @ R.T, com=com, gravity=random.uniform(1, 9))
         one, _ = to_principal(one)
         requests += [pair.second(one, *pair.scales[:1]).numbers for pair in PAIRS if "top" in pair.bodies]
-    for given in requests:
-        check_request(given)
+    for request in requests:
+        check_request(request)
     assert len(requests) > 1000
 
 
 def test_every_pair_has_a_body_and_every_description_of_an_adapter_a_pair():
     """A pair or a description without the other would never be tried, and a relation without a verdict never shown."""
     assert {body for pair in PAIRS for body in pair.bodies} == set(BODIES)
-    declared = {each for name in registry.list_engines() for each in adapter(name).data.descriptions}
+    declared = {description for name in registry.list_engines() for description in adapter(name).data.descriptions}
     assert declared <= VARIANTS
     assert VARIANTS - declared == {"accelerator"}
     assert len(PAIRS) == len(BY_NAME) >= 20
@@ -217,7 +217,7 @@ class Planted(Runner):
 def verify_planted(monkeypatch, runner, *names):
     """Return the findings on a planted engine, by case."""
     monkeypatch.setattr(verify, "runner_of", lambda method: runner)
-    return {each.case: each for each in verify_pairs(registry.method("reduced"), names)}
+    return {pair.case: pair for pair in verify_pairs(registry.method("reduced"), names)}
 
 
 def small_moments_count_as_zero(one):

@@ -158,7 +158,7 @@ PARTS = {
 
 def judged(scene, t, R, w, from_row=True, allowed=1e-9):
     found = verify_recording(scene, Recording(t, (R, w), rows=len(t)), from_row, allowed)
-    assert {row["quantity"] for row in found.details.rows()} == {each.name for each in found.details.quantities}
+    assert {row["quantity"] for row in found.details.rows()} == {quantity.name for quantity in found.details.quantities}
     return found
 
 
@@ -205,7 +205,9 @@ def test_the_right_motion_is_right_from_any_row_and_without_the_part_it_is_wrong
     late = judged(build(), T[50:], R[50:], w[50:])  # a scene that depends on time is integrated from the time of the row
     assert np.max(late.details.error) < 2e-11
     assert np.max(judged(build(), T[50:], R[50:], w[50:], from_row=False).details.error) < 2e-11
-    assert all(each.largest < 1e-10 for each in late.details.quantities)  # no balance without the work, no energy with a motor
+    assert all(
+        quantity.largest < 1e-10 for quantity in late.details.quantities
+    )  # no balance without the work, no energy with a motor
     found = judged(build(), T, *integrate(T))
     assert max(found.details.error) > 0.1
     assert found.details.explaining[0].name == missing

@@ -50,8 +50,8 @@ def verified(text, *checks):
 def keys(found):
     """Return the keys of the mistakes, and how many motions each explains."""
     named = {}
-    for each in found.findings:
-        for cause in each.causes:
+    for finding in found.findings:
+        for cause in finding.causes:
             named[cause.key] = named.get(cause.key, 0) + 1
     return named
 
@@ -67,8 +67,8 @@ OTHER_DESIGNS = (
 def test_a_right_program_is_right(name):
     found = verified(command(right_programs.__file__, name), "protocol", "motions", "order", "repeatability")
     assert (found.verdict, keys(found)) == (Verdict.RIGHT, {}), found.reason
-    assert sum(each.check == "motions" and each.verdict == "right" for each in found.findings) == 42
-    (order,) = (each.error for each in found.findings if each.check == "order")
+    assert sum(finding.check == "motions" and finding.verdict == "right" for finding in found.findings) == 42
+    (order,) = (finding.error for finding in found.findings if finding.check == "order")
     if not RIGHT[name].single:  # whose errors of order 4 are rounding
         assert abs(order - RIGHT[name].order) < 0.05  # measured: 0.01 at most
 
@@ -81,9 +81,9 @@ IN_PROGRAMS = ("wrong side", "turning of the field")
 def test_a_planted_mistake_is_named(name):
     found = verified(command(wrong_programs.__file__, name), "motions", "order")
     assert found.verdict is Verdict.WRONG
-    named, failing = keys(found), sum(each.check == "motions" and each.verdict == "wrong" for each in found.findings)
+    named, failing = keys(found), sum(finding.check == "motions" and finding.verdict == "wrong" for finding in found.findings)
     if WRONG[name].key == "explicit Euler":
-        assert (failing, [each.verdict for each in found.findings if each.check == "order"]) == (0, ["wrong"])
+        assert (failing, [finding.verdict for finding in found.findings if finding.check == "order"]) == (0, ["wrong"])
     else:
         assert max(named, key=named.get) == WRONG[name].key
         assert named[WRONG[name].key] >= 0.7 * failing
@@ -156,7 +156,7 @@ def test_a_mistake_of_the_protocol_is_found(mistake, monkeypatch):
         monkeypatch.setattr(protocol, "PACE", PATIENCE)
     check, words = REFUSED[mistake]
     found = verified(command(PLANTED, "rk4", mistake), *dict.fromkeys(("protocol", check)))
-    wrong = [each for each in found.findings if each.verdict is Verdict.WRONG]
+    wrong = [finding for finding in found.findings if finding.verdict is Verdict.WRONG]
     assert {each.check for each in wrong} == {check}
     assert words in wrong[0].detail
 
@@ -184,7 +184,9 @@ def test_a_warm_up_of_every_measurement_is_reported():
 def test_a_program_without_free_bodies_is_not_called_wrong():
     found = verified(command(PLANTED, "rk4", "only tops"), "protocol", "motions")
     assert found.verdict is Verdict.RIGHT
-    assert {each.case for each in found.findings if each.check == "motions" and each.verdict == "right"} >= {"heavy"}
+    assert {finding.case for finding in found.findings if finding.check == "motions" and finding.verdict == "right"} >= {
+        "heavy"
+    }
 
 
 def test_a_program_that_does_not_answer_is_ended(monkeypatch):
@@ -231,4 +233,4 @@ def test_one_check_is_a_text_or_a_list(monkeypatch):
     monkeypatch.setattr(programs, "load", lambda: load()[:2])
     one, two = (verify("mujoco:RK4", only=only)[0] for only in ("repeatability", ["repeatability"]))
     assert one.sentence == two.sentence
-    assert {each.check for each in one.findings} == {"repeatability"}
+    assert {finding.check for finding in one.findings} == {"repeatability"}

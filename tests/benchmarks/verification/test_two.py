@@ -27,7 +27,7 @@ def verify(first, second, scene=FREE, **options):
 
 
 def findings(found):
-    return [(each.subject, each.verdict) for each in found.findings]
+    return [(finding.subject, finding.verdict) for finding in found.findings]
 
 
 def test_the_wrong_one_of_two_is_named_with_its_mistake():
@@ -66,8 +66,8 @@ def test_two_wrong_ones_have_the_same_mistake_or_another_body(monkeypatch):
     found = verify(of(*without(FREE)), of(*without(FREE)))
     assert "same mistake" in found.reason
     found = verify(of(*without(FREE)), of(*late(FREE, 0.02)))
-    assert all(each.verdict == "wrong" for each in found.findings)
-    assert [each.mistake for each in found.findings[:2]] == ["no gyroscopic term", "time shift"]
+    assert all(finding.verdict == "wrong" for finding in found.findings)
+    assert [finding.mistake for finding in found.findings[:2]] == ["no gyroscopic term", "time shift"]
     monkeypatch.setattr(verdict, "diagnose", lambda *_: Diagnosis())  # other bodies are searched for a minute
     found = verify(of(*exact(OTHER)), of(*exact(OTHER, OTHER_T), OTHER_T))
     assert (found.verdict, found.findings[2].verdict) == ("wrong", "right")

@@ -49,7 +49,7 @@ def test_rounding_is_no_violation(number, method):
 def causes(method):
     """The keys of the mistakes on free and on other bodies."""
     setting = {"order": method.order, "precision": method.precision}
-    return tuple(each.key for each in find_causes(lambda scene, grid: method.prepare(scene, grid)(), setting))
+    return tuple(cause.key for cause in find_causes(lambda scene, grid: method.prepare(scene, grid)(), setting))
 
 
 CAUSES = ["no gyroscopic term", "sign of the field", "damping", "transposed"]
