@@ -474,7 +474,8 @@ def test_a_method_refuses_to_prepare_what_it_does_not_support(method: str) -> No
 )
 def test_prepare_and_check_are_right(method: str, feature: Feature) -> None:
     row, grid, chosen = ROWS[feature], cv.Grid(0.005, 400, 50), registry.method(method)
-    found = chosen.check(row.scene(), grid, chosen.prepare(row.scene(), grid)())
+    scene = row.scene()
+    found = chosen.check(scene, grid, chosen.prepare(scene, grid)())
     assert found.ok, found.outcome
     assert row.distance(row.t, found.R_WB) < 0.1  # methods of order 1 and 2
 
