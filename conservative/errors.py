@@ -65,10 +65,14 @@ REMOVED: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys((".a", ".aem"), "its rows as CSV, below a line of names, such as time q_x q_y q_z q_w"),
         "run --parquet": "Write CSV with --csv FILE, and convert it: pandas.read_csv(FILE).to_parquet(NEW)",
         "study --latex": "Use --csv, or --markdown and a converter such as pandoc",
+        "study engines_at_one_step": "Run: conservative study paper --engines NAMES for errors, drifts and flips, or "
+        "conservative study speed --engines NAMES for times",
+        "study engines_over_steps": "Run: conservative study convergence --engines NAMES for orders, or "
+        "conservative study work_precision --engines NAMES for times",
         "to_xarray": "to_pandas(), which returns the same samples as a table",
     }
 )
-"""What is gone since the last release, and what to use instead: endings of files, options, and attributes."""
+"""What is gone since the last release, and what to use instead: endings of files, options, studies, and attributes."""
 
 
 class RemovedAttribute:

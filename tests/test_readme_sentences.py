@@ -12,8 +12,8 @@ from packaging.specifiers import SpecifierSet
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks import speed_ratio
+from conservative.benchmarks.measures.errors import count_turns_over
 from conservative.benchmarks.studies import random
-from conservative.benchmarks.studies.engines_at_one_step import count_turns_over
 
 from .pages import FENCE, INDENTED, ROOT
 

@@ -20,6 +20,8 @@ from .measure import Measure, Value
 CONSERVED, SMALL = 1e-10, 1e-3
 """Relative drift up to which a quantity is conserved, and up to which its drift is small."""
 
+FAR_SIDE = 0.5
+"""Fraction of the initial momentum along the spin axis that the reversed momentum has to reach for a flip."""
 OF_TRUTH = ", loads of the truth"
 """Ends the name of the drift of a balance with the work or impulse of the truth."""
 
@@ -102,6 +104,19 @@ def blanks(scene: Scene) -> list[Value]:
     """Return the measures of `measure_errors` for a scene without values, for a run that failed."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
     return [replace(value, value=math.nan) for value in measure_errors(start, start)]
+
+
+def count_turns_over(trajectory: Trajectory) -> int:
+    """Return how often a body turned over.
+
+    The momentum component along one principal axis changes its sign when the body turns over. The axis is the one with the
+    largest component at the start. A sign counts only if the component reaches `FAR_SIDE` of its initial size, so that small
+    oscillations about zero are ignored.
+    """
+    body, start = trajectory.scene.body, trajectory.scene.w_WB_B0
+    along = (body.momentum(trajectory.w_WB_B) @ body.R_BP)[:, int(np.argmax(np.abs(body.momentum(start) @ body.R_BP)))]
+    signs = np.sign(along[np.abs(along) >= FAR_SIDE * abs(along[0])])
+    return int(np.count_nonzero(np.diff(signs)))
 
 
 def secular_slope(t: Array, drift: Array) -> tuple[float, float]:

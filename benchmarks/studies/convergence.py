@@ -68,4 +68,4 @@ def order_rows(case: Case, names: tuple[Measure, Measure], order: Order, reason:
     return list(map(drop_step, rows))
 
 
-STUDY = Declaration(findings)
+STUDY = Declaration(findings, named=True)

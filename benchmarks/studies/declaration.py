@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum, IntEnum, auto
+from enum import IntEnum, auto
 from typing import Any
 
 from conservative.method import Method
@@ -28,17 +28,6 @@ class Extent(IntEnum):
     """A full report that is not quick."""
 
 
-class Named(Enum):
-    """How a study uses the engines that are named for a report."""
-
-    APART = auto()
-    """Not at all: they have studies of their own."""
-    TOO = auto()
-    """They are compared like all methods."""
-    ONLY = auto()
-    """They are its methods. Without them it is not made."""
-
-
 @dataclass(frozen=True)
 class Declaration:
     """A study as it is declared; its name is that of its file.
@@ -47,8 +36,10 @@ class Declaration:
     ----------
     findings
         Function that yields its rows and samples.
-    extent, named
-        In which reports it is, and with which engines.
+    extent
+        In which reports it is.
+    named
+        It also measures the engines that are named for a report, as it measures all methods.
     apart
         Its rows have a section of their own and are not among the tables of the scenes.
     timed
@@ -71,7 +62,7 @@ class Declaration:
 
     findings: Maker
     extent: Extent = Extent.EVERY
-    named: Named = Named.APART
+    named: bool = False
     apart: bool = False
     timed: bool = False
     in_turn: bool = False

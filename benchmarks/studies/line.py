@@ -12,6 +12,7 @@ import numpy as np
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.trajectory import Trajectory
 
 from ..measures import errors
@@ -25,6 +26,11 @@ FEWEST_POINTS = 4
 """Smallest number of points, as far as `LINE_LIMIT` allows."""
 LINE_LIMIT = 8
 """Time for all points of a slow method, in units of the time budget of a run."""
+SLOW_PREPARATION = 1.0
+"""Time of a preparation, s, above which an engine gets only every second point: some engines compile for each."""
+PREPARATIONS = 30.0
+"""Time, s, for all preparations of an engine on a line. Points beyond it are skipped."""
+SKIPPED = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
 
 
 def list_settings(case: Case, grids: Iterable[Grid], tolerances: Iterable[float]) -> list[Case]:
@@ -77,11 +83,16 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
     """Yield the result of each case, coarse to fine. Cases beyond the time budget are skipped.
 
     A slow method gets fewer points: the coarsest `FEWEST_POINTS` if their total time allows it, and finer ones within the time
-    budget of a run. After a run that was stopped, no finer one is made.
+    budget of a run. After a run that was stopped, no finer one is made. An engine in an environment of its own that takes long
+    to prepare a run gets fewer points, too; any other method compiles once.
     """
     times: list[float] = []
+    prepared: list[float] = []
     per_step = 0.0
-    for case in cases:
+    for i, case in enumerate(cases):
+        if sum(prepared) > PREPARATIONS or (i % 2 and sum(prepared[:1]) > SLOW_PREPARATION):
+            yield case, SKIPPED
+            continue
         expected = per_step * case.grid.n_steps or study.expected_cost(case)
         needed = len(times) < FEWEST_POINTS and sum(times) + expected <= LINE_LIMIT * study.longest_run
         if not needed and expected > study.longest_run:
@@ -93,6 +104,7 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
         if isinstance(done, Success):
             times.append(cost_of_run(study, case, done, first=not (times or expected)))
             per_step = times[-1] / case.grid.n_steps
+            prepared.append(done.cost.prepare if isinstance(case.method, EngineMethod) else 0.0)
         elif done.kind is OutcomeKind.TIMEOUT:
             per_step = math.inf
 

@@ -28,7 +28,7 @@ from conservative.trajectory import Trajectory, head
 from ..measures import errors
 from ..measures.measurement import Samples
 from .case import Case, Success
-from .declaration import Declaration, Named
+from .declaration import Declaration
 from .long_runs import end_of
 from .study import Finding, Progress, Study
 
@@ -159,4 +159,4 @@ def project_on_sphere(trajectory: Trajectory) -> Array:
     return np.asarray(trajectory.R_WB @ (com_B / length if length else np.eye(3)[2]))
 
 
-STUDY = Declaration(findings, named=Named.TOO)
+STUDY = Declaration(findings, named=True)

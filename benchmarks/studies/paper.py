@@ -1,25 +1,34 @@
-"""Accuracy at the paper's steps: drifts, errors and work."""
+"""Accuracy at the paper's steps: drifts, errors, work, flips, and the precision and expected order of each method."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
 
 from conservative.grid import Grid, grid_for
+from conservative.invariants import find_energy
 from conservative.method import Role
-from conservative.outcome import Outcome
+from conservative.outcome import OK, Outcome
 from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures import errors
-from ..measures.measure import Measure, Value
+from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .declaration import Declaration
+from .selection import Missing, bits_of
 from .study import Progress, Study, without_truth
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
+AS_INSTALLED = "as installed"
+"""Detail of the precision of an engine as installed."""
+TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
 APPROXIMATE = "approximate"
 """Detail of the agreement of a reference solution that is not known more accurately."""
 
@@ -54,6 +63,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                     yield from case.rows(errors.blanks(scene), done)
                 else:
                     yield from measure_accuracy(case, done, truths[case.grid])
+                if case.grid is grids[0]:
+                    yield from describe(case, done)
+                    yield from count_turns(case, done, truths)
 
 
 def agreement_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
@@ -83,7 +95,35 @@ def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory | Ou
         Measure.EVALUATIONS: counters.evaluations,
     }
     counts = [Value(measure, float(count)) for measure, count in work.items() if count is not None]
-    return case.accuracy_rows(done.trajectory, truth) + case.rows(counts)
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
+        rows = case.accuracy_rows(done.trajectory, truth)
+        if energy := find_energy(case.scene.invariants):
+            direction = "gained" if done.trajectory.drift(energy)[-1] > 0 else "lost"
+            place = next(i for i, row in enumerate(rows) if (row.measure, row.quantity) == (Measure.DRIFT_MAX, energy.name))
+            rows[place] = replace(rows[place], detail=direction)
+    return rows + case.rows(counts)
 
 
-STUDY = Declaration(findings)
+def describe(case: Case, done: Success | Outcome) -> list[Measurement]:
+    """Return the precision and the expected order of a method that is installed, with the outcome of its run."""
+    method, outcome = case.method, done if isinstance(done, Outcome) else OK
+    if isinstance(method, Missing):
+        return []
+    order = math.nan if method.order is None else float(method.order)
+    properties = (Value(Measure.PRECISION, float(bits_of(method))), Value(Measure.ORDER_EXPECTED, order))
+    return case.rows(properties, outcome, AS_INSTALLED if method in method.settings_for("as_installed") else "")
+
+
+def count_turns(case: Case, done: Success | Outcome, truths: Mapping[Grid, Trajectory | Outcome]) -> list[Measurement]:
+    """Return how often a free body turned over, and how often in the exact motion; without values if one of them is missing."""
+    if not case.scene.free:
+        return []
+    if isinstance(done, Outcome):
+        return case.rows(blanks(*TURNS), done)
+    if isinstance(truth := truths[case.grid], Outcome):
+        return case.rows(blanks(*TURNS), truth)
+    counts = (errors.count_turns_over(trajectory) for trajectory in (done.trajectory, truth))
+    return case.rows(map(Value, TURNS, map(float, counts)))
+
+
+STUDY = Declaration(findings, named=True)

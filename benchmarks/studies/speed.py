@@ -16,6 +16,8 @@ from conservative.attitude import angle_between
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
 from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.references.environments.engine_method import EngineMethod
+from conservative.references.worker.client import time_limit
 from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value, blanks
@@ -54,9 +56,21 @@ def own_loop(run: Run) -> Callable[[], Any]:
     return getattr(run, "own_loop", run)
 
 
-def shorten(study: Study, case: Case) -> Case:
-    """Return the case, with fewer steps if its steps are slow and would exceed the time budget."""
-    cost = study.expected_cost(case)
+def attempt_short(study: Study, case: Case) -> tuple[Case, Success | Outcome]:
+    """Return the case and its result, with fewer steps if its steps are slow and would exceed the time budget.
+
+    How long an engine in an environment of its own takes is known from its first run, which compiles nothing of ours.
+    """
+    case = shorten(study, case, study.expected_cost(case))
+    done = study.attempt_here(case)
+    if isinstance(case.method, EngineMethod) and isinstance(done, Success) and done.cost.first_call > study.longest_run:
+        case = shorten(study, case, done.cost.first_call)
+        done = study.attempt_here(case)
+    return case, done
+
+
+def shorten(study: Study, case: Case, cost: float) -> Case:
+    """Return the case, whose run takes `cost` s, with as many steps as the time budget allows."""
     if cost <= study.longest_run:
         return case
     n = max(1, min(case.grid.n_steps, int(case.grid.n_steps * study.longest_run / cost)))
@@ -71,8 +85,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for method in study.competitors:
             tell(f"{scene.name}: preparing {method.name}")
             scene.forget()  # so that the scene is converted again; compiled code stays warm
-            case = shorten(study, Case(study.name, scene, method, keep_end(grid_for(scene, scene.dt))))
-            done = study.attempt_here(case)
+            case, done = attempt_short(study, Case(study.name, scene, method, keep_end(grid_for(scene, scene.dt))))
             if isinstance(done, Outcome):
                 yield from case.rows(blanks(*MEASURES), done)
             else:
@@ -84,7 +97,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 def time_steps(study: Study, ready: Mapping[Case, Success]) -> Iterator[Measurement]:
     """Yield the `MEASURES` of runs, all in interleaved rounds."""
     loops = {case: own_loop(done.run) for case, done in ready.items()}
-    timings = time_interleaved(loops, study.rounds, CALL, study.timing_budget)
+    with time_limit(study.hang_limit):
+        timings = time_interleaved(loops, study.rounds, CALL, study.timing_budget)
     for case, timing in timings.items():
         yield from times(case, ready[case], timing)
 
@@ -151,15 +165,16 @@ def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measu
 
     The conversion of samples is included in `Measure.TIME_SAMPLED` only.
     """
-    timings = processes.time(
-        {key: run if key[1] == Measure.TIME_SAMPLED else own_loop(run) for key, (_, run) in ready.items()},
-        {key: partial(prepare_timed, case, key[1] == Measure.TIME_SAMPLED) for key, (case, _) in ready.items()},
-        limit=study.hang_limit * (1 + len(ready)),
-        rounds=study.rounds,
-        min_time=CALL,
-        budget=study.timing_budget / 4,
-        shared=list({case.scene: None for case, _ in ready}),
-    )
+    with time_limit(study.hang_limit):
+        timings = processes.time(
+            {key: run if key[1] == Measure.TIME_SAMPLED else own_loop(run) for key, (_, run) in ready.items()},
+            {key: partial(prepare_timed, case, key[1] == Measure.TIME_SAMPLED) for key, (case, _) in ready.items()},
+            limit=study.hang_limit * (1 + len(ready)),
+            rounds=study.rounds,
+            min_time=CALL,
+            budget=study.timing_budget / 4,
+            shared=list({case.scene: None for case, _ in ready}),
+        )
     for key, each in timings.items():
         case, _ = ready[key]
         yield from key[0].time_rows(key[1], each, case.grid.dt * case.grid.n_steps)
@@ -172,4 +187,4 @@ def prepare_timed(case: Case, converted: bool) -> Callable[[], Any]:
     return run if converted else own_loop(run)
 
 
-STUDY = Declaration(findings, timed=True)
+STUDY = Declaration(findings, named=True, timed=True)

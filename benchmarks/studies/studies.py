@@ -18,8 +18,6 @@ from ..measures.measurement import Measurement
 from . import (
     convergence,
     each_step,
-    engines_at_one_step,
-    engines_over_steps,
     hard_cases,
     long_runs,
     long_time,
@@ -37,7 +35,7 @@ from .study import Finding, Progress, Study, without_truth
 
 _IN_ORDER = (
     *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time),
-    *(engines_at_one_step, engines_over_steps, stability, hard_cases, throughput),
+    *(stability, hard_cases, throughput),
 )
 STUDIES: Mapping[str, Declaration] = {each.STUDY.name: each.STUDY for each in _IN_ORDER}
 """The declaration of each study by its name, in the order of a report."""

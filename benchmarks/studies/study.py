@@ -14,6 +14,7 @@ from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.presentation import number
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.truth import Disagreement, Truth, Unsolvable, reference
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -29,6 +30,8 @@ MOST_TRUTHS = 32
 """Number of cached reference solutions: about six for each scene of a report."""
 HANG_LIMIT = 60.0
 """Shortest time limit of a run, s: a first run may compile."""
+ENGINE_LIMIT = 180.0
+"""The same of an engine in an environment of its own: importing and compiling it can take more than a minute."""
 HANG_FACTOR = 10.0
 """Ratio of the time limit of a run to the time budget."""
 SLOW_FACTOR = 100.0
@@ -118,8 +121,12 @@ class Study:
 
     @property
     def hang_limit(self) -> float:
-        """Time limit of a run, s."""
+        """Time limit of a run in this process or of a call that is timed, s."""
         return max(HANG_LIMIT, HANG_FACTOR * self.longest_run)
+
+    def limit_of(self, method: Method) -> float:
+        """Return the time limit, s, of a run of a method."""
+        return max(ENGINE_LIMIT if isinstance(method, EngineMethod) else 0.0, self.hang_limit)
 
     @property
     def competitors(self) -> tuple[Method, ...]:
@@ -142,11 +149,11 @@ class Study:
 
     def attempt(self, case: Case) -> Success | Outcome:
         """Return the result of a case within the time limit of a run; see `attempt_within`."""
-        return attempt_within(self.hang_limit, case, self.skip_missing)
+        return attempt_within(self.limit_of(case.method), case, self.skip_missing)
 
     def attempt_here(self, case: Case) -> Success | Outcome:
         """Return the result of a case whose run is to be timed; see `time_limit.attempt_here`."""
-        return attempt_here(self.hang_limit, case, self.skip_missing)
+        return attempt_here(self.limit_of(case.method), case, self.skip_missing)
 
     def find_truth(self, scene: Scene, grid: Grid) -> Trajectory | Outcome:
         """Return the reference solution, or the outcome of rows that cannot be measured without a confirmed one."""
@@ -159,7 +166,7 @@ class Study:
         """Return the wall time, s, that a run of a case is expected to take, from a short run; 0 if its steps are quick."""
         if is_quick(case) or case.method.unsupported(case.scene):
             return 0.0
-        cost = find_trial(self.longest_run, self.hang_limit, case, self.skip_missing).expect(case)
+        cost = find_trial(self.longest_run, self.limit_of(case.method), case, self.skip_missing).expect(case)
         return 0.0 if math.isnan(cost) else cost  # the run itself tells how it fails
 
     def skip_slow(self, *ranks: Sequence[Case]) -> dict[Case, Outcome]:

@@ -41,7 +41,7 @@ from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..speed_ratio import list_deciding
 from .case import Case, Drawn, outcome_of_error
-from .declaration import Declaration, Extent, Named
+from .declaration import Declaration, Extent
 from .ensembles import DURATION, KINDS, draw
 from .line import list_settings
 from .many_runs import ManyDone, RunBlocks, Way, attempt_many, family_settings, list_ways
@@ -276,7 +276,7 @@ def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
 STUDY = Declaration(
     findings,
     Extent.LONG,
-    Named.TOO,
+    named=True,
     apart=True,
     timed=True,
     in_turn=True,

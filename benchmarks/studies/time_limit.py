@@ -84,23 +84,28 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: 
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
     """
-    if isinstance(case.method, EngineMethod):  # it is in another process already
-        with time_limit(limit):
-            return attempt(case, skip_missing)
-    if is_bounded(case.method) or (is_known_to_end(case.method) and not apart):
+    elsewhere = isinstance(case.method, EngineMethod)  # in another process already
+    if is_bounded(case.method) or (is_known_to_end(case.method) and not apart and not elsewhere):
         return attempt(case, skip_missing)
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
     longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
     if limit <= before and longer:  # at least as long, in steps and in time, as one that was stopped at this limit
         return Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s")
+    done: tuple[Trajectory, Preparation] | Success | Outcome
     try:
-        done = run_within(limit, partial(_attempt, case), (case.scene,))
+        if elsewhere:
+            with time_limit(limit):
+                done = attempt(case, skip_missing)
+        else:
+            done = run_within(limit, partial(_attempt, case), (case.scene,))
     except (EngineTimeout, EngineCrashed) as failure:
-        if isinstance(failure, EngineTimeout):
-            _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
-        return failure.outcome
+        done = failure.outcome
     except NotTransferable:
         return attempt(case, skip_missing)
+    if isinstance(done, Outcome) and done.kind is OutcomeKind.TIMEOUT:
+        _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
+    if isinstance(done, Success):
+        return done
     if isinstance(done, Outcome):
         return attempt(case, skip_missing) if done.kind is OutcomeKind.MISSING else done
     prepare = cache(lambda: case.method.prepare(case.scene, case.grid))

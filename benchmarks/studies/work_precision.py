@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from conservative.method import Method
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 
 from ..measures.measure import Measure, Value
@@ -35,8 +36,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                     yield Case(study.name, scene, method, step_ladder.samples(scene, method)).row(TIME, same)
                     continue
                 truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-                # More steps of a method of first order are slow and still inaccurate.
-                for point in measure_line(study, list_cases(study, scene, method, step_ladder.LENGTH), truth, ERRORS):
+                for point in measure_line(study, list_cases(study, scene, method), truth, ERRORS):
                     yield from point.rows()
                     if point.outcome.ok:
                         good.append(point)
@@ -46,12 +46,14 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield from time_cases(study, good, processes)
 
 
-def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int | None = None) -> list[Case]:
+def list_cases(study: Study, scene: Scene, method: Method) -> list[Case]:
     """Return the cases of one line, coarse to fine: step sizes, or tolerances of an adaptive method.
 
-    A method of first order has at most `most_first_order` step sizes.
+    Most game engines, which are in environments of their own, are of first order, so that such an engine has all step sizes.
+    More steps of any other method of first order are slow and still inaccurate.
     """
-    grids = step_ladder.steps(scene, method)[: most_first_order if method.order == 1 else None]
+    few = method.order == 1 and not isinstance(method, EngineMethod)
+    grids = step_ladder.steps(scene, method)[: step_ladder.LENGTH if few else None]
     tolerances = set(step_ladder.TOLERANCES)  # also if quick: an engine is fastest at one of them
     if setting := tolerance_setting(method):
         tolerances.add(getattr(method, setting))
@@ -59,4 +61,4 @@ def list_cases(study: Study, scene: Scene, method: Method, most_first_order: int
     return list_settings(case, grids[:: 2 if study.quick else 1], sorted(tolerances, reverse=True))
 
 
-STUDY = Declaration(findings, timed=True, in_turn=True)
+STUDY = Declaration(findings, named=True, timed=True, in_turn=True)

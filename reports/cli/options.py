@@ -68,13 +68,13 @@ class OldName(click.ClickException):
         super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
 
 
-class GoneOption(click.ClickException):
-    """An option that is gone, in the table `REMOVED`."""
+class Gone(click.ClickException):
+    """An option or a study that is gone, in the table `REMOVED`."""
 
     exit_code = 2
 
-    def __init__(self, option: str) -> None:
-        super().__init__(f"{option} is gone. {REMOVED[option]}")
+    def __init__(self, name: str) -> None:
+        super().__init__(f"{name} is gone. {REMOVED[name]}")
 
 
 class Command(click.Command):
@@ -95,7 +95,7 @@ class Command(click.Command):
             if name.startswith("-") and f"{self.name} {name}" in OLD_NAMES and not ctx.resilient_parsing:
                 raise OldName(f"{self.name} {name}", [*args[:i], *args[i + 1 :]])
             if f"{self.name} {name}" in REMOVED and not ctx.resilient_parsing:
-                raise GoneOption(f"{self.name} {name}")
+                raise Gone(f"{self.name} {name}")
             if name in new and not ctx.resilient_parsing:  # as in completion
                 click.echo(f"{name} is now {new[name]}; the old name works until the next release.", err=True)
                 args = [*args[:i], "=".join([new[name], *value]), *args[i + 1 :]]

@@ -8,12 +8,13 @@ from typing import Any
 
 import click
 
-from conservative.errors import require_extra
+from conservative.errors import REMOVED, require_extra
 
 from . import completion
 from .options import (
     FAILED,
     OLD_NAMES,
+    Gone,
     OldName,
     Output,
     OutputCommand,
@@ -55,7 +56,7 @@ class StudyCommand(OutputCommand):
         "conservative study random --bodies 5 --methods projected,gauss,heyoka --csv rows.csv",
         "conservative study throughput --sizes 1,1000,1e6 --time-limit 5",
         "conservative study convergence --scenes lagrange_top --methods reduced,gauss --json",
-        "conservative study engines_at_one_step --engines all --out one_step",
+        "conservative study paper --methods reduced --engines all --out at_one_step",
         "conservative study hard_cases --scheduler tcp://10.0.0.7:8786",
     ),
 )
@@ -110,6 +111,8 @@ def study(
 
     if (old := f"study {name}") in OLD_NAMES:
         raise OldName(old, [*split_names("methods", methods), *split_list("engines", engines)])
+    if old in REMOVED:
+        raise Gone(old)
     with output_files(out, FILES, csv=csv, markdown=markdown) as write:
         planned = plan_study(
             name,

@@ -111,6 +111,11 @@ def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.Da
     return rows if scene is None else rows[rows["scene"] == scene]
 
 
+def at_own_step(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a study at the scene's own step, which is the longest of each method."""
+    return rows[rows["dt"] == rows.groupby("method")["dt"].transform("max")]
+
+
 def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.DataFrame:
     """Return the rows of a measure, and of one quantity if it is a drift."""
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]

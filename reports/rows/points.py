@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import engines_over_steps, work_precision
+from conservative.benchmarks.studies import work_precision
 from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
@@ -70,14 +70,6 @@ def pooled(timed: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     wide = timed.assign(process=timed["process"].fillna(0)).pivot_table(index=keys, columns="process", values="value")
     times = pd.Series([tuple(row) for row in wide.to_numpy()], dtype=object)
     return wide.index.to_frame(index=False).assign(time=np.exp(np.log(wide).mean(axis=1)).to_numpy(), times=times)
-
-
-def all_points(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of the work-precision study, and the points that only the study of engines has."""
-    ours, engines = points(table), points(table, engines_over_steps.STUDY.name)
-    known = set(zip(ours["scene"], ours["name"], strict=True))
-    new = [key not in known for key in zip(engines["scene"], engines["name"], strict=True)]
-    return pd.concat([ours, engines[new]], ignore_index=True) if any(new) else ours
 
 
 def front(points: pd.DataFrame) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from conservative.benchmarks.measures.processes import PROCESSES
 from conservative.benchmarks.studies import engine_selection, selection
-from conservative.benchmarks.studies.declaration import Declaration, Extent, Named
+from conservative.benchmarks.studies.declaration import Declaration, Extent
 from conservative.benchmarks.studies.studies import STUDIES
 from conservative.benchmarks.studies.study import Study, remember_truths
 from conservative.method import Method
@@ -48,7 +48,7 @@ seconds after the installation, mostly to compile kernels, and a further method 
 class Plan:
     """The plan of a report: what is compared, and the studies in the order of measurement.
 
-    Engines have studies and a section of their own, and are verified if `verified`. `named` are the methods that the user
+    Engines have a section of their own, and are verified if `verified`. `named` are the methods that the user
     named. `bodies` is the number of random bodies in each field, `seed` their seed. `arguments` are the texts from which
     commands make the scenes, such as their files, by the names of the scenes.
     """
@@ -137,18 +137,16 @@ def plan_report(
         """Return the methods of a study; none if the report does not have it."""
         if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
             return ()
-        if each.named is Named.ONLY:
-            return named
         if each.draw and few:
             return tuple(method for method in compared if method.name in FEW_METHODS)
         mine = every if each.draw else compared
-        return each.in_report((*mine, *named) if each.named is Named.TOO else mine)
+        return each.in_report(tuple(dict.fromkeys((*mine, *named))) if each.named else mine)
 
     made: list[Study] = []
     for each in STUDIES.values():
         if not (taken := methods_of(each)):
             continue
-        limit = kind.time_limit if time_limit is None and each.named is not Named.ONLY else time_limit
+        limit = kind.time_limit if time_limit is None and not (named and each.named) else time_limit
         extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if each.draw else shared
         settings = {"quick": quick or (few and each.draw is not None), "time_limit": limit, **extent, **dict(each.more)}
         study = each.plan(taken, () if each.scenes else chosen, kind.processes, **settings)

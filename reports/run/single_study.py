@@ -8,7 +8,7 @@ from typing import Any
 
 from conservative.benchmarks.measures.processes import PROCESSES, QUICK_PROCESSES
 from conservative.benchmarks.studies import engine_selection, on_cluster, selection, studies
-from conservative.benchmarks.studies.declaration import Declaration, Named
+from conservative.benchmarks.studies.declaration import Declaration
 from conservative.benchmarks.studies.study import Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
@@ -46,12 +46,9 @@ def plan_study(
     _require_options(declared, {option: value for option, value in given.items() if value not in (None, (), [])})
     counts = tuple(read_count("sizes", size) for size in sizes)
     extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
-    if declared.named is Named.ONLY and not methods:
-        compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
-    else:
-        ours = selection.methods(methods or None, skip_missing, declared.settings)
-        others = declared.of_engines(engine_selection.select_engines(engines, skip_missing)) if engines else ()
-        compared = tuple(dict.fromkeys((*ours, *others)))
+    ours = selection.methods(methods or None, skip_missing, declared.settings)
+    others = declared.of_engines(engine_selection.select_engines(engines, skip_missing)) if engines else ()
+    compared = tuple(dict.fromkeys((*ours, *others)))
     settings = {"quick": quick, "skip_missing": skip_missing, "time_limit": time_limit, **extent}
     processes = QUICK_PROCESSES if quick else PROCESSES
     return declared.plan(compared, selection.scenes(scenes) if scenes else (), processes, **settings)
@@ -61,9 +58,8 @@ def _require_options(declared: Declaration, given: Mapping[str, Any]) -> None:
     """Raise `BadInput` if an option is given that the study does not have."""
     for option, value in given.items():
         if option not in declared.options:
-            own = [*declared.options, *(["engines"] if declared.named is Named.ONLY else [])]
             text = ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
-            allowed = f"nothing: the study {declared.name!r} has no {option}; it has {', '.join(own)}"
+            allowed = f"nothing: the study {declared.name!r} has no {option}; it has {', '.join(declared.options)}"
             raise BadInput(option, text, allowed)
 
 

@@ -18,7 +18,7 @@ from conservative.scene import Scene
 from ..document.cells import DASH, angle, bound, factor, number, outcome_cell, tolerance
 from ..document.model import Row, Table
 from ..rows import lines
-from ..rows.names import ABSENT, display_name, largest_drifts, of_measure, of_study, outcomes, without_outcome
+from ..rows.names import ABSENT, at_own_step, display_name, largest_drifts, of_measure, of_study, outcomes, without_outcome
 from .summary import MIDDLE
 
 HEADER = ("attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
@@ -59,7 +59,7 @@ def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
     accuracy = of_study(table, paper.STUDY.name, scene.name)
     accuracy = accuracy[accuracy["role"] != Role.TRUTH.value]
     accuracy = accuracy if named else without_outcome(accuracy, *ABSENT)
-    accuracy = accuracy[accuracy["dt"] == accuracy.groupby("method")["dt"].transform("max")]
+    accuracy = at_own_step(accuracy)
     reached = costs(points, [MIDDLE], ["series"]).set_index("series")["time"]
     orders = lines.orders(of_study(table, convergence.STUDY.name, scene.name))
     timed = of_study(table, speed.STUDY.name, scene.name)

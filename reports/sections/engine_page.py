@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Sequence
 from functools import partial
 
-from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
+from conservative.benchmarks.studies.paper import AS_INSTALLED
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.kind import version_key
 from conservative.version import VERSION
@@ -16,9 +16,8 @@ from conservative.version import VERSION
 from ..document.attempt import attempt
 from ..document.cells import DASH, angle
 from ..document.model import Block, Document, Emphasis, Item, Items, Paragraph, Row, Section, Table
-from ..rows.points import points as points_over
 from . import verified_engines
-from .engines import AT_ITS_BEST, ONE_STEP, OVER_STEPS, EngineRow, chosen, comparison_cells, engine_rows
+from .engines import AT_ITS_BEST, EngineRow, chosen, comparison_cells, engine_rows
 from .measured import Measured
 
 COLUMNS = ("error, rad", "energy drift", "world momentum drift", "axial momentum drift", "turns over")
@@ -44,9 +43,7 @@ def file_name(engine: str) -> str:
 
 def pages(measured: Measured) -> dict[str, Document]:
     """Return the page of each engine that the report names, by the name of its file without an ending."""
-    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
-    points = points_over(table, OVER_STEPS)
-    scenes = {scene.name: engine_rows(table, scene.name, points) for scene in measured.plan.scenes}
+    scenes = {scene.name: engine_rows(measured, scene.name) for scene in measured.plan.scenes}
     measured_ones = dict.fromkeys((row.family, row.version) for rows in scenes.values() for row in rows)
     families: dict[str, list[str]] = {}
     for family, version in sorted(measured_ones, key=lambda engine: version_key(engine[1]), reverse=True):

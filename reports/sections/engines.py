@@ -13,22 +13,25 @@ from conservative.benchmarks.measures.convergence_order import grows_with_shorte
 from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.speed_ratio import cost
-from conservative.benchmarks.studies import engines_at_one_step, engines_over_steps
-from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
-from conservative.benchmarks.studies.engines_over_steps import WORSE
+from conservative.benchmarks.studies import convergence, paper, speed, work_precision
+from conservative.benchmarks.studies.paper import AS_INSTALLED
 from conservative.benchmarks.studies.selection import Missing
 from conservative.invariants import AXIAL_MOMENTUM, MOMENTA
+from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, angle, bound, grade, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
-from ..rows.names import ABSENT, of_measure, of_study, outcomes, with_outcome
-from ..rows.points import points as points_over
+from ..rows.names import ABSENT, at_own_step, of_measure, of_study, outcomes, with_outcome
 from .measured import Measured, of_scene
 from .provenance import lock_sections
 
-ONE_STEP, OVER_STEPS = engines_at_one_step.STUDY.name, engines_over_steps.STUDY.name
+STUDIES = tuple(each.STUDY.name for each in (paper, convergence, speed, work_precision))
+WORSE = "worse with smaller steps"
+"""Said of an order that does not exist, because the error increases as steps get shorter."""
+SAME_MOTION = 1.0
+"""Largest attitude error, rad, of a run that is compared by its time. A run with a larger error is another motion."""
 USABLE = 0.1
 """Largest attitude error over the run, rad, of a usable step."""
 ERROR = 1e-3
@@ -106,8 +109,6 @@ class EngineRow:
 
 def section(measured: Measured) -> Section:
     """Return the section of the engines that the report names."""
-    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
-    points = points_over(table, OVER_STEPS)
     words = (
         "Engines in their own environments, and those installed with this package. Each runs in its own loop and "
         "process, one process at a time. At its best: the setting with the smallest error at the scene's step. As "
@@ -116,7 +117,7 @@ def section(measured: Measured) -> Section:
     columns = Items([Item(meaning, name) for name, meaning in COLUMNS])
     blocks: list[Block] = [Paragraph(words)]
     for scene in measured.plan.scenes:
-        rows, name, dt = engine_rows(table, scene.name, points), scene.name, f"{scene.dt:g}"
+        rows, name, dt = engine_rows(measured, scene.name), scene.name, f"{scene.dt:g}"
         if rows:
             about = (
                 f"{scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
@@ -124,21 +125,19 @@ def section(measured: Measured) -> Section:
             )
             sides: list[Block] = [Paragraph(about), side_by_side(rows, name)]
             blocks.append(Section(f"{name}: as installed, and at its best", sides, source={"scene": name}))
-            drawn = picture_points(rows, of_scene(points, name))
+            drawn = picture_points(rows, of_scene(measured.points, name))
             none = Paragraph("No run was close enough to the motion to be timed.")
             blocks.append(Section(f"{name}: work against precision", [figure(drawn, name) if len(drawn) else none]))
         blocks.append(Section(f"{name}: every setting", [every_setting(rows, dt, name)], source={"scene": name}))
     blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
-    return Section("Engines", blocks, "engines", source={"study": (ONE_STEP, OVER_STEPS)})
+    return Section("Engines", blocks, "engines", source={"study": STUDIES, "role": Role.ENGINE.value})
 
 
 def tables(measured: Measured) -> list[Table]:
     """Return the table of engines for each scene, `side_by_side`; none if the report names no engines."""
-    table = measured.rows[measured.rows["study"].isin((ONE_STEP, OVER_STEPS))]
-    points = points_over(table, OVER_STEPS)
     scenes = [scene.name for scene in measured.plan.scenes] if measured.plan.engines else []
-    return [side_by_side(engine_rows(table, scene, points), scene) for scene in scenes]
+    return [side_by_side(engine_rows(measured, scene), scene) for scene in scenes]
 
 
 def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFrame:
@@ -147,6 +146,7 @@ def picture_points(rows: Sequence[EngineRow], points: pd.DataFrame) -> pd.DataFr
     Columns name (engine with version), kind (as installed, or at its best), setting, dt (s), error (rad), time (s per simulated
     second), times (of each process).
     """
+    points = points[points["error"] <= SAME_MOTION]
     parts = [
         points[points["series"] == row.series].assign(name=row.engine, kind=AT_ITS_BEST if row.best else AS_INSTALLED)
         for row in rows
@@ -178,20 +178,20 @@ def _versions(measured: Measured) -> Table:
     return Table(["engine", "runs", "runtime", "packages"], [*apart, *here], "Engines of this section")
 
 
-def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[EngineRow]:
-    """Return the measurements of engines on a scene, accurate ones first, those that did not run last.
-
-    `table` contains the named rows of the studies of engines, `points` their `rows.points.points`.
-    """
-    at_step, over_steps = of_study(table, ONE_STEP, scene), of_study(table, OVER_STEPS, scene)
+def engine_rows(measured: Measured, scene: str) -> list[EngineRow]:
+    """Return the measurements of engines on a scene, accurate ones first, those that did not run last."""
+    accuracy, times, over_steps = (
+        of_study(measured.engine_rows, each.STUDY.name, scene) for each in (paper, speed, convergence)
+    )
+    at_step, points = pd.concat([at_own_step(accuracy), times]), of_scene(measured.points, scene)
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}
-    timed = {str(name): rows for name, rows in points[points["scene"] == scene].groupby("series", sort=False)}
-    measured = [_engine_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
+    timed = {str(name): rows for name, rows in points[points["error"] <= SAME_MOTION].groupby("series", sort=False)}
+    rows = [_engine_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
     best: dict[str, EngineRow] = {}  # of each engine: the smallest error, then the shortest time
-    known = (row for row in measured if not math.isnan(row.error))
+    known = (row for row in rows if not math.isnan(row.error))
     for row in sorted(known, key=lambda row: (row.error, math.isnan(row.second_time), row.second_time)):
         best.setdefault(row.engine, row)
-    marked = [replace(row, best=best.get(row.engine) is row) for row in measured]
+    marked = [replace(row, best=best.get(row.engine) is row) for row in rows]
     return sorted(marked, key=lambda row: (math.isnan(row.error), not row.outcome.ok, row.error, row.label))
 
 

@@ -15,7 +15,7 @@ from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outco
 
 
 def section(table: pd.DataFrame) -> Section:
-    """Return the section of the rows of a report that are not apart (see `Measured.scene_rows`)."""
+    """Return the section of the rows of a report that are not apart (see `Measured.together`)."""
     words = (
         "Runs that did not reach their end, and runs that were skipped, such as those that would have exceeded `--time-limit`. "
         "Errors are relative to a reference solution that a second, independent one confirms."

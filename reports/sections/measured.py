@@ -45,15 +45,26 @@ class Measured:
         return with_names(self.measurements.samples)
 
     @cached_property
-    def scene_rows(self) -> pd.DataFrame:
+    def together(self) -> pd.DataFrame:
         """The rows of the studies that compare methods on scenes, without those that have a section of their own."""
-        together = [name for name, each in STUDIES.items() if not each.apart]
-        return self.rows[self.rows["study"].isin(together)].reset_index(drop=True)
+        names = [name for name, each in STUDIES.items() if not each.apart]
+        return self.rows[self.rows["study"].isin(names)].reset_index(drop=True)
+
+    @cached_property
+    def scene_rows(self) -> pd.DataFrame:
+        """These rows without the engines that the report compares in the section of engines only."""
+        engines = {method.name for method in self.plan.engines} - {method.name for method in self.plan.methods}
+        return self.together[~self.together["method"].isin(engines)].reset_index(drop=True)
+
+    @cached_property
+    def engine_rows(self) -> pd.DataFrame:
+        """The rows of the engines that the report names."""
+        return self.together[self.together["method"].isin([method.name for method in self.plan.engines])]
 
     @cached_property
     def points(self) -> pd.DataFrame:
         """Errors and times on the scenes (see `rows.points`), and the time per `sample`, s."""
-        every = points.all_points(self.rows)
+        every = points.points(self.rows)
         intervals = {scene.name: scene.t_end / SAMPLES for scene in self.plan.scenes}
         return every.assign(sample=every["time"] * every["scene"].map(intervals).astype(float))
 

@@ -82,7 +82,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
             details.append(replace(section, source={"study": name}) if isinstance(section, Section) else section)
     cases = part("hard cases", lambda: hard_cases.sections(measured.rows))
     details += [cases] if isinstance(cases, Paragraph) else cases
-    details.append(part("failures", lambda: failures.section(rows)))
+    details.append(part("failures", lambda: failures.section(measured.together)))
     paper = part("table for a paper", lambda: closing.paper_table(rows, points, plan.scenes)) if plan.latex else None
     if isinstance(paper, Paragraph):
         details.append(paper)
@@ -113,7 +113,7 @@ def brief(
 ) -> Iterator[Block]:
     """Yield what the terminal shows: a table of each scene, and sentences."""
     for scene in measured.plan.scenes:
-        table = partial(closing.scene_table, measured.rows, points[scene.name], scene, bool(measured.plan.named))
+        table = partial(closing.scene_table, measured.scene_rows, points[scene.name], scene, bool(measured.plan.named))
         yield attempt(f"The table of {scene.name}", table)
     yield Paragraph(f"{closing.LEGEND}\n")
     tables = attempt("The tables of engines", lambda: engines.tables(measured))

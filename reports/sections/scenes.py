@@ -11,6 +11,7 @@ from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, each_step, long_runs, paper, speed, step_ladder, work_precision
 from conservative.deferred_imports import DEFAULT_METHOD
+from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from ..charts import figures, vega_embed
@@ -19,7 +20,7 @@ from ..document.attempt import attempt
 from ..document.cells import DASH, bound, grade, number, numeric, outcome_cell, size, tolerance
 from ..document.model import Block, Cell, Emphasis, Figure, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
-from ..rows.names import MethodClass, of_measure, of_study, outcomes
+from ..rows.names import MethodClass, at_own_step, of_measure, of_study, outcomes, with_outcome
 from ..rows.points import front
 from . import scene_ratios
 from .drift import drift_figure, spheres_figure
@@ -108,8 +109,7 @@ def convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> F
 
 def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
     """Return the values of a study at the scene's step: a row for each method, ours first, a column (measure, quantity)."""
-    rows = of_study(table, study, scene)
-    rows = rows[rows["dt"] == rows.groupby("method")["dt"].transform("max")]
+    rows = with_outcome(at_own_step(of_study(table, study, scene)), OutcomeKind.OK)
     return rows.pivot_table(index="name", columns=["measure", "quantity"], values="value", sort=False)
 
 

@@ -7,8 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.benchmarks.measures.errors import blanks, measure_drifts, measure_errors, secular_slope
-from conservative.benchmarks.studies.engines_at_one_step import count_turns_over
+from conservative.benchmarks.measures.errors import blanks, count_turns_over, measure_drifts, measure_errors, secular_slope
 from conservative.errors import BadInput
 from conservative.references.exact.method import Exact
 from conservative.trajectory import Trajectory

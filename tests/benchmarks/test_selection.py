@@ -140,7 +140,7 @@ def test_a_missing_engine_is_a_row_if_requested():
     (selected,) = select_engines(["exudyn==1.2.3"], skip_missing=True)
     assert isinstance(selected, Missing)
     assert selected.label == "exudyn@1.2.3"
-    case = Case("engines_at_one_step", SCENE, selected, grid_for(SCENE, 0.02))
+    case = Case("paper", SCENE, selected, grid_for(SCENE, 0.02))
     outcome = attempt(case, skip_missing=True)
     assert outcome.kind is OutcomeKind.MISSING
     assert outcome.reason.endswith("conservative engines install exudyn@1.2.3")

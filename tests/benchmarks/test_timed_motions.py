@@ -140,7 +140,7 @@ def test_a_run_that_ends_elsewhere_is_not_timed(name):
 
 
 def test_versions_of_an_engine_are_timed_over_the_scene():
-    study = Study("engines_at_one_step", (SCENE,), METHODS)
+    study = Study("speed", (SCENE,), METHODS)
     engine.time_versions(study, SCENE, dict(zip("12", METHODS, strict=True)))
     check()
     assert_over(SCENE.t_end)

@@ -16,7 +16,7 @@ import conservative as cv
 from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.timing import time_interleaved
-from conservative.benchmarks.studies import engines_at_one_step, studies, study
+from conservative.benchmarks.studies import studies, study
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
@@ -28,7 +28,7 @@ from conservative.references.environments.environment import worker_of
 from conservative.references.worker import client
 from conservative.references.worker.client import EngineCrashed, Worker, time_limit
 
-from ..declared import ENGINES
+from ..declared import NAMED
 from ..environments import PATIENCE, run_python, wait_until
 from ..sampling import sampled
 from . import trial
@@ -239,6 +239,7 @@ def test_a_kill_in_a_preparation_is_an_outcome(trial_cache, first_preparation_is
     assert cv.integrate(SCENE, 0.01, Trial()).ok
 
 
+TIMED = tuple(name for name in NAMED if studies.STUDIES[name].timed)
 ENDS = {
     "segfault": OutcomeKind.CRASHED,
     "hang": OutcomeKind.TIMEOUT,
@@ -251,7 +252,7 @@ ENDS = {
 def short_limits(monkeypatch):
     """Limits that only the engine that hangs can reach: the others have all the time that a busy machine needs."""
     monkeypatch.setattr(study, "HANG_LIMIT", 2.0)
-    monkeypatch.setattr(engines_at_one_step, "FIRST_LIMIT", 2.0)
+    monkeypatch.setattr(study, "ENGINE_LIMIT", 2.0)
     prepared, ask = {}, Worker.ask
 
     def ask_within(self, do, **values):
@@ -267,7 +268,7 @@ def rows(name, *methods):
 
 
 @pytest.mark.usefixtures("short_limits")
-@pytest.mark.parametrize(("name", "do"), sampled(product(ENGINES, ENDS), 1))
+@pytest.mark.parametrize(("name", "do"), sampled(product(TIMED, ENDS), 2))
 def test_a_crash_or_a_hang_is_a_row(name, do):
     table = rows(name, Trial(do), registry.method("pinocchio"), Trial())
     measured = [row for row in table if row.measure in (Measure.ATTITUDE_MAX, Measure.TIME)]

@@ -9,8 +9,10 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Samples
 from conservative.benchmarks.studies import studies
-from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
+from conservative.benchmarks.studies.paper import AS_INSTALLED
+from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.study import Study
+from conservative.errors import MissingEngine
 from conservative.method import Role
 from conservative.outcome import OK
 from conservative.reports.run.measure import Measurements
@@ -80,13 +82,12 @@ def at_step(engine, setting, error, **facts):
     }
     known = {Measure.PRECISION: facts.get("bits", 64), Measure.ORDER_EXPECTED: facts.get("expected", 4)}
     detail = AS_INSTALLED if facts.get("as_installed") else ""
-    found = [
-        _row(engine, setting, measure, value, 0.01, "engines_at_one_step", detail=detail) for measure, value in known.items()
-    ]
+    found = [_row("paper", engine, setting, measure, value, 0.01, detail=detail) for measure, value in known.items()]
     for measure, value in values.items():
         shown = value if outcome == OK else math.nan
         said = facts.get("direction", "lost") if measure == "energy drift max" else ""
-        found.append(_row(engine, setting, measure, shown, 0.01, "engines_at_one_step", outcome=outcome, detail=said))
+        study = "speed" if measure in (Measure.TIME, Measure.TIME_PER_STEP) else "paper"
+        found.append(_row(study, engine, setting, measure, shown, 0.01, outcome=outcome, detail=said))
     return found
 
 
@@ -94,14 +95,20 @@ def over_steps(engine, setting, errors, order, **fields):
     """Errors and times of one setting over `STEPS`, and the order that was seen."""
     found = []
     for dt, error in zip(STEPS, errors, strict=True):
-        found.append(_row(engine, setting, Measure.ATTITUDE_MAX, error, dt))
-        found.append(_row(engine, setting, Measure.TIME, 1e-6 / dt, dt))
+        found += [_row(study, engine, setting, Measure.ATTITUDE_MAX, error, dt) for study in ("convergence", "work_precision")]
+        found.append(_row("work_precision", engine, setting, Measure.TIME, 1e-6 / dt, dt))
     for measure, value in ((Measure.ORDER, order), (Measure.ORDER_STDERR, 0.01)):
-        found.append(_row(engine, setting, measure, value, math.nan, **fields))
+        found.append(_row("convergence", engine, setting, measure, value, math.nan, **fields))
     return found
 
 
-def _row(engine, setting, measure, value, dt, study="engines_over_steps", **fields):
+def named(*groups):
+    """The engines of rows, to be named in a plan. They cannot run."""
+    names = dict.fromkeys(row.method for row in (row for group in groups for row in group) if row.role == Role.ENGINE)
+    return tuple(Missing(name, error=MissingEngine(name, name)) for name in names)
+
+
+def _row(study, engine, setting, measure, value, dt, **fields):
     family, _, version = engine.partition("==")
     names = {"family": family, "engine": family.partition("@")[0], "version": version, "setting": setting}
     names |= {"label": f"{engine}/{setting}", "role": "engine"}

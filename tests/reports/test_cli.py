@@ -291,6 +291,8 @@ def test_samples_as_csv_equal_the_table_and_replace_their_own_file(tmp_path):
         (["study", "random", "--latex=a"], "study --latex"),
         (["run", "brick_flip", "--picture", "a.pdf"], ".pdf"),
         (["watch", "brick_flip", "--out", "a.mp4"], ".mp4"),
+        (["study", "engines_at_one_step", "--engines", "all"], "study engines_at_one_step"),
+        (["study", "engines_over_steps", "--engines", "mujoco"], "study engines_over_steps"),
     ],
 )
 def test_what_is_gone_is_answered_with_what_to_do(arguments, name, tmp_path, monkeypatch):

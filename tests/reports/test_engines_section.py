@@ -1,24 +1,27 @@
 """The section of engines, on made-up measurements with known tables and pictures."""
 
 import math
+from functools import cache
 
 import pytest
 
 from conservative import BadInput, MissingEngine, registry
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.speed_ratio import cheapest, costs
-from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.document.model import Grade
 from conservative.reports.rows.names import OF_ENGINES, of_classes
-from conservative.reports.rows.points import all_points, points
 from conservative.reports.run.checkpoint import differences, terms
-from conservative.reports.run.plan import plan_report
+from conservative.reports.run.measure import Measurements
+from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.sections.engines import OVER_STEPS, engine_rows, every_setting, figure, picture_points, side_by_side
+from conservative.reports.sections.engines import WORSE, engine_rows, every_setting, figure, picture_points, side_by_side
+from conservative.reports.sections.measured import Measured
 
-from ..declared import ENGINES
-from .made_up import SCENE, STEPS, at_step, over_steps
-from .rows import point, table
+from ..declared import NAMED
+from .made_up import SCENE, STEPS, at_step, named, over_steps
+from .rows import point, row
 
 NO_ORDER = Outcome(OutcomeKind.NO_ORDER, WORSE)
 CRASHED = Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")
@@ -26,8 +29,16 @@ REFUSED = Outcome(OutcomeKind.UNSUPPORTED, "its adapter has free bodies")
 GOOD, POOR, WRONG, SINGLE = "a==1/RK4", "a==1/Euler", "b==2/RK4", "c==3/default"
 
 
+def measured_with(*groups, engines=None):
+    """Rows of a report on the scene, whose engines are named."""
+    rows = [row for group in groups for row in group]
+    plan = Plan((registry.scene(SCENE),), (registry.method("reduced"),), (), named(rows) if engines is None else engines)
+    return Measured(plan, Measurements(measurement.frame(rows), measurement.samples_frame([])), provenance([]))
+
+
+@cache
 def measured():
-    return table(
+    return measured_with(
         at_step("a==1", "Euler", 3.0, as_installed=True, energy=0.22, direction="gained", turns=3, expected=1),
         over_steps("a==1", "Euler", (3.0, 3.0, 2.0, 1.0), 1.0),
         at_step("a==1", "RK4", 1e-6),
@@ -44,8 +55,7 @@ def measured():
 
 @pytest.fixture(scope="module")
 def rows():
-    found = measured()
-    return {row.label: row for row in engine_rows(found, SCENE, points(found, OVER_STEPS))}
+    return {row.label: row for row in engine_rows(measured(), SCENE)}
 
 
 @pytest.fixture(scope="module")
@@ -109,20 +119,29 @@ def test_an_engine_as_installed_is_compared_with_its_best(rows):
 
 
 def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend(rows):
-    drawn = picture_points(list(rows.values()), points(measured(), OVER_STEPS))
+    drawn = picture_points(list(rows.values()), measured().points)
     lines = {tuple(line) for line in drawn[["name", "kind"]].itertuples(index=False)}
     assert lines == {("a==1", "at its best"), ("a==1", "as installed"), ("b==2", "at its best"), ("c==3", "at its best")}
     assert [entry.name for entry in figure(drawn, SCENE).legend] == ["a==1", "b==2", "c==3"]
 
 
-def test_a_plan_has_studies_of_engines_only_where_some_are_named():
+def test_engines_that_are_named_are_methods_of_the_studies_of_scenes():
     without = plan_report([SCENE], ["reduced"], quick=True)
-    named = plan_report([SCENE], ["reduced"], quick=True, engines=["pinocchio"])
-    assert not set(without.names) & set(ENGINES)
-    assert set(named.names) - set(without.names) == set(ENGINES)
-    assert (without.verified, named.verified) == (False, False)  # scenes are named
-    assert {method.family for study in named.studies if study.name in ENGINES for method in study.methods} == {"pinocchio"}
-    assert registry.method("pinocchio") not in named.methods
+    planned = plan_report([SCENE], ["reduced", "pinocchio:RK4"], quick=True, engines=["pinocchio"])
+    assert planned.names == without.names
+    assert (without.verified, planned.verified) == (False, False)  # scenes are named
+    for study in planned.studies:
+        others = set(planned.engines) if study.name in NAMED else set()
+        assert len(study.methods) == len(set(study.methods))
+        assert set(study.methods) == {*planned.methods, *others}
+    assert registry.method("pinocchio:Euler") not in planned.methods
+
+
+def test_rows_of_the_section_of_engines_are_not_in_the_tables_of_scenes():
+    both = measured_with(at_step("a==1", "RK4", 1e-6), [row("paper", "reduced", Measure.ATTITUDE_MAX, 1e-2, 0.01, scene=SCENE)])
+    assert set(both.engine_rows["method"]) == {"a@1:RK4"}
+    assert set(both.scene_rows["method"]) == {"reduced"}
+    assert set(both.together["method"]) == {"reduced", "a@1:RK4"}
 
 
 @pytest.mark.parametrize(("names", "error"), [(["exudin"], BadInput), (["mujoco==0.0.1"], MissingEngine)])
@@ -138,14 +157,12 @@ def test_unfinished_work_with_other_engines_is_not_gone_on_with():
     assert any(text.startswith("engines: pinocchio") for text in differences(terms(first, source), terms(second, source)))
 
 
-def test_the_verdict_counts_engines_that_only_their_own_studies_measured():
+def test_the_verdict_counts_engines_that_are_named():
     ours = [
         each
         for dt, error in ((0.1, 1e-4), (0.01, 1e-8))
         for each in point("reduced", "ours", error, 1e-5 / dt, dt, scene=SCENE)
     ]
-    found = table(ours, over_steps("a==1", "RK4", (1e-5, 1e-7, 1e-9, 1e-11), 4.0))
-    points = all_points(found)
+    points = measured_with(ours, over_steps("a==1", "RK4", (1e-5, 1e-7, 1e-9, 1e-11), 4.0)).points
     assert set(points["name"]) == {"reduced", "a 1 RK4"}
     assert cheapest(of_classes(costs(points, [1e-6]), *OF_ENGINES)).name == "a 1 RK4"
-    assert len(all_points(table(ours))) == 2

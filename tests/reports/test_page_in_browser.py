@@ -23,7 +23,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.sections.report import build
 
 from ..environments import PATIENCE
-from .made_up import at_step, over_steps
+from .made_up import at_step, named, over_steps
 
 pytestmark = pytest.mark.browser
 
@@ -326,7 +326,7 @@ def engines_page(tmp_path_factory):
         *at_step("a==1", "Euler", 3.0, as_installed=True),
         *at_step("b==2", "Euler", 0.2),
     ]
-    plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
+    plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=named(rows))
     document = build(plan, Measurements(measurement.frame(rows), measurement.samples_frame([])), provenance([]))
     file = tmp_path_factory.mktemp("page") / "index.html"
     file.write_text(html.render(document), encoding="utf-8")

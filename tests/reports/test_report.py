@@ -25,7 +25,7 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import failures
 
-from ..declared import ENGINES, FULL, MAIN, ONLY
+from ..declared import FULL, MAIN
 from .made_up import measurements
 from .rows import frame, row
 
@@ -97,7 +97,7 @@ def test_the_table_for_a_paper_has_error_drift_order_and_time_of_each_scheme(mad
 def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_everything():
     default, full = plan_report(), plan_report(full=True)
     assert default.names == ("random", *MAIN)
-    assert set(full.names) == set(studies.STUDIES) - set(ONLY)
+    assert set(full.names) == set(studies.STUDIES)
     assert set(default.methods) < set(full.methods)
     left_out = {name for name, family in registry.list_families().items() if family.method_info.report == ()}
     assert {"exact", "textbook"} <= left_out
@@ -105,7 +105,7 @@ def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_every
     assert "textbook" in {method.family for method in full.methods}
     assert plan_report(bodies=2).names == ("random", *MAIN)
     assert plan_report(quick=True).names == plan_report(bodies=0).names == MAIN
-    assert plan_report(engines=["scipy"]).names == ("random", *MAIN, *ENGINES)
+    assert plan_report(engines=["scipy"]).names == ("random", *MAIN)
     assert plan_report(engines=["scipy"]).verified
     assert set(plan_report(["lagrange_top"], full=True).names) == set(FULL)
 

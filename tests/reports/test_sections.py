@@ -24,6 +24,7 @@ from conservative.reports.run.provenance import LockedEngine, provenance
 from conservative.reports.sections.report import build
 
 from .made_up import at_step, convergence, curves, measurements, over_steps
+from .made_up import named as engines_of
 from .rows import frame, parts, point, row
 from .rows import texts as texts_of
 
@@ -75,7 +76,7 @@ def test_building_and_rendering_integrates_nothing_and_starts_nothing(report, no
 def test_engines_and_locks_are_in_the_document(report, nothing_is_measured, tmp_path):
     plan, measured, source = report
     rows = [*at_step("exudyn==1.0", "RK44", 1e-6), *over_steps("exudyn==1.0", "RK44", (1e-1, 1e-2, 1e-3, 1e-4), 4.0)]
-    named = dataclasses.replace(plan, engines=(registry.method("pinocchio"),))
+    named = dataclasses.replace(plan, engines=(registry.method("pinocchio"), *engines_of(rows)))
     locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3", ("exudyn==1.0", "numpy==2.0")),))
     document = build(named, Measurements(measurement.frame(rows), measured.samples), locked)
     for text in texts(document, tmp_path):

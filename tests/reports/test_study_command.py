@@ -89,7 +89,6 @@ def test_any_other_study_shows_its_rows(tmp_path):
         (("random", "--sizes", "3"), "sizes"),
         (("throughput", "--sizes", "1,half"), "sizes"),
         (("throughput", "--scenes", "brick_flip"), "scenes"),
-        (("engines_at_one_step", "--methods", "reduced"), "methods"),
         (("random", "--methods", "nonsense"), "method"),
     ],
 )
