@@ -1,4 +1,4 @@
-"""Engines and settings of the studies of engines."""
+"""Engines that are named for a report or a study, and their settings."""
 
 from __future__ import annotations
 

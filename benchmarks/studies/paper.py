@@ -17,7 +17,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures import errors
-from ..measures.measure import Measure, Value, blanks
+from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from .case import Case, Success
 from .declaration import Declaration
@@ -28,7 +28,6 @@ FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
 AS_INSTALLED = "as installed"
 """Detail of the precision of an engine as installed."""
-TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
 APPROXIMATE = "approximate"
 """Detail of the agreement of a reference solution that is not known more accurately."""
 
@@ -115,15 +114,16 @@ def describe(case: Case, done: Success | Outcome) -> list[Measurement]:
 
 
 def count_turns(case: Case, done: Success | Outcome, truths: Mapping[Grid, Trajectory | Outcome]) -> list[Measurement]:
-    """Return how often a free body turned over, and how often in the exact motion; without values if one of them is missing."""
+    """Return how often a free body turned over, and how often in the exact motion; without a value for a motion that failed."""
     if not case.scene.free:
         return []
-    if isinstance(done, Outcome):
-        return case.rows(blanks(*TURNS), done)
-    if isinstance(truth := truths[case.grid], Outcome):
-        return case.rows(blanks(*TURNS), truth)
-    counts = (errors.count_turns_over(trajectory) for trajectory in (done.trajectory, truth))
-    return case.rows(map(Value, TURNS, map(float, counts)))
+    motions = (done, done) if isinstance(done, Outcome) else (done.trajectory, truths[case.grid])
+    return [
+        case.row(Value(measure, math.nan), motion)
+        if isinstance(motion, Outcome)
+        else case.row(Value(measure, float(errors.count_turns_over(motion))))
+        for measure, motion in zip((Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE), motions, strict=True)
+    ]
 
 
 STUDY = Declaration(findings, named=True)

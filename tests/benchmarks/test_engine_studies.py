@@ -1,4 +1,4 @@
-"""The studies of engines on the brick; the failure of an engine affects only its own rows."""
+"""Engines in the studies of all methods, on the brick; the failure of an engine affects only its own rows."""
 
 import math
 from functools import cache
@@ -70,7 +70,8 @@ def test_a_body_in_a_field_has_no_turns_over():
 @pytest.mark.parametrize("name", declared.NAMED)
 def test_a_failing_engine_costs_its_own_rows_only(name):
     broken = (Broken("raises"), Broken("unsupported"))
-    measured = studied(name, (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5))
+    methods, scene = (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5)
+    measured = studied(name, methods, scene, time_limit=PATIENCE)
     for method, kind in zip(broken, (OutcomeKind.CRASHED, OutcomeKind.UNSUPPORTED), strict=True):
         kinds = {row.outcome.kind for row in measured if row.method == method.name}
         assert kind in kinds
@@ -101,7 +102,7 @@ def test_a_slow_engine_in_its_environment_is_timed_over_its_first_steps(monkeypa
         assert value(measured, "pinocchio", Measure.TIME).detail.endswith(f" s, {steps} steps")
 
 
-@pytest.mark.parametrize(("slow", "most", "left"), [(math.inf, -1.0, 1), (-1.0, math.inf, 4), (math.inf, math.inf, 8)])
+@pytest.mark.parametrize(("slow", "most", "left"), [(math.inf, 0.0, 1), (0.0, math.inf, 4), (math.inf, math.inf, 8)])
 def test_an_engine_with_expensive_preparation_has_fewer_steps(slow, most, left, monkeypatch):
     is_elsewhere(monkeypatch)
     monkeypatch.setattr(line, "SLOW_PREPARATION", slow)

@@ -125,7 +125,7 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     )
     mine = [row for row in measured if row.method == Harmful("hang").name]
     assert {row.outcome.kind for row in mine} <= {OutcomeKind.TIMEOUT, OutcomeKind.SKIPPED, OutcomeKind.NO_ORDER}
-    assert all(math.isnan(row.value) for row in mine)
+    assert all(math.isnan(row.value) for row in mine if row.measure not in (Measure.PRECISION, Measure.ORDER_EXPECTED))
     assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine)
     assert any(row.outcome.ok for row in measured if row.method == "reduced")
 
