@@ -227,8 +227,8 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     real difference appears again.
     """
     grid = keep_end(grid_for(scene, scene.dt))
-    cases = {version: shorten(study, Case(study.name, scene, method, grid)) for version, method in methods.items()}
-    tried = {version: study.attempt_here(case) for version, case in cases.items()}
+    cases = {version: Case(study.name, scene, method, grid) for version, method in methods.items()}
+    tried = {version: study.attempt_here(shorten(study, case, study.expected_cost(case))) for version, case in cases.items()}
     ready = {version: done for version, done in tried.items() if not isinstance(done, Outcome)}
     times = _repeat(study, ready, range(REPEATS))
     if any(ratio(was, now).direction(TIME_FACTOR) for was, now in pairwise(times.values())):

@@ -19,7 +19,7 @@ from conservative.reports.run.verification import Verified
 from conservative.reports.sections import engine_page, verified_engines
 from conservative.reports.sections.measured import Measured
 
-from .made_up import at_step
+from .made_up import at_step, named
 
 
 def verified(version, setting, *verdicts):
@@ -43,7 +43,7 @@ def measured():
     ]
     right, wrong, _, not_tested = Verdict
     findings = verified("2", "Euler", wrong, right), verified("2", "RK4", right, right, not_tested, wrong)
-    plan = Plan((registry.scene("brick_flip"),), (), (), engines=(registry.method("pinocchio"),))
+    plan = Plan((registry.scene("brick_flip"),), (), (), engines=named(found))
     return Measured(plan, Measurements(measurement.frame(found), measurement.samples_frame([]), findings), provenance([]))
 
 
