@@ -22,7 +22,7 @@ from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
 from conservative.errors import MissingEngine, Unsupported
 from conservative.grid import grid_for
-from conservative.outcome import Outcome, OutcomeKind
+from conservative.outcome import OutcomeKind
 from conservative.references.environments import environment, folders
 from conservative.references.environments.environment import worker_of
 from conservative.references.worker import client
@@ -264,7 +264,7 @@ def short_limits(monkeypatch):
 
 
 def rows(name, *methods):
-    return list(studies.rows(Study(name, (SCENE,), methods, quick=True, time_limit=0.05)))
+    return list(studies.rows(Study(name, (SCENE.rename(SCENE.name),), methods, quick=True, time_limit=0.05)))
 
 
 @pytest.mark.usefixtures("short_limits")
@@ -291,9 +291,9 @@ def test_a_run_that_crashes_while_it_is_timed_is_marked():
 @pytest.mark.usefixtures("trial_registered")
 @pytest.mark.parametrize("within", [attempt_here, attempt_within])
 def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
-    outcome = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
-    assert isinstance(outcome, Outcome)
-    assert str(outcome) == "timeout (after 0.5 s)"
+    case = Case("test", SCENE.rename(SCENE.name), Trial("hang"), grid_for(SCENE, 0.01))
+    assert str(within(0.5, case)) == "timeout (after 0.5 s)"
+    assert within(0.5, case).reason == "a run of 50 steps was ended after 0.5 s"  # not tried again
 
 
 @pytest.mark.usefixtures("trial_registered")
