@@ -120,6 +120,7 @@ def test_an_engine_as_installed_is_compared_with_its_best(rows):
 
 def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend(rows):
     drawn = picture_points(list(rows.values()), measured().points)
+    assert drawn["error"].max() == 1.0  # beyond, it is another motion
     lines = {tuple(line) for line in drawn[["name", "kind"]].itertuples(index=False)}
     assert lines == {("a==1", "at its best"), ("a==1", "as installed"), ("b==2", "at its best"), ("c==3", "at its best")}
     assert [entry.name for entry in figure(drawn, SCENE).legend] == ["a==1", "b==2", "c==3"]

@@ -52,6 +52,7 @@ def test_drift_is_that_of_the_scenes_own_step():
     found = [row("paper", "energy drift max", 2e-16), row("paper", "energy drift max", 5e-16, dt=0.005)]
     found += [row("paper", "energy drift slope", 3e-18), row("paper", "energy drift slope stderr", 1e-18)]
     found += [row("paper", "orthonormality max", 4e-16)]
+    found += [row("paper", Measure.PRECISION, 64.0, method="mujoco", outcome=DIVERGED)]  # no row of a run that failed
     table = scenes.drift(frame(found), "made_up")
     assert table.header == ["method", "energy", "energy, 1/s", "orthonormality"]
     assert texts(table) == [["reduced", "2.0e-16", "3.0e-18 ± 1e-18", "4.0e-16"]]
