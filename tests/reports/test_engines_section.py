@@ -16,10 +16,17 @@ from conservative.reports.run.checkpoint import differences, terms
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.sections.engines import WORSE, engine_rows, every_setting, figure, picture_points, side_by_side
+from conservative.reports.sections.engines import (
+    STUDIES,
+    WORSE,
+    engine_rows,
+    every_setting,
+    figure,
+    picture_points,
+    side_by_side,
+)
 from conservative.reports.sections.measured import Measured
 
-from ..declared import NAMED
 from .made_up import SCENE, STEPS, at_step, named, over_steps
 from .rows import point, row
 
@@ -132,7 +139,7 @@ def test_engines_that_are_named_are_methods_of_the_studies_of_scenes():
     assert planned.names == without.names
     assert (without.verified, planned.verified) == (False, False)  # scenes are named
     for study in planned.studies:
-        others = set(planned.engines) if study.name in NAMED else set()
+        others = set(planned.engines) if study.name in (*STUDIES, "motion") else set()
         assert len(study.methods) == len(set(study.methods))
         assert set(study.methods) == {*planned.methods, *others}
     assert registry.method("pinocchio:Euler") not in planned.methods
