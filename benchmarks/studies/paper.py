@@ -26,6 +26,8 @@ from .study import Progress, Study, without_truth
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
+PROPERTIES = (Measure.PRECISION, Measure.ORDER_EXPECTED)
+"""Measures of a method itself, which have a value also if its run failed."""
 AS_INSTALLED = "as installed"
 """Detail of the precision of an engine as installed."""
 APPROXIMATE = "approximate"
@@ -109,7 +111,7 @@ def describe(case: Case, done: Success | Outcome) -> list[Measurement]:
     if isinstance(method, Missing):
         return []
     order = math.nan if method.order is None else float(method.order)
-    properties = (Value(Measure.PRECISION, float(bits_of(method))), Value(Measure.ORDER_EXPECTED, order))
+    properties = map(Value, PROPERTIES, (float(bits_of(method)), order))
     return case.rows(properties, outcome, AS_INSTALLED if method in method.settings_for("as_installed") else "")
 
 

@@ -34,8 +34,6 @@ KINDS = {
     "gives nothing": OutcomeKind.INVALID,
 }
 BROKEN = tuple(Broken(how) for how in KINDS)
-FACTS = (Measure.PRECISION, Measure.ORDER_EXPECTED)
-"""Properties of a method that do not depend on its runs."""
 CROSSING = [name for name in studies.STUDIES if name not in ("motion", "throughput", "long_time")]
 """Studies of any scene with a row for every method, also for failures. The others have their own tests."""
 
@@ -133,7 +131,7 @@ def test_nothing_is_dropped_silently(name):
         assert mine
         assert KINDS[broken.how] in {row.outcome.kind for row in mine}
         assert {row.outcome.kind for row in mine} <= {KINDS[broken.how], OutcomeKind.NO_ORDER}
-        assert all(math.isnan(row.value) for row in mine if row.measure not in FACTS)
+        assert all(math.isnan(row.value) for row in mine if row.measure not in PROPERTIES)
     missing = [row for row in measured if row.method == "mujoco"]
     assert missing
     assert all(row.outcome.kind is OutcomeKind.MISSING and math.isnan(row.value) for row in missing)

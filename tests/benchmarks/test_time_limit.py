@@ -14,6 +14,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import line, studies, study
 from conservative.benchmarks.studies.case import Case, Success, attempt
 from conservative.benchmarks.studies.line import FEWEST_POINTS, LINE_LIMIT, attempt_each
+from conservative.benchmarks.studies.paper import PROPERTIES
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
 from conservative.benchmarks.studies.work_precision import list_cases
@@ -125,7 +126,7 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     )
     mine = [row for row in measured if row.method == Harmful("hang").name]
     assert {row.outcome.kind for row in mine} <= {OutcomeKind.TIMEOUT, OutcomeKind.SKIPPED, OutcomeKind.NO_ORDER}
-    assert all(math.isnan(row.value) for row in mine if row.measure not in (Measure.PRECISION, Measure.ORDER_EXPECTED))
+    assert all(math.isnan(row.value) for row in mine if row.measure not in PROPERTIES)
     assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine)
     assert any(row.outcome.ok for row in measured if row.method == "reduced")
 
