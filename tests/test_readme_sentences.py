@@ -214,7 +214,7 @@ def columns(rows):
     """Each table has a column for each invariant of its scene."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for title, scene in (("brick", BRICK), ("top", TOP)):
-        names = " | ".join(each.name for each in scene.invariants)
+        names = " | ".join(invariant.name for invariant in scene.invariants)
         assert f"| {title} | drift of {names} | error, rad | time, µs |" in text
     return []
 
@@ -293,7 +293,7 @@ def named(sentence):
 
 
 def telling():
-    return [each for each in sentences() if TELLING.search(each)]
+    return [sentence for sentence in sentences() if TELLING.search(sentence)]
 
 
 def test_each_sentence_with_a_number_or_about_conservation_has_a_row():
@@ -335,7 +335,7 @@ FEW = ("kovalevskaya_top", "sprung_body", "lagrange_top", "brick_flip", "tumblin
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=() if each in FEW else pytest.mark.slow) for each in registry.list_scenes()]
+    "name", [pytest.param(scene, marks=() if scene in FEW else pytest.mark.slow) for scene in registry.list_scenes()]
 )
 def test_the_methods_that_are_chosen_conserve(name):
     method, drift = importlib.import_module("rows").chosen_drift(name)
@@ -351,10 +351,10 @@ def test_the_rows_of_the_papers_map_are_measured(scene):
     run, exact = (cv.integrate(scene, dt=scene.dt, method=registry.method(name)) for name in ("reduced", "exact"))
     rows = Rows().value
     assert run.error(exact).max() == pytest.approx(rows[scene.name, "reduced", "error"], rel=1e-6)  # measured 4e-12
-    for each in scene.invariants:
+    for invariant in scene.invariants:
         drift, row = (
-            float(np.linalg.norm(np.atleast_2d(run.drift(each).T).T, axis=1).max()),
-            rows[scene.name, "reduced", f"drift of {each.name}"],
+            float(np.linalg.norm(np.atleast_2d(run.drift(invariant).T).T, axis=1).max()),
+            rows[scene.name, "reduced", f"drift of {invariant.name}"],
         )
         assert drift == pytest.approx(row, rel=1e-6, abs=1e-15)
 
@@ -366,9 +366,9 @@ def test_the_rows_of_our_methods_are_measured(scene, name):
     program = importlib.import_module("measured")
     rows = {row["quantity"]: row for row in program.read_csv(program.ROWS) if (row["scene"], row["name"]) == (scene.name, name)}
     run, exact = (cv.integrate(scene, dt=scene.dt, method=registry.method(each)) for each in (rows["error"]["method"], "exact"))
-    for each in scene.invariants:
-        drift = float(np.linalg.norm(np.reshape(run.drift(each), (len(run), -1)), axis=1).max())
+    for invariant in scene.invariants:
+        drift = float(np.linalg.norm(np.reshape(run.drift(invariant), (len(run), -1)), axis=1).max())
         assert drift < 2e-15  # measured 7.2e-16
-        assert program.small(float(rows[f"drift of {each.name}"]["value"])) == "< 1e-15"
+        assert program.small(float(rows[f"drift of {invariant.name}"]["value"])) == "< 1e-15"
     error = run.error(exact).max()  # the closed form is the truth itself
     assert error <= 3e-14 or error == pytest.approx(float(rows["error"]["value"]), rel=0.2)  # measured 1.2e-11 of 1.2e-11

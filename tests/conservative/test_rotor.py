@@ -40,7 +40,7 @@ def errors(method: str, kind: str, index: int, n: int) -> tuple[float, float]:
     scene, chosen = gyrostat(kind, index), registry.method(method)
     found = chosen.solve(scene, Grid(scene.t_end / n, n))
     assert found.ok, found.outcome
-    kept = [each for each in scene.invariants if each.name in chosen.conserves]
+    kept = [invariant for invariant in scene.invariants if invariant.name in chosen.conserves]
     drift = max((float(np.linalg.norm(np.atleast_2d(found.drift(each)), axis=0).max()) for each in kept), default=0.0)
     return float(angle_between(found.R_WB[:: n // 10], truth(kind, index)).max()), drift
 

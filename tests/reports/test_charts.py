@@ -33,7 +33,7 @@ def axes(spec):
 
 
 def drawn(spec, field):
-    return sorted({each[field] for rows in spec["datasets"].values() for each in rows if field in each})
+    return sorted({row[field] for rows in spec["datasets"].values() for row in rows if field in row})
 
 
 def test_time_against_error_is_in_microseconds_and_radians():
@@ -64,7 +64,7 @@ def test_lines_have_the_colour_of_their_family_and_the_mark_of_their_place():
     families = {"reduced": "reduced", "gauss 2": "gauss", "gauss 3": "gauss"}
     channels = look(families, "shape")
     scales = [channels[name].to_dict()["scale"] for name in ("color", "shape")]
-    found = [dict(zip(each["domain"], each["range"], strict=True)) for each in scales]
+    found = [dict(zip(scale["domain"], scale["range"], strict=True)) for scale in scales]
     assert found == [colours(families), {"reduced": SHAPES[0], "gauss 2": SHAPES[0], "gauss 3": SHAPES[1]}]
 
 
