@@ -43,7 +43,7 @@ _FEW_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Heyoka(Method):
-    """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
+    """heyoka's adaptive Taylor integrator in double precision; dt is only the interval between samples.
 
     Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
     vectorised within a step). `fast_math` is on for base vectors only, which then take 14 % less to 8 % more time. Samples are

@@ -46,7 +46,7 @@ Derivative = Callable[[float, Array], Array]
 
 @dataclass(frozen=True)
 class SciPy(Method):
-    """SciPy's integrators with their own step control; dt is only the distance of samples.
+    """SciPy's integrators with their own step control; dt is only the interval between samples.
 
     The state is the quaternion, scalar first, of principal axes F in the world, and the rates in F. numba compiles the
     right-hand side for the fields of this package. Any other potential works as well, through its gradient.

@@ -289,8 +289,8 @@ skip_missing_option = click.option(
 quick_option = click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
 engines_option = names_option(
     "engines",
-    "Add engines: NAME, NAME@VERSION, or `all`, the installed ones (see `conservative engines`). A report gets a section that "
-    "compares them.",
+    "Engines to add: NAME, NAME@VERSION, or `all` for all installed engines (see `conservative engines`). A report gets a "
+    "section that compares them.",
     "E,F",
     completion.engine_lists,
 )
@@ -300,7 +300,7 @@ find_links_option = click.option(
     help="Install from this folder of wheels, without a network.",
 )
 allow_build_option = click.option(
-    "--allow-build", is_flag=True, help="Build packages that have no wheel, which runs their code."
+    "--allow-build", is_flag=True, help="Build packages without a wheel from source, which runs their code."
 )
 
 

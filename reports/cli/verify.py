@@ -52,7 +52,7 @@ LISTS = ("only", "pairs", "engines")
 @click.command(
     cls=OutputCommand,
     short_help="Verify a recording, an engine, a program or a model file.",
-    codes={1: "a subject is wrong", 3: "none is wrong, and one is undecided or not tested"},
+    codes={1: "a subject is wrong", 3: "no subject is wrong, and one is undecided or not tested"},
     epilog=epilog(
         "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
@@ -64,14 +64,20 @@ LISTS = ("only", "pairs", "engines")
     ),
 )
 @click.argument("subjects", nargs=-1, metavar="SUBJECT...", shell_complete=completion.subjects)
-@click.option("--body", shell_complete=completion.scenes, help="Recordings: scene file or scene, with body, field and start.")
+@click.option(
+    "--body",
+    shell_complete=completion.scenes,
+    help="Recordings: scene (file or name) with the body, the field and the initial state.",
+)
 @click.option(
     "--columns",
     metavar="MAP",
-    help="Recordings: columns by name or number, time=1,w=2:3:4,q=5:6:7:8 (R, euler, rotvec, mrp, crp).",
+    help="Recordings: columns by name or number, such as time=1,w=2:3:4,q=5:6:7:8 (also R, euler, rotvec, mrp, crp).",
 )
 @click.option(
-    "--quaternion", type=click.Choice(["wxyz", "xyzw"]), help="Recordings: order of numbered columns.  [default: what fits]"
+    "--quaternion",
+    type=click.Choice(["wxyz", "xyzw"]),
+    help="Recordings: order in numbered columns.  [default: the one that fits]",
 )
 @click.option("--euler", metavar="ZYX", help="Recordings: sequence of Euler angles, zyx for yaw, pitch, roll.")
 @click.option(
@@ -80,30 +86,33 @@ LISTS = ("only", "pairs", "engines")
 @click.option(
     "--units",
     type=click.Choice(["deg", "rad", "deg/s", "rad/s"]),
-    help="Recordings: unit of angles and rates whose columns name none; with /s of rates only.",
+    help="Recordings: unit of angles and rates if their columns have none; deg/s and rad/s for rates only.",
 )
 @click.option(
     "--start",
     type=click.Choice(["row", "scene"]),
     default="row",
     show_default=True,
-    help="Recordings: the motion starts in the first row, or at the scene's t = 0.",
+    help="Recordings: initial state from the first row, or from the scene at t = 0.",
 )
 @click.option("--from", "start_time", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
 @click.option("--until", "end_time", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
-@error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: by digits and noise]")
+@error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: from digits and noise]")
 @names_option("only", "Checks to run: motions, order, repeatability, pairs, protocol, times.  [default: all]", "CHECKS")
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
 @click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
 @names_option(
-    "engines", "Model files: engines or programs that load them.  [default: those installed]", "E,F", completion.engine_lists
+    "engines",
+    "Model files: engines or programs that load them.  [default: the installed engines]",
+    "E,F",
+    completion.engine_lists,
 )
 @click.option("--search", multiple=True, type=FilePath(), help="Model files: folder of meshes and packages; repeatable.")
 @json_option
 @click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
 @click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
-@option("out", f"Write {', '.join(FILES)} into this folder; the last two of a recording.", type=Output(FILES))
+@option("out", f"Write {', '.join(FILES)} into this folder; the last two only for a recording.", type=Output(FILES))
 @picture_option
 @click.pass_context
 def verify(
@@ -119,14 +128,14 @@ def verify(
     scripts: Path | None,
     **given: Any,
 ) -> None:
-    """Decide whether each SUBJECT is right, and name the mistakes that explain what is wrong.
+    """Decide whether each SUBJECT is right, and name the mistakes that explain the errors.
 
-    A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method
-    of this package, a program (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder
-    of recordings or of model files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines
-    load the small model files of this package, each with one trap.
+    A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method of this package, a program
+    (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder of recordings or of model
+    files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines load the small model files
+    of this package, each of which tests one rule of a format.
 
-    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided.
+    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested.
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")

@@ -45,13 +45,13 @@ if TYPE_CHECKING:
 )
 @scene_argument
 @methods_option(
-    "Methods, one panel each; the reference solutions `exact` and `precise` are also the outline in the other panels.  "
+    "Methods, one panel each. The reference solutions `exact` and `precise` are also drawn as outlines in the other panels.  "
     "[default: chosen for --error; with --dt the paper's, reduced]"
 )
 @target_option
 @option(
     "dt",
-    "Step size, s; with --error the sampling interval.  [default: the step that an engine's users take, or the scene's]",
+    "Step size, s; with --error the sampling interval.  [default: the usual step of an engine, or the scene's]",
     type=float,
     metavar="S",
 )
@@ -73,11 +73,12 @@ def watch(
     as_json: bool,
     out: Path,
 ) -> None:
-    """Integrate SCENE with each method and show the motions side by side, on one clock.
+    """Integrate SCENE, a name or a scene file, with each method and show the motions side by side, on one clock.
 
-    The body is its inertia box, the arrow its angular momentum. The numbers are the largest drifts and attitude error so far. A
-    motion that ends early, or is wrong by more than 0.1 rad, is named; the exit code is 1 if none reaches its end. Without
-    --methods and --dt, the motion is accurate to 1e-6 rad.
+    The body is drawn as a box, or a symmetric top as a cone, with the same moments. The arrow is the angular momentum. The
+    numbers are the largest drifts and attitude error so far. Motions that end early, or whose attitude error exceeds 0.1 rad,
+    are reported. The exit code is 1 if no motion reaches its end. Without --methods and --dt, the motion is accurate to 1e-6
+    rad.
     """
     from conservative import registry
     from conservative.method import Role
