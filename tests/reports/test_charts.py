@@ -121,7 +121,7 @@ def test_guides_have_the_slopes_of_the_fitted_orders():
     for ends, texts in ((fits, 1), (fits.iloc[:0], 0)):
         spec = figures.convergence(errors.assign(family=errors["name"]), ends, "s").to_dict()
         # In one list: the page removes the legend of each layer, and adds the filter of its buttons.
-        assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == texts
+        assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == 2 * texts  # a white halo and the text
 
 
 def test_guides_of_growth_stay_within_the_axes_and_have_their_slopes():
@@ -164,7 +164,8 @@ def test_an_uncertain_fit_has_neither_a_bold_stretch_nor_a_guide():
 
 
 def labels_of_guides(spec):
-    (text,) = [layer for layer in spec["layer"] if layer["mark"]["type"] == "text"]
+    halo, text = [layer for layer in spec["layer"] if layer["mark"]["type"] == "text"]
+    assert halo["data"] == text["data"]
     return spec["datasets"][text["data"]["name"]]
 
 
