@@ -75,8 +75,8 @@ class RigidBody(PickledByFields):
         breaks: ArrayLike = (),
     ) -> None:
         if motor is None and rotor_momentum is not None:
-            given = RotorMomentum(rotor_momentum, breaks)
-            motor, rotor_momentum = None if given.constant else given, given.at(0.0)
+            momentum = RotorMomentum(rotor_momentum, breaks)
+            motor, rotor_momentum = None if momentum.constant else momentum, momentum.at(0.0)
         rotor = None if rotor_momentum is None else np.asarray(rotor_momentum, dtype=float)
         rotor = None if rotor is None or not rotor.any() else read_only(rotor)
         set_fields(self, inertia=read_inertia(inertia), rotor_momentum=rotor, motor=motor)
@@ -126,7 +126,7 @@ class RigidBody(PickledByFields):
         of_body = numbers("w_WB_B", w_WB_B) @ self.inertia
         if self.motor is not None:
             times = numbers("t", t)
-            return of_body + np.array([self.motor.at(each) for each in times.ravel().tolist()]).reshape(*times.shape, 3)
+            return of_body + np.array([self.motor.at(time) for time in times.ravel().tolist()]).reshape(*times.shape, 3)
         return of_body if self.rotor_momentum is None else of_body + self.rotor_momentum
 
     def rotor_along(self, R_BF: Array) -> tuple[float, float, float] | None:

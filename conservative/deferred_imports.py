@@ -50,13 +50,13 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 
 def find_entry(group: str, argument: str, name: str) -> EntryPoint:
     """Return the entry point of a name in a group. `argument` is the name of the argument in messages. Raise `BadInput`."""
-    known = list_entries(group)
-    if name in known:
-        return known[name]
+    entries = list_entries(group)
+    if name in entries:
+        return entries[name]
     if group == PACKAGES:
         raise BadInput(argument, f"no entry point {name!r}", REINSTALL)
     files = "; or give a file whose name ends with .toml" if group == SCENES else ""
-    raise BadInput(argument, repr(name), nearest(name, known, _LISTS.get(group, "")) + files)
+    raise BadInput(argument, repr(name), nearest(name, entries, _LISTS.get(group, "")) + files)
 
 
 def load_entry(group: str, argument: str, name: str) -> Any:

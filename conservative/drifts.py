@@ -38,13 +38,13 @@ def measure_drifts(
     drifts, rotor, potential = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum, bodies.scene.potential
     V, impulse = _NO_ENERGIES if potential is None else field_energies(bodies, t, R_WB, w_WB_B), None
     if supplied is not None:
-        known = np.where(np.isnan(supplied), 0.0, supplied)
-        work, impulse = known[..., 0], np.ascontiguousarray(known[..., 1:])
+        sums = np.where(np.isnan(supplied), 0.0, supplied)
+        work, impulse = sums[..., 0], np.ascontiguousarray(sums[..., 1:])
         if isinstance(potential, Turning):
             work = work - impulse @ (potential.orbit.rate * potential.orbit.normal_W)
         V = V - work if len(V) else -work
         if (motor := bodies.scene.body.motor) is not None:  # a change of h counts as an impulse of the opposite sign
-            change = np.array([motor.at(each) for each in t.tolist()]) - motor.at(0.0)
+            change = np.array([motor.at(time) for time in t.tolist()]) - motor.at(0.0)
             impulse = impulse - (R_WB @ change[:, :, None])[..., 0]
     kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, drifts)
     if supplied is not None:
@@ -90,14 +90,14 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
         rows[:, 7] = np.nan_to_num(bodies.symmetry_axes_B) / momentum[:, None]
         rows[:, 8, 2] = np.einsum("ni,ni->n", rows[:, 7], L_B)
     own = [invariant for invariant in scene.invariants if invariant not in scene.extra_invariants]
-    if any(each.unit == "J" for each in own):
+    if any(invariant.unit == "J" for invariant in own):
         V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], w[:, None])
         rows[:, 8, 0], rows[:, 8, 1] = kinetic + (V[:, 0] if len(V) else 0.0), 1 / scale
-    for each in own:
-        if each.name in conserved and each.unit == "J":
+    for invariant in own:
+        if invariant.name in conserved and invariant.unit == "J":
             rows[:, 9, 0] = 1.0
-        elif each.name in conserved:
-            rows[:, 9, 2 if each.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
+        elif invariant.name in conserved:
+            rows[:, 9, 2 if invariant.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
     return rows
 
 

@@ -135,11 +135,11 @@ def balance_of(invariant: Invariant, potential: AnyPotential | None) -> Invarian
     """Return the balance that replaces an invariant of body and potential in a scene with a torque or damping."""
     line = None if potential is None else potential.axis_W
 
-    def supplied(given: Array) -> Array:
+    def supplied(sums: Array) -> Array:
         if invariant.unit == "J":
             turning = potential.orbit.rate * potential.orbit.normal_W if isinstance(potential, Turning) else np.zeros(3)
-            return np.asarray(given[:, 0] - given[:, 1:] @ turning)
-        return given[:, 1:] if line is None else np.asarray(given[:, 1:] @ line)
+            return np.asarray(sums[:, 0] - sums[:, 1:] @ turning)
+        return sums[:, 1:] if line is None else np.asarray(sums[:, 1:] @ line)
 
     return replace(invariant, name=f"{invariant.name} balance", supplied=supplied)
 
@@ -175,7 +175,9 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     of_motion = (
         invariant for invariant in scene.invariants if invariant.name in kept and invariant not in scene.extra_invariants
     )
-    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in of_motion}
+    return {
+        invariant: max(invariant.scale, most) if invariant.unit == MOMENTUM_UNIT else invariant.scale for invariant in of_motion
+    }
 
 
 NEARLY_SPHERICAL = 0.005

@@ -40,8 +40,8 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     import cloudpickle
 
     with LOCK, ExitStack() as stack:
-        known = cloudpickle.list_registry_pickle_by_value() if by_value else ()
-        for module in (sys.modules[name] for name in by_value if name not in known):
+        registered = cloudpickle.list_registry_pickle_by_value() if by_value else ()
+        for module in (sys.modules[name] for name in by_value if name not in registered):
             cloudpickle.register_pickle_by_value(module)
             stack.callback(cloudpickle.unregister_pickle_by_value, module)
         try:
@@ -74,7 +74,7 @@ def _pickler() -> Any:
     class Pickler(CloudPickler):  # type: ignore[misc]  # of a package without types
         def __init__(self, stream: io.BytesIO, shared: Sequence[object]) -> None:
             super().__init__(stream)
-            self.places = {id(each): place for place, each in enumerate(shared)}
+            self.places = {id(value): place for place, value in enumerate(shared)}
 
         def persistent_id(self, value: object) -> int | None:
             return self.places.get(id(value))

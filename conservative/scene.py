@@ -139,10 +139,10 @@ class Scene(PickledByFields):
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
         try:
-            given: tuple[Any, ...] = tuple(extra_invariants)
+            invariants: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
-            given = (extra_invariants,)
-        if not all(isinstance(each, Invariant) for each in given):
+            invariants = (extra_invariants,)
+        if not all(isinstance(invariant, Invariant) for invariant in invariants):
             raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
         step = dt
         if step is None:
@@ -159,7 +159,7 @@ class Scene(PickledByFields):
             dt=positive_number("dt", step, "a finite step above 0, s"),
             torque=torque,
             damping=damping,
-            extra_invariants=given,
+            extra_invariants=invariants,
             group=printable_text("group", group, "a text"),
             source=printable_text("source", source, "a text"),
             flight=flight,
@@ -188,9 +188,9 @@ class Scene(PickledByFields):
     @property
     def identity(self) -> Identity:
         """The key, and the part that cannot be followed, if there is one."""
-        known: Identity | None = vars(self).get("_identity")
-        if known is not None:
-            return known
+        identity: Identity | None = vars(self).get("_identity")
+        if identity is not None:
+            return identity
         now = identify(self)
         if now.fixed:
             vars(self)["_identity"] = now
@@ -327,9 +327,9 @@ class Scene(PickledByFields):
         """
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
         if self.loaded:
-            own = tuple(balance_of(each, self.potential) for each in own)
+            own = tuple(balance_of(invariant, self.potential) for invariant in own)
         if self.body.motor is not None:  # its work is not part of the motion of the body
-            own = tuple(in_time(each, self.body) for each in own if each.unit != "J")
+            own = tuple(in_time(invariant, self.body) for invariant in own if invariant.unit != "J")
         return (*own, *self.extra_invariants, *(self.flight.invariants(self) if self.flight else ()))
 
     def initial_value(self, invariant: Invariant) -> Array:
@@ -353,14 +353,14 @@ class Scene(PickledByFields):
 
     def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
         """Return `function(self, *settings)`, cached with the scene, which never changes. Settings are hashable."""
-        known, key = self._derivations, (function, settings)
+        cache, key = self._derivations, (function, settings)
         try:
-            return known[key]
+            return cache[key]
         except KeyError:
             result = function(self, *settings)
-            if len(known) >= MOST_DERIVATIONS:
-                known.clear()
-            known[key] = result
+            if len(cache) >= MOST_DERIVATIONS:
+                cache.clear()
+            cache[key] = result
         return result
 
     def forget(self) -> None:

@@ -141,7 +141,7 @@ class Trajectory:
             The scene has no such invariant.
         """
         if isinstance(invariant, str):
-            by_name = {each.name: each for each in self.scene.invariants}
+            by_name = {entry.name: entry for entry in self.scene.invariants}
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
@@ -212,11 +212,11 @@ class Trajectory:
             their own samples. If the samples of the truth have other times, they are moved there by integration.
         """
         shown = [self, *others]
-        if truth is not None and not any(each is truth for each in shown):
+        if truth is not None and not any(trajectory is truth for trajectory in shown):
             shown.append(truth)
-        index = next((number for number, each in enumerate(shown) if each is truth), None)
+        index = next((number for number, trajectory in enumerate(shown) if trajectory is truth), None)
         animation = load_entry(PACKAGES, PACKAGES, "animation")
-        return animation(shown, labels or [each.label for each in shown], index)
+        return animation(shown, labels or [trajectory.label for trajectory in shown], index)
 
     def _repr_html_(self) -> str:
         rows = [
@@ -291,7 +291,7 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
     frame: Any = result.frame
-    if frame is not None and (scene.flight is None or [np.shape(each) for each in frame] != [(n, 3)] * 2):
+    if frame is not None and (scene.flight is None or [np.shape(part) for part in frame] != [(n, 3)] * 2):
         return "positions and velocities that are not two arrays (n, 3) in free flight"
     return None
 

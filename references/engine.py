@@ -137,7 +137,7 @@ class EngineAxes:
         R_WB, w_WB_B, finite = to_body_axes(grid.t, states, self.R_BF[None])
         good = int(finite[0])
         if frame:
-            good = min(good, *(int(np.append(np.isfinite(each).all(axis=1), False).argmin()) for each in frame))
+            good = min(good, *(int(np.append(np.isfinite(part).all(axis=1), False).argmin()) for part in frame))
             frame = frame[0][:good], frame[1][:good]
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
         return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure, frame=frame)

@@ -63,7 +63,7 @@ def to_body_axes(t: Array, states: States, R_BF: Array) -> tuple[Array, Array, A
     R_WD = np.broadcast_to(np.eye(3), (n, 3, 3)) if states.R_WD is None else states.R_WD
     constants = np.zeros((n, 4)) if states.constants is None else states.constants
     # Copies, because numba compiles a function again for arrays that are read-only.
-    arrays = [np.array(each, float, order="C") for each in (t, states.values, R_BF, constants, R_WD)]
+    arrays = [np.array(array, float, order="C") for array in (t, states.values, R_BF, constants, R_WD)]
     _convert(states.kind, states.rates_in_world, *arrays, R_WB, w_WB_B, finite)
     return R_WB, w_WB_B, finite
 

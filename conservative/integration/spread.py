@@ -216,9 +216,9 @@ def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
 
 def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -> Array:
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
-    argument, known = f"potential.{name}", list_parameters(scene)
-    if name not in known:
-        allowed = nearest(name, known) if known else "none: the scene has no potential with numbers to spread"
+    argument, shapes = f"potential.{name}", list_parameters(scene)
+    if name not in shapes:
+        allowed = nearest(name, shapes) if shapes else "none: the scene has no potential with numbers to spread"
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
     deviation, relative = _read(argument, value, {"": 1.0, "%": 0.01}, _NUMBER)

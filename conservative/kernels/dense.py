@@ -55,7 +55,7 @@ def expand(field, constants, order, h, K, g, a, w, over, largest, over_order):
     """
     series, _, (_, *sized), terms = grow(field, constants, order, h, K, g, a, w)
     squares = (sum(series.split(fuse(w * over, w * over, fuse(a, a, g * g)))) for g, a, w in sized)
-    x, y = ((largest - fast_log2(square)) * each for square, each in zip(squares, over_order, strict=True))
+    x, y = ((largest - fast_log2(square)) * factor for square, factor in zip(squares, over_order, strict=True))
     least = choose(x < y, x, y)
     return fast_exp2(choose(least < LONGER, least, LONGER)), terms.locate()
 

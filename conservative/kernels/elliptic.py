@@ -93,9 +93,9 @@ def find_means(mc):
 
 
 @kernel
-def jacobi(u, found):
+def jacobi(u, means_and_levels):
     """Return sn, cn, dn of u from the result of `find_means` (Bulirsch 1965, sncndn), without computing 1 - m."""
-    means, levels, last, limit = found
+    means, levels, last, limit = means_and_levels
     sine, cosine = sine_and_cosine(limit * u)
     at_rest = sine == 0.0
     one = fill_like(1.0, u)

@@ -51,8 +51,8 @@ def body_torque(field, q):
 @trace
 def torque(field, q, w):
     """Return the torque of field and loads in N m at rates w, rad/s."""
-    found = field.body_torque(q)
-    return add(found, field.load(q, w)) if hasattr(field, "load") else found
+    T = field.body_torque(q)
+    return add(T, field.load(q, w)) if hasattr(field, "load") else T
 
 
 @trace
@@ -158,7 +158,7 @@ def _finite_derivative(field, q0, q1):
 def finite_derivative(field, q0, q1):
     """Return V* (9,) in J between base vectors q0 and q1 (9,), and its derivative by q1 (9, 9)."""
     V_star, dV_star = np.empty(9), np.empty(81)
-    found = _finite_derivative(field, load_rows(q0, 0, 1, 9, 1), load_rows(q1, 0, 1, 9, 1))
-    save_rows(V_star, 0, 1, found[0])
-    save_rows(dV_star, 0, 1, found[1])
+    derivatives = _finite_derivative(field, load_rows(q0, 0, 1, 9, 1), load_rows(q1, 0, 1, 9, 1))
+    save_rows(V_star, 0, 1, derivatives[0])
+    save_rows(dV_star, 0, 1, derivatives[1])
     return V_star, dV_star.reshape(9, 9)

@@ -107,10 +107,10 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
         axes = (x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4])
         # There is a step below the limits whose squares stay in the range of floats.
         angle = math.sqrt(dot(w, w)) * h
-        known = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
+        possible = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
         # The last condition: r0 is finite. The difference of infinity or nan with itself is nan.
-        known = known & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
-        finished = choose(known, 1.0, 0.0 * h)
+        possible = possible & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
+        finished = choose(possible, 1.0, 0.0 * h)
         save_rows(flat, first + SHIFT * columns, columns, k)
         save_rows(states.reshape(-1), first, columns, at)
         save_rows(flat, first + LEFT * columns, columns, left)

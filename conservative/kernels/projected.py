@@ -235,9 +235,9 @@ def project(J_inverse, rotor, field, axis, turn, kept, scales, q, L):
         if max(abs(e) / scales[0], abs(m) / scales[1]) <= ROUND_OFF:
             return q, L, corrections, defect
         corrections += 1
-        dL, way = shortest_move(w, T, rotor, axis, scales[1], e, m, q, L)
+        dL, rotation = shortest_move(w, T, rotor, axis, scales[1], e, m, q, L)
         L = add(L, dL)
-        q = near_unit(product(q, (1.0, 0.5 * way[0], 0.5 * way[1], 0.5 * way[2])))
+        q = near_unit(product(q, (1.0, 0.5 * rotation[0], 0.5 * rotation[1], 0.5 * rotation[2])))
 
 
 @kernel

@@ -259,12 +259,12 @@ def rotate(kind, h, t, J, k, rotor, field, q, q_carry, L, L_carry):
         if rotor is not None:
             q, q_carry, L, L_carry = turn_with_rotor(0.5 * h, k, rotor, q, q_carry, L, L_carry)
         return q, q_carry, L, L_carry, 0, 0.0, True
-    c, l, kick, corrections, size, found = solve(h, t, J, k, field, kind == MIDDLE, q, L)  # noqa: E741
+    c, l, kick, corrections, size, solved = solve(h, t, J, k, field, kind == MIDDLE, q, L)  # noqa: E741
     turned = cross(c, l)
     gain = add(subtract(l, L), scale(2.0 / (1.0 + dot(c, c)), subtract(cross(c, turned), turned)))
     q, q_carry = turn_attitude(c, q, q_carry)
     L, L_carry = add_momentum(L, L_carry, add(gain, kick))
-    return q, q_carry, L, L_carry, corrections, size, found
+    return q, q_carry, L, L_carry, corrections, size, solved
 
 
 @kernel
@@ -286,11 +286,11 @@ def march(model, coefficients, workspace):
             for stage in range(stages):
                 part, t = rotations[stage], (step - 1) * h + nodes[stage]
                 if part != 0.0:
-                    q, q_carry, L, L_carry, more, size, found = rotate(
+                    q, q_carry, L, L_carry, more, size, solved = rotate(
                         kind, part, t - part, J, k, rotor, field, q, q_carry, L, L_carry
                     )
                     corrections += more
-                    if not found:
+                    if not solved:
                         return Result(step - 1, (step - 1) * stages, corrections, None, size, False)
                 if kicks[stage] != 0.0:
                     if part != 0.0:  # otherwise attitude and time are those of the last kick

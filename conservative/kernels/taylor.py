@@ -278,7 +278,7 @@ def advance(field, constants, order, h, K, g, a, w, angles):
     if not hasattr(field, "advance"):
         return take_step(field, constants, order, h, K, g, a, w), angles
     x, changes = field.advance(order, h, g)
-    return (x, a, w), tuple(accumulate(*each, change) for each, change in zip(angles, changes, strict=True))
+    return (x, a, w), tuple(accumulate(*angle, change) for angle, change in zip(angles, changes, strict=True))
 
 
 @trace

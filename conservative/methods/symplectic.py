@@ -184,5 +184,5 @@ def find_coefficients(method: Splitting, dt: float, exact: bool) -> Any:
         kicks = (0 * kicks[0],) * len(kicks)
     nodes = itertools.accumulate(rotations)
     return kernels("symplectic").Coefficients(
-        *(np.array([float(x) * dt for x in each]) for each in (rotations, kicks, nodes)), dt
+        *(np.array([float(x) * dt for x in parts]) for parts in (rotations, kicks, nodes)), dt
     )

@@ -148,8 +148,8 @@ def turn_samples(run: KernelRun, orbit: Orbit) -> KernelRun:
     """Return a run whose attitudes are turned from the axes of an orbit to the world's."""
 
     def run_and_turn() -> Trajectory:
-        found = run()
-        return replace(found, R_WB=orbit.R_WO(found.t) @ found.R_WB)
+        trajectory = run()
+        return replace(trajectory, R_WB=orbit.R_WO(trajectory.t) @ trajectory.R_WB)
 
     turned = KernelRun(run_and_turn)
     turned.own_loop = run.own_loop

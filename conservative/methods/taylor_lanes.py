@@ -49,13 +49,13 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
             field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
     R_WD = np.broadcast_to(directions(axis_W if axis_W.strides[0] else axis_W[:1]), (n, 3, 3))
     R_DP = R_WD.swapaxes(1, 2) @ bodies.R_WB0 @ R_BP
-    energy, one = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
+    energy, ones = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
     J_in_units = J / mass[:, None]
     start = kernel.Bodies(
         J=J_in_units,
         J_inverse=1 / J_in_units,
         field=field,
-        loose=np.column_stack([one, one, ~symmetric]),
+        loose=np.column_stack([ones, ones, ~symmetric]),
         scales=np.column_stack([energy, np.sqrt(2 * energy * (moments / mass[:, None]).max(axis=1))]),
         g=R_DP[:, 2],
         a=R_DP[:, 0],
@@ -63,11 +63,11 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         h=grid.dt / time,
         axes=R_WD,
         R_BP=R_BP,
-        units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
+        units=np.column_stack([ones, ones, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
     )
     motion = kernel.LaneState(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
     width, like = kernels("compiler.lanes").REGISTER, (zeros_like(start), zeros_like(motion))
-    columns, motions = (stack_columns(list(flatten(each, n)), width) for each in (start, motion))
+    columns, motions = (stack_columns(list(flatten(value, n)), width) for value in (start, motion))
     m = columns.shape[1]
     spin = np.where(symmetric, spin_rate(moments[:, 0], moments[:, 2], w[:, 2] * moments[:, 2]), 0.0)
     angles = np.outer(grid.t, np.pad(spin, (0, m - n))) if symmetric.any() else np.zeros((1, m))
@@ -76,9 +76,9 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
 
     def run() -> Block:
         ends, R_WB, w_WB_B = motions.copy(), np.empty((m, s, 3, 3)), np.empty((m, s, 3))
-        given, samples = (order, like, columns, ends, turns), (R_WB.reshape(-1), w_WB_B.reshape(-1))
+        inputs, samples = (order, like, columns, ends, turns), (R_WB.reshape(-1), w_WB_B.reshape(-1))
         take_pieces(
-            grid.n_steps, cost, lambda done, last: kernel.enter_many(*given, done, last, grid.n_steps, grid.every, *samples)
+            grid.n_steps, cost, lambda done, last: kernel.enter_many(*inputs, done, last, grid.n_steps, grid.every, *samples)
         )
         R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
         failures: dict[int, IntegrationFailed] = {}
@@ -98,7 +98,7 @@ def find_frames(bodies: Batch) -> tuple[Array, Array, Array, Any]:
     together with its field (n,) is described in the frame that does not spin, so that its motion has the moments J (n, 3), J1
     three times. Bodies that may be symmetric are examined one by one, unless all are the same.
     """
-    moments, R_BP = (np.array(each) for each in bodies.principal)
+    moments, R_BP = (np.array(array) for array in bodies.principal)
     J, symmetric = moments.copy(), np.zeros(len(bodies), bool)
     gaps = np.abs(moments - np.roll(moments, 1, axis=1)).min(axis=1)
     near = np.flatnonzero(gaps <= NEARLY_EQUAL * moments.max(axis=1))

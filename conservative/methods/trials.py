@@ -137,9 +137,9 @@ class Trials:
 
     def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory | None]:
         """Return the estimate of a run, with its `sensitivity` if requested, and its trajectory, or None if no run was made."""
-        known = self.known.get((method, grid))
-        if known is not None and not (sensitivity and known.sensitivity is None):
-            return known, self.last[method, grid].fine if (method, grid) in self.last else None
+        cached = self.known.get((method, grid))
+        if cached is not None and not (sensitivity and cached.sensitivity is None):
+            return cached, self.last[method, grid].fine if (method, grid) in self.last else None
         if (method, grid) not in self.last:
             self.last.clear()
             self.observe(method, grid)
@@ -172,8 +172,8 @@ def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None
 
     Nothing is cached for a scene that cannot be followed (`Scene.key`).
     """
-    known = {} if (identity := scene.identity).unknown else recall(identity.text)
-    return Trials(scene, known, (lambda method, grid: None) if progress is None else throttle(progress))
+    estimates = {} if (identity := scene.identity).unknown else recall(identity.text)
+    return Trials(scene, estimates, (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)

@@ -39,7 +39,7 @@ class GradientField(NamedTuple):
         u, du = halfway(scale(-1.0, a), e)
         m, dm = halfway(a, apply(self.rows, u))
         changes = (halfway(a, apply(self.rows, scale(-1.0, column)))[0] for column in du)
-        return cross(e, m), tuple(cross(e, add(*each)) for each in zip(dm, changes, strict=True))
+        return cross(e, m), tuple(cross(e, add(*column)) for column in zip(dm, changes, strict=True))
 
     def finite_derivative(self, q0: Any, q1: Any) -> Any:
         """Return e and G ubar."""

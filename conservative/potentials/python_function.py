@@ -133,7 +133,7 @@ class FunctionPotential:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
 
         def convert(function: Callable[..., Any]) -> Callable[..., Any]:
-            return lambda R, *t: function(R, *(each * time for each in t)) / energy
+            return lambda R, *t: function(R, *(now * time for now in t)) / energy
 
         V = Energy(convert(self.energy.at), self.time_dependent)
         G = Gradient(convert(self.gradient.at), self.time_dependent)
@@ -160,14 +160,14 @@ def _has_values(energy: Energy, gradient: Gradient, t: float) -> bool:
 
 def _check_gradient(energy: Energy, gradient: Gradient, t: Time) -> None:
     """Compare the gradient with differences of the energy at one attitude, and at a time if they depend on it."""
-    found, differences = _probe("gradient", gradient, _PROBE, *t), np.empty((3, 3))
+    dV_dR, differences = _probe("gradient", gradient, _PROBE, *t), np.empty((3, 3))
     for index in np.ndindex(3, 3):
         aside = np.zeros((3, 3))
         aside[index] = _DIFFERENCE
         ahead, behind = (float(_probe("energy", energy, _PROBE + sign * aside, *t)) for sign in (1, -1))
         differences[index] = (ahead - behind) / (2 * _DIFFERENCE)
-    off = np.abs(differences - found).max()
-    if not off <= _AGREEMENT * max(np.abs(found).max(), np.abs(differences).max()):
+    off = np.abs(differences - dV_dR).max()
+    if not off <= _AGREEMENT * max(np.abs(dV_dR).max(), np.abs(differences).max()):
         raise BadInput("gradient", f"a matrix off by {off:.3g} J from differences of the energy", "the derivative of `energy`")
 
 
@@ -175,10 +175,10 @@ def _probe(argument: str, function: Energy | Gradient, R: Array, *t: float) -> A
     """Return what a function gives at one attitude (3, 3); what it raises, and what is not finite, is bad input."""
     allowed = "a function that gives a real number, J" if argument == "energy" else "a function that gives a matrix (3, 3), J"
     try:
-        found = function.at(R, *t)
+        value = function.at(R, *t)
     except PotentialFailed as failure:
         raise BadInput(argument, f"a function that fails: {describe(failure.__cause__)}", allowed) from failure.__cause__
-    return finite_array(argument, found, ((), (3, 3)), f"{allowed}, at every attitude")
+    return finite_array(argument, value, ((), (3, 3)), f"{allowed}, at every attitude")
 
 
 def _check_axis(axis_W: ArrayLike, gradient: Gradient, t: Time) -> Array:
@@ -186,8 +186,8 @@ def _check_axis(axis_W: ArrayLike, gradient: Gradient, t: Time) -> Array:
     axis = finite_array("axis_W", axis_W, ((3,),), _AXIS)
     if abs(np.linalg.norm(axis) - 1) > ROTATION_TOLERANCE:
         raise BadInput("axis_W", describe(axis.tolist()), _AXIS)
-    found = _probe("gradient", gradient, _PROBE, *t)
-    torque, size = abs(moment(np.eye(3), _PROBE, found) @ axis), np.abs(found).max()
+    dV_dR = _probe("gradient", gradient, _PROBE, *t)
+    torque, size = abs(moment(np.eye(3), _PROBE, dV_dR) @ axis), np.abs(dV_dR).max()
     if torque > _AGREEMENT * size:
         raise BadInput("axis_W", f"{axis.tolist()}, about which the field has a torque of {torque:.3g} N m", _AXIS)
     return axis

@@ -62,9 +62,9 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
     """
     if all(load.origin for load in loads):  # in other units: a scan takes a second
         (_, unit), *_ = (load.origin for load in loads)
-        known = examine(tuple(load.origin[0] for load in loads), t_end * unit)
-        first, last = known.interval
-        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit), known.noise)
+        in_s = examine(tuple(load.origin[0] for load in loads), t_end * unit)
+        first, last = in_s.interval
+        return Smoothness(read_only(in_s.breaks / unit), in_s.step / unit, (first / unit, last / unit), in_s.noise)
     step, interval, noise = math.inf, (0.0, t_end), False
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
@@ -75,10 +75,10 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
         except Exception:  # a table; or a function that fails, which the run reports
             continue
         other = partial(_at_attitude, load.value, OTHER) if load.of_attitude else None
-        found = _drop_near(_find_jumps(function, times, values, other), breaks, 1e-12 * t_end)
-        if found and not load.may_jump:
-            raise BadInput(load.name, f"a function that jumps at t = {found[0]:g} s", "a function without jumps")
-        breaks = np.union1d(breaks, found)
+        jumps = _drop_near(_find_jumps(function, times, values, other), breaks, 1e-12 * t_end)
+        if jumps and not load.may_jump:
+            raise BadInput(load.name, f"a function that jumps at t = {jumps[0]:g} s", "a function without jumps")
+        breaks = np.union1d(breaks, jumps)
         breaks = np.union1d(breaks, _drop_near(_find_corners(function, times, values, other), breaks, 1e-9 * t_end))
         resolved, where = _resolve(times, values, breaks)
         if resolved <= times[1] and (place := _find_noise(function, times, values, breaks)) is not None:
@@ -92,9 +92,9 @@ def _at_attitude(function: Callable[[float, Array], Array], R_WB: Array, t: floa
     return function(t, R_WB)
 
 
-def _drop_near(found: list[float], breaks: Array, distance: float) -> list[float]:
+def _drop_near(times: list[float], breaks: Array, distance: float) -> list[float]:
     """Return the times, s, that are not within a distance, s, of known ones (n,), s."""
-    return [t for t in found if not len(breaks) or np.abs(breaks - t).min() > distance]
+    return [t for t in times if not len(breaks) or np.abs(breaks - t).min() > distance]
 
 
 def _value(function: Callable[[float], Array], t: float) -> Array:
@@ -138,13 +138,13 @@ def _find_corners(function: Callable[[float], Array], times: Array, values: Arra
     for i in places.tolist() if len(places) <= MOST_CORNERS else ():
         a, b = float(times[i]), float(times[i + 2])
         turn = float(bend[max(0, i - 1) : i + 2].sum()) / float(times[1])  # of the slope; a corner counts at two times
-        found = _narrow(function, a, b, turn, NARROW * float(times[-1]), largest)
-        if found is not None and other is not None:
+        corner = _narrow(function, a, b, turn, NARROW * float(times[-1]), largest)
+        if corner is not None and other is not None:
             h = float(times[1]) / 4
-            again = np.linalg.norm(_value(other, found - h) - 2 * _value(other, found) + _value(other, found + h))
-            found = found if again > AGREED * turn * h else None
-        if found is not None:
-            corners.append(found)
+            again = np.linalg.norm(_value(other, corner - h) - 2 * _value(other, corner) + _value(other, corner + h))
+            corner = corner if again > AGREED * turn * h else None
+        if corner is not None:
+            corners.append(corner)
     return corners
 
 
@@ -152,7 +152,7 @@ def _narrow(function: Callable[[float], Array], a: float, b: float, turn: float,
     """Return the time of a corner between a and b, s, at which the slope changes by `turn`, to a width, s; None without one."""
     while b - a > width:
         t = np.linspace(a, b, ZOOM + 1)
-        values = np.array([_value(function, each) for each in t.tolist()])
+        values = np.array([_value(function, time) for time in t.tolist()])
         bend = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=1)
         i, spacing = int(bend.argmax()), float(t[1] - t[0])
         here = float(bend[max(0, i - 1) : i + 2].sum())
@@ -192,7 +192,7 @@ def _compare_blocks(times: Array, values: Array, breaks: Array, size: int) -> Ar
 def _find_noise(function: Callable[[float], Array], times: Array, values: Array, breaks: Array) -> tuple[float, float] | None:
     """Return an interval, s, in which a function is not smooth, if it is so in most of the worst blocks; otherwise None."""
     worst = np.argsort(-_compare_blocks(times, values, breaks, 2), kind="stable")[:WORST]
-    found = []
+    noisy = []
     for i in (2 * worst).tolist():
         a, b = float(times[i]), float(times[i + 2])
         closer = np.array([_value(function, t) for t in np.linspace(a, b, 2 * CLOSER + 1).tolist()])
@@ -200,8 +200,8 @@ def _find_noise(function: Callable[[float], Array], times: Array, values: Array,
             float(np.linalg.norm(closer[: -2 * n] - 2 * closer[n:-n] + closer[2 * n :], axis=1).max()) for n in (NARROWER, 1)
         )
         if near > far / (4 * NARROWER):
-            found.append((a, b))
-    return found[0] if len(found) > WORST / 2 else None
+            noisy.append((a, b))
+    return noisy[0] if len(noisy) > WORST / 2 else None
 
 
 class Unresolved(NamedTuple):

@@ -69,12 +69,12 @@ class Orbit:
             direction_W is not perpendicular to `normal_W`; or a parameter is not finite, not positive, not an inertia, or has
             the wrong shape.
         """
-        found = GravityGradient(self.rate, inertia, direction_W)
-        nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
-        if abs(found.direction_W @ self.normal_W) > _ACROSS:
+        fixed = GravityGradient(self.rate, inertia, direction_W)
+        nearest = fixed.direction_W - fixed.direction_W @ self.normal_W * self.normal_W
+        if abs(fixed.direction_W @ self.normal_W) > _ACROSS:
             hint = f", such as {nearest.tolist()}" if np.linalg.norm(nearest) > _ACROSS else ""
             allowed = f"a direction in the plane of the orbit, at right angles to {self.normal_W.tolist()}{hint}"
-            raise BadInput("direction_W", describe(found.direction_W.tolist()), allowed)
+            raise BadInput("direction_W", describe(fixed.direction_W.tolist()), allowed)
         return Turning(GravityGradient(self.rate, inertia, nearest), self)
 
 

@@ -212,10 +212,10 @@ def _find_callback(mj, model, data):
         return None
     data.time = FIELD
     arrays = [(model, model.numeric_data), (data, data.xmat), (data, data.qfrc_passive)]
-    words = [_find_word(owner, array.ctypes.data) for owner, array in arrays]
-    words.append(_find_word(data, np.float64(FIELD).view(np.int64)))
+    addresses = [_find_word(owner, array.ctypes.data) for owner, array in arrays]
+    addresses.append(_find_word(data, np.float64(FIELD).view(np.int64)))
     mj.mj_resetData(model, data)
-    return _compile_callback(*words).ctypes
+    return _compile_callback(*addresses).ctypes
 
 
 def _find_word(owner, value):
@@ -231,7 +231,7 @@ def _compile_callback(numeric, attitude, force, time):
         from numba.extending import intrinsic
     except ImportError:
         raise NotImplementedError("this field needs numba next to MuJoCo") from None
-    doubles, words = types.CPointer(types.float64), types.CPointer(types.int64)
+    doubles, integers = types.CPointer(types.float64), types.CPointer(types.int64)
     torque = compile_torque()
 
     @intrinsic
@@ -239,7 +239,7 @@ def _compile_callback(numeric, attitude, force, time):
         to_pointer = lambda context, builder, _, args: builder.inttoptr(args[0], context.get_value_type(doubles))  # noqa: E731
         return doubles(types.int64), to_pointer
 
-    @cfunc(types.void(words, words))
+    @cfunc(types.void(integers, integers))
     def passive(model, data):
         if model[numeric] == 0 or read(model[numeric])[0] != FIELD:
             return

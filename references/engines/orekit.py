@@ -38,7 +38,7 @@ def prepare(given):
 
     def run():
         attitudes = [motion.getAttitude(None, date.shiftedBy(time), frame) for time in times]
-        turns, rates = [each.getRotation() for each in attitudes], [each.getSpin() for each in attitudes]
+        turns, rates = [attitude.getRotation() for attitude in attitudes], [attitude.getSpin() for attitude in attitudes]
         q = [(turn.getQ0(), turn.getQ1(), turn.getQ2(), turn.getQ3()) for turn in turns]
         return {"q": np.array(q), "w": np.array([(rate.getX(), rate.getY(), rate.getZ()) for rate in rates])}
 

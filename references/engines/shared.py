@@ -25,7 +25,7 @@ def sample(given, step, read):
         for _ in range(n_steps):
             step()
         samples.append({name: np.array(values, float) for name, values in read().items()})  # copies of an engine's own arrays
-    return {name: np.array([each[name] for each in samples]) for name in samples[0]}
+    return {name: np.array([values[name] for values in samples]) for name in samples[0]}
 
 
 def stepped(given, start, step, read, convert=None):

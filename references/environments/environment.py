@@ -162,13 +162,17 @@ def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
     folders = folder_of_all().glob("*/[!.]*")
     environments = [environment for folder in folders if (environment := read_environment(folder))]
     chosen = [environment for environment in environments if engine in (None, environment.engine)]
-    return tuple(sorted(chosen, key=lambda each: (each.engine, version_key(each.version))))
+    return tuple(sorted(chosen, key=lambda environment: (environment.engine, version_key(environment.version))))
 
 
 def find_environment(engine: str, version: str = "") -> Environment:
     """Return the environment of a version, by default of the newest installed release. Raise `MissingEnvironment`."""
     environments = list_environments(engine)
-    matching = [each for each in environments if each.version == version or (not version and not each.is_build)]
+    matching = [
+        environment
+        for environment in environments
+        if environment.version == version or (not version and not environment.is_build)
+    ]
     if not matching:
         raise MissingEnvironment(engine, version, tuple(environment.version for environment in environments))
     return matching[-1]

@@ -110,11 +110,11 @@ def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     Raise `BadInput` if the engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
-    known = KINDS[distribution.kind].list_versions(distribution.package, source)
-    if not known:
+    versions = KINDS[distribution.kind].list_versions(distribution.package, source)
+    if not versions:
         got = f"no list of versions of {distribution.package} from the package index"
         raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
-    supported = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
+    supported = [release for release in versions if version_key(release) >= version_key(distribution.oldest)]
     return tuple(sorted(supported, key=version_key)[-count:])
 
 
@@ -188,8 +188,12 @@ def remove(requirement: str) -> tuple[Environment | Program, ...]:
     engine, version, _ = read_name(requirement, "engine", settings=False)
     if program := find_program(requirement):
         return (register(program, undo=True),)
-    installed = {each.name: each for each in list_environments()}
-    chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))
+    installed = {environment.name: environment for environment in list_environments()}
+    chosen = tuple(
+        environment
+        for environment in installed.values()
+        if environment.engine == engine and version in ("", environment.version)
+    )
     if not chosen:
         near = f"an installed engine: {nearest(requirement, installed)}"
         raise BadInput("engine", repr(requirement), near if installed else "an installed engine (none is installed)")

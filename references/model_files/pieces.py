@@ -134,8 +134,11 @@ def errors(part: Piece, other: Piece, scale: Piece | None = None) -> dict[str, f
     size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass)) if unit.mass else 0.0
     size = max(size, 1e-9 * np.linalg.norm(unit.com)) or 1.0  # below that the centre of mass is round-off
     pairs = (other.mass - part.mass, unit.mass), (other.com - part.com, size), (other.inertia - part.inertia, unit.inertia)
-    found = [np.linalg.norm(each) and np.linalg.norm(each) / (np.linalg.norm(of) or 1e-300) for each, of in pairs]
-    return dict(zip(QUANTITIES, map(float, np.nan_to_num(found, nan=np.inf)), strict=True))
+    relative = [
+        np.linalg.norm(difference) and np.linalg.norm(difference) / (np.linalg.norm(size_of) or 1e-300)
+        for difference, size_of in pairs
+    ]
+    return dict(zip(QUANTITIES, map(float, np.nan_to_num(relative, nan=np.inf)), strict=True))
 
 
 def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
@@ -149,7 +152,7 @@ def differing(part: Piece, other: Piece, tolerance: float) -> list[str]:
     texts = {
         "mass": ([part.mass], [other.mass], "kg"),
         "centre of mass": (part.com, other.com, "m"),
-        "inertia": (*(each.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] for each in (part, other)), "kg m^2"),
+        "inertia": (*(whole.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] for whole in (part, other)), "kg m^2"),
     }
     return [f"{name} {list_numbers(texts[name][0])} and {list_numbers(texts[name][1])} {texts[name][2]}" for name in far]
 
@@ -200,8 +203,8 @@ _OFF = ("false", "0", "auto", "-1", "0 5")
 
 def touched(option: str) -> Sequence[str]:
     """Return the `QUANTITIES` that an option of an engine may change."""
-    known = re.search("mass|inertia|density", option.lower()) and "rotor" not in option.lower()
-    return _TOUCHED.get(option.lower(), QUANTITIES if known else ())
+    changes_mass = re.search("mass|inertia|density", option.lower()) and "rotor" not in option.lower()
+    return _TOUCHED.get(option.lower(), QUANTITIES if changes_mass else ())
 
 
 def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:

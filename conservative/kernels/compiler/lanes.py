@@ -49,7 +49,7 @@ if COMPILED:
 
         def lower(context, builder, sig, args):
             # No flags: the function that is compiled says whether products may be fused.
-            numbers = (unpack(builder, *each, ()) for each in zip(sig.args, args, strict=True))
+            numbers = (unpack(builder, *typed, ()) for typed in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
 
         pairs = ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes))
@@ -97,10 +97,10 @@ if COMPILED:
             return types.UniTuple(kind, like.literal_value)
         if not isinstance(like, types.BaseTuple):
             return kind
-        return types.BaseTuple.from_types([_arrange(each, kind) for each in like], getattr(like, "instance_class", None))
+        return types.BaseTuple.from_types([_arrange(part, kind) for part in like], getattr(like, "instance_class", None))
 
     def _flatten(value):
-        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
+        return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
 
     @intrinsic(prefer_literal=True)
     def load(typing, array, index, width):
@@ -124,7 +124,7 @@ if COMPILED:
             def fill(part):
                 nonlocal at
                 if isinstance(part, types.BaseTuple):
-                    return context.make_tuple(builder, part, [fill(each) for each in part])
+                    return context.make_tuple(builder, part, [fill(inner) for inner in part])
                 number, at = _read(context, builder, (sig.args[0], args[0]), at, kind), builder.add(at, args[2])
                 return number
 
@@ -227,7 +227,7 @@ else:
     def _fill(like, numbers):
         if not isinstance(like, tuple):
             return float(next(numbers))
-        parts = [_fill(each, numbers) for each in like]
+        parts = [_fill(part, numbers) for part in like]
         return like._make(parts) if hasattr(like, "_make") else tuple(parts)
 
     def load_rows(array, index, stride, like, width):  # type: ignore[misc]  # the same name twice: one of them is defined
@@ -235,7 +235,7 @@ else:
         return _fill((0.0,) * like if isinstance(like, int) else like, iter(array[index::stride]))
 
     def _flatten(value):
-        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
+        return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
 
     def save(array, index, value):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Store a number at index."""
@@ -278,7 +278,7 @@ def cache_by_types(build):
 
     Named tuples of different types with equal numbers are equal, and fields of different types need code of their own.
     """
-    known = {}
+    built = {}
 
     def kinds(value):
         return (type(value), *map(kinds, value)) if isinstance(value, tuple) else type(value)
@@ -286,9 +286,9 @@ def cache_by_types(build):
     @wraps(build)
     def recall(like):
         key = kinds(like)
-        if key not in known:
-            known[key] = build(like)
-        return known[key]
+        if key not in built:
+            built[key] = build(like)
+        return built[key]
 
     return recall
 

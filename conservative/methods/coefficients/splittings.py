@@ -39,8 +39,8 @@ class Sequence(NamedTuple):
 
 
 SEQUENCES = {
-    each.order: each
-    for each in (
+    sequence.order: sequence
+    for sequence in (
         Sequence(
             4,
             "Blanes & Moan 2002, SRKN6b",
