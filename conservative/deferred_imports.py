@@ -20,7 +20,7 @@ METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "co
 ENGINES = "conservative.engines"
 """Groups of entry points; see `conservative.registry`."""
 PACKAGES = "conservative.packages"
-"""Group of what the core uses of the packages above it, which it cannot import."""
+"""Group of the objects that the core uses from the packages above it, which it must not import."""
 DEFAULT_METHOD = "reduced"
 """Name of the method of `integrate` for a given step, `Reduced()`."""
 _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "conservative engines list"}
@@ -41,7 +41,7 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 
     entries = list(entry_points(group=group))
     if group == ENGINES and (programs := list_programs()):
-        module = find_entry(PACKAGES, PACKAGES, "programs").value
+        module = find_entry(PACKAGES, PACKAGES, "programs").value  # its attributes are the classes of programs, by name
         for name in programs.keys() & {*list_entries(METHODS), *(entry.name for entry in entries)}:
             raise BadInput(str(programs[name].file), f"{name!r}, the name of a method or an engine", "another name")
         entries += [EntryPoint(name, f"{module}:{name}", group) for name in programs]

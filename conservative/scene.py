@@ -194,6 +194,7 @@ class Scene(PickledByFields):
         now = identify(self)
         if now.fixed:
             vars(self)["_identity"] = now
+        # `identify` returns another text each time if a part is unknown. The scene keeps the first, so that it equals itself.
         return replace(now, text=vars(self).setdefault("_alone", now.text)) if now.unknown else now
 
     @cached_property
@@ -203,7 +204,10 @@ class Scene(PickledByFields):
         return not self.features.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
 
     def _call_loads(self) -> None:
-        """Raise `BadInput` unless the loads have values; keep the key, for `now`, unless functions change what they read."""
+        """Raise `BadInput` unless the loads have values. Keep the key for `now`, unless calls change what functions read.
+
+        `_current` is the key for which the caches are valid, and the copy with these caches; None for the scene itself.
+        """
         before = self.key if self.changeable else ""
         for load in self.loads:
             load.require(self.t_end, self.R_WB0)
@@ -215,8 +219,8 @@ class Scene(PickledByFields):
     def now(self) -> Scene:
         """Return the scene as its functions are now: itself, or a copy without caches if they changed, or may have.
 
-        Break points, scales and compiled code are cached with a scene and its parts. Functions that read a global variable are
-        others when it changes, and those that cannot be followed may be others in each call.
+        Break points, scales and compiled code are cached with a scene and its parts. A function that reads a global variable
+        changes with it, and a function that cannot be followed may change with each call.
         """
         if not self.changeable:
             return self
@@ -254,7 +258,7 @@ class Scene(PickledByFields):
 
     @property
     def calls_python(self) -> bool:
-        """True if steps call Python functions, so that one takes as long as the functions need."""
+        """True if steps call Python functions, so that a step takes as long as the functions."""
         return bool(self.loads) or not self.features.isdisjoint((Feature.FUNCTION, Feature.TIME))
 
     @property
@@ -269,7 +273,7 @@ class Scene(PickledByFields):
 
     def smoothness(self, t_end: float = 0.0) -> Smoothness:
         """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
-        end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # not beyond it by rounding
+        end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # rounding can put the last step after t_end
         return examine(self.loads, end) if self.loads else SMOOTH
 
     @property
@@ -298,7 +302,7 @@ class Scene(PickledByFields):
 
     @cached_property
     def energies(self) -> float:
-        """The sum of these energies, J, which is 0 for a body at rest without a field and a load."""
+        """The sum of the energies in `energy_scale`, J; 0 for a body at rest without a field and a load."""
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
@@ -323,7 +327,7 @@ class Scene(PickledByFields):
     def invariants(self) -> tuple[Invariant, ...]:
         """Conserved quantities of the exact motion: energy, momenta or their balances, and `extra_invariants`.
 
-        In free flight, energy and momentum are those of the rotation about the centre of mass, and those of `flight` follow.
+        In free flight, energy and momentum belong to the rotation about the centre of mass. The invariants of `flight` follow.
         """
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
         if self.loaded:
@@ -378,7 +382,7 @@ class Scene(PickledByFields):
 
 
 def _copy(value: Any) -> Any:
-    """Return a copy of a frozen dataclass of this package, and of those in it, without caches; another value itself."""
+    """Return a copy without caches of a frozen dataclass of this package and the dataclasses in it; other values unchanged."""
     if not is_dataclass(value) or not type(value).__module__.startswith(f"{__package__}."):
         return value
     return replace_unchecked(value, **{field.name: _copy(getattr(value, field.name)) for field in fields(value)})

@@ -71,9 +71,9 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
 def install_build(engine: str, path: Path, source: Source) -> Installation:
     """Return the environment of a build, a wheel or a folder of sources, created if it does not exist.
 
-    Its version is that of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is never
-    mistaken for a release or for another build. Raise `BadInput` if the path is neither a wheel of the engine nor a folder of
-    sources, must not be built, or cannot be installed.
+    Its version is the version of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is
+    never mistaken for a release or for another build. Raise `BadInput` if the path is neither a wheel of the engine nor a
+    folder of sources, must not be built, or cannot be installed. It names `--against`, the option of `conservative track`.
     """
     if path.suffix == ".whl" and path.is_file():
         distribution = distribution_of(engine)
@@ -82,8 +82,9 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
         if normal_name(name) != package or not re.fullmatch(r"[0-9][^-]*(-[^-]+){3,4}\.whl", rest):
             raise BadInput("against", repr(path.name), f"a wheel of {package}")
         version = rest.partition("-")[0].lower()
+        # A version has one plus sign at most.
         version += f"{'.' if '+' in version else '+'}{BUILD}{hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
-        if existing := read_environment(folder_of_all() / engine / version):  # without a network
+        if existing := read_environment(folder_of_all() / engine / version):  # needs no network
             return Installation(existing, False, import_trouble(existing, distribution))
         return _install(engine, distribution, resolve_wheel(distribution, path.resolve(), version, source), source)
     if not any((path / name).is_file() for name in ("pyproject.toml", "setup.py")):
@@ -107,7 +108,7 @@ def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> P
 def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     """Return the newest versions with wheels that the engine's file supports, oldest first.
 
-    Raise `BadInput` if the engine is unknown, or the source does not list its versions.
+    Raise `BadInput` for `--last` of `conservative track` if the engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
     versions = KINDS[distribution.kind].list_versions(distribution.package, source)

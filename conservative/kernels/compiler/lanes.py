@@ -25,7 +25,13 @@ from .traced import trace
 
 WIDTH = 2 * FOUR if COMPILED else 1
 """Number of bodies in most kernels: two registers of most processors, so that these work on one while they wait for the other.
-Kernels that have no room for two use `REGISTER`."""
+Kernels whose numbers fill the registers of a processor already use `REGISTER`."""
+
+
+def _flatten(value):
+    """Return the numbers of a tuple of tuples, or of one number, as a list."""
+    return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
+
 
 if COMPILED:
     from llvmlite import ir
@@ -39,6 +45,9 @@ if COMPILED:
         unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
 
         def result_of(*kinds):
+            """Return the type of the result. None refuses the arguments: lanes go with lanes of their width and with numbers,
+            masks only with masks.
+            """
             widths = {kind.width for kind in kinds if isinstance(kind, first)}
             others = [kind for kind in kinds if not isinstance(kind, first)]
             fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
@@ -48,7 +57,7 @@ if COMPILED:
         type_callable(symbol)(lambda _: (lambda a: result_of(a)) if unary else (lambda a, b: result_of(a, b)))
 
         def lower(context, builder, sig, args):
-            # No flags: the function that is compiled says whether products may be fused.
+            # No flags: the flags of the function that is being compiled decide whether products may be fused.
             numbers = (unpack(builder, *typed, ()) for typed in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
 
@@ -99,9 +108,6 @@ if COMPILED:
             return kind
         return types.BaseTuple.from_types([_arrange(part, kind) for part in like], getattr(like, "instance_class", None))
 
-    def _flatten(value):
-        return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
-
     @intrinsic(prefer_literal=True)
     def load(typing, array, index, width):
         """Return array[index : index + width] as a number."""
@@ -122,7 +128,7 @@ if COMPILED:
             at = args[1]
 
             def fill(part):
-                nonlocal at
+                nonlocal at  # the numbers of all parts follow each other
                 if isinstance(part, types.BaseTuple):
                     return context.make_tuple(builder, part, [fill(inner) for inner in part])
                 number, at = _read(context, builder, (sig.args[0], args[0]), at, kind), builder.add(at, args[2])
@@ -165,7 +171,11 @@ if COMPILED:
         return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, len(at)), list(at)))
 
     def _transpose(builder, numbers):
-        """Return four registers, one per lane, from up to four registers of four, one per number."""
+        """Return four registers, one per lane, from up to four registers of four, one per number.
+
+        First a with b and c with d, the even lanes apart from the odd ones, then both pairs: eight shuffles. Missing
+        numbers leave parts without a value, which `save_columns` does not store.
+        """
         pick, nothing = partial(_pick, builder), ir.Constant(ir.VectorType(DOUBLE, FOUR), ir.Undefined)
         a, b, c, d = [*numbers] + [nothing] * (FOUR - len(numbers))
         ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
@@ -177,6 +187,7 @@ if COMPILED:
         """Store the numbers of each body one after the other: the first body at index, the next at index + stride."""
 
         def build(context, builder, sig, args):
+            # Four numbers of four bodies are transposed at a time, so that one instruction stores four numbers of a body.
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
             parts = range(0, numbers[0].width // len(numbers[0].registers), FOUR)
             fours = [[_pick(builder, x, x, range(i, i + FOUR)) for x in number.registers for i in parts] for number in numbers]
@@ -203,6 +214,7 @@ if COMPILED:
         def build(context, builder, sig, args):
             if a.width == floats_in_register(a.width):
                 return builder.extract_element(builder.extract_value(args[0], 0), args[1])
+            # Several registers: which of them is known only when the code runs, so the lane is read from memory.
             return builder.load(builder.gep(_copy(builder, args[0])[1], [args[1]]))
 
         return types.float64(a, types.intp), build
@@ -234,9 +246,6 @@ else:
         """Return the numbers at index, index + stride and so on: `like` of them, or arranged as the tuple `like`."""
         return _fill((0.0,) * like if isinstance(like, int) else like, iter(array[index::stride]))
 
-    def _flatten(value):
-        return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
-
     def save(array, index, value):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Store a number at index."""
         array.reshape(-1)[index : index + np.size(value)] = value
@@ -265,7 +274,7 @@ def gather_numbers(values):
 
     def clear(value):
         if isinstance(value, tuple):
-            return tuple.__new__(type(value), map(clear, value))
+            return tuple.__new__(type(value), map(clear, value))  # for tuples and named tuples
         numbers.append(value)
         return 0.0
 
@@ -294,6 +303,7 @@ def cache_by_types(build):
 
 
 join = trace(traced.join)
+"""`traced.join` as kernels call it."""
 
 
 @trace
