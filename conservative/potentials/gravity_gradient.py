@@ -51,10 +51,10 @@ class GradientField(NamedTuple):
         return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return six rows: the factors of u = G g that `series` multiplies with the components of g, divided by J.
+        """Return six rows, from which `series` forms u = G g in two arrangements, with component j divided by J_j.
 
-        A series stores a vector v as r = (v2, v3, v1) and s = (v3, v1, v2). Then u in the arrangement r is the first three rows
-        times g in the arrangements r and s and g itself, component by component, and u in the arrangement s the last three.
+        The arrangements of a vector v are v_r = (v2, v3, v1) and v_s = (v3, v1, v2). The first three rows times g_r, g_s and g,
+        component by component, add up to u_r, and the last three to u_s.
         """
         x, y, z = self.rows
         of_r = (y[1], z[2], x[0]), (y[2], z[0], x[1]), (y[0], z[1], x[2])
@@ -70,7 +70,7 @@ class GradientField(NamedTuple):
         """Return the recurrence of J^-1 (g x u)."""
         rows = [series.vector(*row) for row in constants]
         by_r, by_s, by_g = zip(rows[:3], rows[3:], strict=True)
-        turned = series.history(), series.history()  # J^-1 u in the arrangements r and s
+        turned = series.history(), series.history()  # J^-1 u_r and J^-1 u_s
 
         def accelerate(c: Any, n: Any) -> Any:
             for k, u in enumerate(turned):
