@@ -119,7 +119,7 @@ class RigidBody(PickledByFields):
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
     def momentum(self, w_WB_B: ArrayLike, t: ArrayLike = 0.0) -> Array:
-        """Return the angular momentum (..., 3), kg m^2/s, with that of the rotor, for rates (..., 3), rad/s; body axes.
+        """Return the angular momentum (..., 3), kg m^2/s, including the rotor's, for rates (..., 3), rad/s; body axes.
 
         Times (...), s, matter if the rotor has a motor.
         """

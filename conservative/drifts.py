@@ -33,7 +33,7 @@ def measure_drifts(
     The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the method
     conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not the grid's.
     Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes. In scenes with
-    loads, drifts are those of the balances with `supplied` (n, m, 4), as in `Trajectory`; nan for a body that has none.
+    loads, drifts belong to the balances with `supplied` (n, m, 4), as in `Trajectory`; nan for a body that has none.
     """
     drifts, rotor, potential = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum, bodies.scene.potential
     V, impulse = _NO_ENERGIES if potential is None else field_energies(bodies, t, R_WB, w_WB_B), None
@@ -102,7 +102,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
 
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
-    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
+    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight of the rotation only."""
     return (ORTHONORMALITY, *(invariant.name for invariant in bodies.scene.rotation_only.invariants))
 
 

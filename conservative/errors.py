@@ -68,7 +68,7 @@ REMOVED: Mapping[str, str] = MappingProxyType(
         "to_xarray": "to_pandas(), which returns the same samples as a table",
     }
 )
-"""What is gone since the last release, and what to use instead: endings of files, options, and attributes."""
+"""Removals since the last release, and what to use instead: endings of files, options, and attributes."""
 
 
 class RemovedAttribute:

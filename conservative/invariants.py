@@ -34,7 +34,7 @@ class Invariant:
     that turn with the field (`Scene.in_field_axes`).
 
     In a scene with a torque or damping, I(t) - I(0) equals what these loads supplied. `supplied` returns it, (n,) or (n, 3),
-    from `Trajectory.supplied`, and the drift is that of the balance I(t) - I(0) - supplied.
+    from `Trajectory.supplied`, and the drift belongs to the balance I(t) - I(0) - supplied.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def invariants_of(
 
     These are the energy, unless the field depends on time; the Jacobi integral in a turning field; the world momentum (a
     vector) of a free body, or its component along the axis of the field (the vertical in uniform gravity); and the axial
-    momentum if body and field are symmetric about one axis. Momenta include that of a rotor.
+    momentum if body and field are symmetric about one axis. Momenta include a rotor's.
 
     The initial rates (3,) are in rad/s, the reference scale of the energy in J, above 0. `axis` is the unit vector (3,), body
     axes, about which body and field are symmetric, or None (`axial_direction`).

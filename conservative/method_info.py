@@ -1,4 +1,4 @@
-"""What a family of methods declares: its settings for tables and benchmarks, its place in the automatic choice, its colour.
+"""Declaration of a family of methods: its settings for tables and benchmarks, its place in the automatic choice, its colour.
 
 Settings are texts as in the name of a method, such as "RK4" or "order=4,tol=1e-9", and "" for the defaults.
 """

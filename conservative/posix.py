@@ -1,4 +1,4 @@
-"""What only some systems have. Elsewhere each function does nothing, or returns that the value is unknown.
+"""Functions that only some systems have. Elsewhere each function does nothing, or returns that the value is unknown.
 
 No other file imports a module of one system, except the program of a worker, which uses no other file.
 """

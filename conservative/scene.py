@@ -272,7 +272,7 @@ class Scene(PickledByFields):
         return self.now().smoothness().breaks
 
     def smoothness(self, t_end: float = 0.0) -> Smoothness:
-        """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
+        """Return the break points of a run to t_end, s, at least to the scene's, and the step that resolves its loads."""
         end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # rounding can put the last step after t_end
         return examine(self.loads, end) if self.loads else SMOOTH
 

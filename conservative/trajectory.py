@@ -87,7 +87,7 @@ class Trajectory:
     def p_WB(self) -> Array | None:
         """Positions (n, 3), m, world axes, of the origin of the body frame in free flight, otherwise None.
 
-        They are those of the engine. If the method integrates the rotation only, they follow from its attitudes and the
+        They are the engine's. If the method integrates the rotation only, they follow from its attitudes and the
         exact parabola of the centre of mass.
         """
         return self.place[0] if self.scene.flight else None
@@ -132,7 +132,7 @@ class Trajectory:
         """Return the drift (I - I0) / scale of an invariant I, (n,) or (n, 3); I0 is its value in the scene's initial state.
 
         The invariant is one of `scene.invariants`, or its name, such as "energy". `conservative.invariants.sizes` returns
-        magnitudes. In a scene with a torque or damping, the drift is that of the balance I - I0 - supplied, and nan if the
+        magnitudes. In a scene with a torque or damping, the drift belongs to the balance I - I0 - supplied, and nan if the
         method does not provide `supplied`.
 
         Raises
@@ -156,7 +156,7 @@ class Trajectory:
         return invariant.evaluate(self.scene.in_field_axes(self.R_WB, self.t), self.w_WB_B, *more)
 
     def error(self, truth: Trajectory) -> Array:
-        """Return the attitude error (n,), rad: the angle between this attitude and that of `truth` at each sample.
+        """Return the attitude error (n,), rad: the angle between this attitude and the attitude of `truth` at each sample.
 
         Raises
         ------

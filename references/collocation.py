@@ -112,7 +112,7 @@ def _slope(scene: Scene) -> Slope:
                 T = T - np.einsum("nij,jn->in", D, np.array([x, y_, z]))
             if torque is not None and scene.torque is not None:
                 T = T + (torque if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(torque))))
-            L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
+            L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # rates follow from the body's own momentum
             spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
             return np.array([*(rate / 2 for rate in turn), *spin])
 

@@ -33,7 +33,7 @@ STEP_LIMIT = 10_000_000
 PACE_STEPS = 1000
 """After so many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
 SHARE = 15 / 16
-"""Mass of a body about a fixed point, relative to the largest possible one: that of the paper's cone."""
+"""Mass of a body about a fixed point, relative to the largest possible one: the mass of the paper's cone."""
 LONG = 1e5
 """Rotation in a run, rad, above which heyoka's pace is checked first. Shorter runs stay far below the limit."""
 

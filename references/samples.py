@@ -1,6 +1,6 @@
 """Samples in body axes from the states of engines: one compiled loop for all engines, as for our own methods.
 
-The form of a state is one of the integers below. Symbols: F are the axes of the engine's body, D those of its attitude,
+The form of a state is one of the integers below. Symbols: F are the axes of the engine's body, D the axes of its attitude,
 q a quaternion with the scalar first, w rates in F, l the momentum, u = l/J1 in D, n the third axis of F in D. Engines return
 attitudes without orthonormalisation, so the norm error of a quaternion is visible in the samples.
 """

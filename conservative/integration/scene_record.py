@@ -1,7 +1,7 @@
 """A scene as JSON: numbers and texts, and a digest for everything else, such as the functions of a `FunctionPotential`.
 
 A digest shows whether two scenes are the same, but a scene cannot be restored from it. Digests of another interpreter or of an
-earlier version of this package cannot be compared, nor can those of values that cannot be followed (`conservative.identity`).
+earlier version of this package cannot be compared, nor can digests of values that cannot be followed (`conservative.identity`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _BY = f"2 {sys.implementation.cache_tag}"
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     """Return `scene` if the record describes it; if it is None, restore the scene from the record.
 
-    Warn if the record has functions that cannot be compared with those of the scene (`SceneNotCompared`). Raise `BadInput` if
+    Warn if the record has functions that cannot be compared with the scene's (`SceneNotCompared`). Raise `BadInput` if
     the record describes another scene; or if `scene` is None, and the record contains digests or cannot be restored.
     """
     if scene is None:

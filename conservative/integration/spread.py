@@ -111,7 +111,7 @@ def spread(
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
         drawn = starts["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
-        if hasattr(scene.potential, "inertia"):  # tensors, because that of the field is one
+        if hasattr(scene.potential, "inertia"):  # tensors, because the field has a tensor
             varied["inertia"] = drawn if drawn.ndim == 3 else drawn[:, :, None] * np.eye(3)
         elif hasattr(static_part(scene.potential), "inertia"):
             got = "a spread in a turning field with the inertia of the scene's body"

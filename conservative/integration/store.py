@@ -214,7 +214,7 @@ def _restore_failure(text: str, outcome_kind: str) -> IntegrationFailed:
 def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
     """Yield the store of a run, which no other process can write to in the block.
 
-    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method.
+    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is the label of the method.
 
     Raise `BadInput` if the folder contains another run or, except on Windows, another process writes to it; for other errors
     see `find_ensemble`.

@@ -66,7 +66,7 @@ def sine_and_cosine(x):
 
 @kernel
 def find_means(mc):
-    """Return what `jacobi` needs to know of the complementary parameter mc in [0, 1]: means of 1 and sqrt(mc), and their limit.
+    """Return the data of `jacobi` for the complementary parameter mc in [0, 1]: means of 1 and sqrt(mc), and their limit.
 
     Of every level `means` has the arithmetic mean, one over it, and the geometric mean; `last` is the level, a float, at which
     both agree. Each lane stops at a level of its own, so that none changes with its neighbours.

@@ -26,13 +26,13 @@ def finite_torque(field, q, a):
 
 @small
 def whole(rotor, L):
-    """Return the momentum L of a body with that of its rotor, which is None without one."""
+    """Return the momentum L of a body plus the momentum of its rotor, which is None without one."""
     return L if rotor is None else add(L, rotor)
 
 
 @small
 def own(rotor, L):
-    """Return the momentum L of a body without that of its rotor, which is None without one."""
+    """Return the momentum L of a body minus the momentum of its rotor, which is None without one."""
     return L if rotor is None else subtract(L, rotor)
 
 
@@ -63,7 +63,7 @@ def at_step(field, t, h):
 
 @trace
 def rotor_at(field, rotor, t):
-    """Return the momentum of the rotor at a time t, s: `rotor`, or that of the field's motor."""
+    """Return the momentum of the rotor at a time t, s: `rotor`, or the momentum of the field's motor."""
     return field.wheel(t) if hasattr(field, "wheel") and field.motor else rotor
 
 
@@ -90,7 +90,7 @@ def react(L, carry, half):
 
 @trace
 def body_momentum(field, whole_momentum, t):
-    """Return the momentum without that of a rotor with a motor at a time t, s; unchanged without one."""
+    """Return the momentum minus the momentum of a rotor with a motor at a time t, s; unchanged without one."""
     if not (hasattr(field, "wheel") and field.motor):
         return whole_momentum
     return subtract(whole_momentum, field.wheel(t))
@@ -98,7 +98,7 @@ def body_momentum(field, whole_momentum, t):
 
 @trace
 def with_motor(field, L, t):
-    """Return the momentum with that of a rotor with a motor at a time t, s; unchanged without one."""
+    """Return the momentum plus the momentum of a rotor with a motor at a time t, s; unchanged without one."""
     return add(L, field.wheel(t)) if hasattr(field, "wheel") and field.motor else L
 
 

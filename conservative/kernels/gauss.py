@@ -37,7 +37,7 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .taylor import shortest_move
 
 FAILURE = "the step is too long for the iteration"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**18
 """Sweeps between two calls of handlers of signals."""
 MOST_SWEEPS = 120
@@ -72,7 +72,7 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Number of stages s; A, E by columns, b and its low part; step h, s. The matrices are those of `gauss_legendre`: A for the
+    """Number of stages s; A, E by columns, b and its low part; step h, s. The matrices are from `gauss_legendre`: A for the
     stages of a step, E for a guess of the next stages. They are padded with zeros to a multiple of four stages.
     """
 

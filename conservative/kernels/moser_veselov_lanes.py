@@ -20,7 +20,7 @@ from .protocol import record_lanes
 GIVEN = 24
 """Numbers that a body is given by: `gather`."""
 SHIFT, LEFT, RATES, AXES, FINISHED = 0, 15, 19, 22, 31
-"""First rows: of `Shift`, the turn in front, amplitudes of the rate, the polhode's axes in those of the body, and 0 or 1."""
+"""First rows: of `Shift`, the turn in front, amplitudes of the rate, the polhode's axes in body axes, and 0 or 1."""
 ROWS, STATE_ROWS = 32, 5
 SLOWEST = 1e-60
 """Limit of |w| dt below which bodies that turn are left to be run alone: squares of squares would be no floats."""
@@ -85,7 +85,7 @@ def step_of_order(p, h, order, room):
 def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table, states):
     """Fill `table` (ROWS, columns) and `states` (STATE_ROWS, columns) for steps dt of an order, 0 for the exact one.
 
-    Bodies are given as `gather` takes them; dt is in units `time`. `limits` are those of |w| dt, of nu dt and of cn: bodies
+    Bodies are given as `gather` takes them; dt is in units `time`. `limits` are for |w| dt, nu dt and cn: bodies
     beyond them, or without a step, get 0 in the row FINISHED.
     """
     columns, flat, room = table.shape[1], table.reshape(-1), np.empty(GIVEN * WIDTH)

@@ -56,7 +56,7 @@ from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply
 from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes, record_supply
 
 FAILURE = "no continuous solution"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**17
 """Stages between two calls of handlers of signals; one that `continue_branch` solves counts as DEAR of them."""
 DEAR = 64
@@ -243,9 +243,9 @@ def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
 
 @kernel
 def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
-    """Return what `newton_solve` does, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
+    """Return the results of `newton_solve`, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
 
-    Each guess is on the tangent of the branch. Where the branch ends before h, the size is that of the residual at that end,
+    Each guess is on the tangent of the branch. Where the branch ends before h, the size is the residual's at that end,
     relative to the right side.
     """
     a, slope = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -407,7 +407,7 @@ def find_start(lengths, step, stage):
     """Return the time, s, at which a stage of a step starts. Without loads its callers do not use it, and it is left out."""
     t = 0.0
     for i in range(len(lengths)):
-        # Products, whose rounding does not add up as that of a sum over all steps would.
+        # Products, whose rounding does not add up as in a sum over all steps.
         t += (step - 1) * lengths[i] if i >= stage else step * lengths[i]
     return t
 
@@ -499,9 +499,9 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, t
 def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n_steps, every_step, q_out, L_out, finished):
     """Take the steps after `done` up to `last` of n_steps: of all bodies, WIDTH at a time.
 
-    lengths (stages,) are those of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses, moment (3, n)
-    that of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is worked in. Samples go to q_out (n, samples,
-    4) and L_out (n, samples, 3), and `finished` (n,) is made False where a body has no solution.
+    lengths (stages,) are the parts of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses; moment
+    (3, n) the moment of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is memory for the work. Samples
+    go to q_out (n, samples, 4) and L_out (n, samples, 3), and `finished` (n,) becomes False if a body has no solution.
     """
     n, stages = moments.shape[1], len(lengths)
     tolerance = tolerance ** (2.0 / 3.0)

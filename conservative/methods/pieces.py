@@ -1,7 +1,7 @@
 """Steps that end where a load is not smooth: at its break points a step is divided, and each part sees one side of a jump.
 
 A run consists of pieces between break points: whole steps, and parts of a step before, between and after points. Each is a run
-of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay those of the grid: a
+of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay on the grid: a
 piece says whether its steps are whole, and which samples it fills, because a part can be as long as a step and one step too.
 
 A part of a step is divided into more steps, the shorter the steps of the grid are. Otherwise runs with different steps would be
@@ -107,7 +107,7 @@ def march_pieces(
     q: Array,
     L: Array,
 ) -> tuple[int, int, int, int | None, float, bool]:
-    """Take the steps of all pieces as `enter` of a kernel takes those of a run, and fill the samples q and L."""
+    """Take the steps of all pieces as `enter` of a kernel takes the steps of a run, and fill the samples q and L."""
     state, supplied, ends = (model.q, model.L), np.zeros(4), (np.empty((2, 4)), np.empty((2, 7)))
     stages, corrections, evaluations, size = 0, 0, None, 0.0
     q[0], L[0, :3], L[0, 3:] = model.q, model.L, 0.0

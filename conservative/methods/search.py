@@ -6,7 +6,7 @@ next, with a shorter step, and the search ends when that candidate already has a
 2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
-Fixed steps are given up as soon as those of one candidate show that the motion is not smooth, or when steps as short as a trial
+Fixed steps are given up as soon as one candidate's steps show that the motion is not smooth, or when steps as short as a trial
 allows show no order: an adaptive method follows. It is not tried on noise of time, which no step resolves.
 
 The chosen setting is then refined over the whole duration (`refine_until`), by its step or its tolerance. `recommend` does the

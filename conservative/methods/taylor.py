@@ -62,7 +62,7 @@ class Taylor(Method):
     them below 0.06 times the tolerance.
 
     `integrate_many` integrates several bodies at once, one per lane of a vector register, with equal steps. The results differ
-    from those of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
+    from runs of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
     after 1,000. Free bodies and symmetric tops are not reduced in lanes, so their truncation errors differ as well. With a
     tolerance, and in turning fields, bodies run one by one.
 

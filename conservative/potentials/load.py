@@ -1,6 +1,6 @@
 """Torques, damping and motors of rotors, which may depend on time: momenta obey balances with their impulse, energy with work.
 
-The discrete work and impulse are those of the load term of the paper's (22) to (27) (DERIVATION.md, section 14).
+The discrete work and impulse belong to the load term of the paper's (22) to (27) (DERIVATION.md, section 14).
 
 Steps end where a load is not smooth, and a load is evaluated on one side of such a time: methods pass the `Window` between two
 of them, and a table is continued beyond it by its last segment.
@@ -75,7 +75,7 @@ class Loaded(NamedTuple):
         return self._replace(field=field, call=call, body=body, world=world, damping=damping, resistance=resistance)
 
     def at_step(self, t: Any, h: Any) -> Any:
-        """Return the field for a step of length h from t, both s. The torque is that of the midpoint."""
+        """Return the field for a step of length h from t, both s. The torque is the torque of the midpoint."""
         return self.at_time(t + 0.5 * h)._replace(over=2.0 / h)
 
     def wheel(self, t: Any) -> Any:
@@ -253,7 +253,7 @@ class OfTime(PickledByFields):
 
     @property
     def end(self) -> float:
-        """Last time, s, at which it has a value: that of a table, otherwise infinite."""
+        """Last time, s, at which it has a value: the end of a table, otherwise infinite."""
         return float(self.value[0][-1]) if isinstance(self.value, tuple) else math.inf
 
     def require_times(self, t_end: float) -> None:

@@ -92,7 +92,7 @@ class Turned(NamedTuple):
         return self._replace(back=(cosine(half), *scale(-sine(half), self.normal)))
 
     def energy(self, q: Any) -> Any:
-        """Return V in J: that of the fixed field at the attitude in axes O."""
+        """Return V in J of the fixed field at the attitude in axes O."""
         return self.field.energy(product(self.back, q))
 
     def body_torque(self, q: Any) -> Any:
@@ -100,7 +100,7 @@ class Turned(NamedTuple):
         return self.field.body_torque(product(self.back, q))
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return those of the fixed field."""
+        """Return the axes of the fixed field."""
         return self.field.find_constants(J_inverse)
 
     def slope(self, constants: Any, g: Any) -> Any:

@@ -50,7 +50,7 @@ def choices() -> dict[str, dict[str, list[str]]]:
     """Return the shapes, the kinds of potential and the forms of an attitude, each with its keys."""
     potentials = {name: keys_of(build) for name, build in _POTENTIALS.items()}
     potentials["uniform_gravity"].append("g")
-    potentials["gravity_gradient"].remove("inertia")  # that of the body
+    potentials["gravity_gradient"].remove("inertia")  # the body has it
     return {
         "shape": {name: keys_of(build) for name, build in SHAPES.items()},
         "kind": potentials,

@@ -199,7 +199,7 @@ def _model(mj, given):
 WRITTEN = ("file", "child", "joints", "world", "damping")
 """Descriptions of a body by a file."""
 DUMMY = 1, (0.1, 0.2, 0.3), (2, 3, 4), (0.6, 0.8, 0, 0)
-"""A body whose centre and axes are not those of its frame: MuJoCo decides that when it compiles a model."""
+"""A body whose centre and axes differ from its frame: MuJoCo decides that when it compiles a model."""
 
 
 def _inertial(given):
@@ -257,7 +257,7 @@ def _start(mj, model, data, given):
 
     qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
     joint as for the ball joint. The free joint's position and velocity, both of its origin in world axes, are ahead of them:
-    those of a free flight, otherwise 0.
+    0 unless the scene is a free flight.
     """
     mj.mj_resetData(model, data)
     data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0

@@ -139,7 +139,7 @@ def compile_derivative():
 
 
 def mujoco_moments(given):
-    """Return the moments (3,). MuJoCo refuses those of a planar body that exceed the sum of the others by a rounding unit."""
+    """Return the moments (3,). MuJoCo refuses a planar body if a moment exceeds the sum of the others by a rounding unit."""
     moments = given.moments_com
     return np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
 

@@ -56,7 +56,7 @@ class EngineData(Distribution):
     precision
         "f64" or "f32", for engines without such a setting.
     fields
-        Names of the potentials that are supported, on bodies about a fixed point; `"Turning"` for those of them that turn.
+        Names of the potentials that are supported, on bodies about a fixed point; `"Turning"` for the ones that turn.
     free_only
         The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
         depends on that.

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from .. import engines
-from ..engines import mujoco as _mujoco  # the name without a dash at the front is that of the class in an environment
+from ..engines import mujoco as _mujoco  # the name without a dash at the front belongs to the class in an environment
 from ..engines import pinocchio as _pinocchio
 from .adapter import SCRIPTS, LocalEngine, read_script
 from .engine_method import EngineMethod, engine_class

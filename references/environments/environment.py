@@ -64,7 +64,7 @@ class Environment:
     engine, version
         Name of the engine, such as `bsk`, and its version.
     folder
-        The virtual environment, the folder of `node_modules`, or that of the compiled program.
+        The virtual environment, the folder of `node_modules`, or the folder of the compiled program.
     runtime
         Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages

@@ -42,7 +42,7 @@ NEEDS: dict[Any, Features] = {kind: frozenset({Feature.TURNING}) if kind is Turn
 
 
 def describe_field(axes: EngineAxes) -> dict[str, Any]:
-    """Return the numbers of all fields; those of a field that the scene does not have are 0."""
+    """Return the numbers of all fields; numbers of a field that the scene does not have are 0."""
     potential: Any = axes.scene.potential
     numbers: dict[str, Any] = {name: np.zeros(3) for name in ("point", "anchor", "direction", "turn")}
     numbers |= {"stiffness": 0.0, "rest_length": 0.0, "strength": 0.0, "gradient": np.zeros((3, 3))}
@@ -99,7 +99,7 @@ def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
 
 
 def join_numbers(every: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the numbers of a run of n bodies, from those of each."""
+    """Return the numbers of a run of n bodies, from the numbers of each body."""
     shared = {name: value for name, value in every[0].items() if name in SHARED}
     rows = {name: np.array([numbers[name] for numbers in every]) for name in every[0] if name not in SHARED}
     return {**shared, **rows, "rows": list(rows)}

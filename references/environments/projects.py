@@ -1,7 +1,7 @@
 """Environments of versions of a project, such as a package that registers a method: of a commit, a folder or a wheel.
 
     FOLDER/wheels/KEY/      the wheel of a version; KEY is its commit or its hash
-    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is that of the package
+    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is the package's
 
 FOLDER is `projects` next to the folder of engines. Wheels and environments stay there, so that the base of many comparisons is
 built once. The other packages of an environment have their current versions: if these have changed, it is created again.

@@ -168,7 +168,7 @@ class Description:
     def weigh(self, element: Any, place: Array, density: float = DENSITY) -> list[Piece]:
         """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane.
 
-        Raise `BadInput` for a mesh that cannot be read, and for another shape than those of `weigh`.
+        Raise `BadInput` for a mesh that cannot be read, and for a shape that `weigh` does not know.
         """
         form = element[0]
         values = _values(form)
@@ -198,7 +198,7 @@ class Description:
             if auto:
                 raise
             self.reading.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
-        if auto:  # a mass of the file is that of the whole, from libsdformat 15.2 on
+        if auto:  # a mass in the file is the mass of the whole, from libsdformat 15.2 on
             mass = inertial.findtext("mass")
             return link.filled(link.geometry.scale(number(mass) / link.geometry.mass if mass and link.geometry.mass else 1.0))
         if inertial is None and self.urdf:

@@ -45,7 +45,7 @@ def refuse(path: Path, what: str, allowed: str) -> BadInput:
 
 
 def reason(error: BadInput) -> str:
-    """Return what is wrong with a file, without its path."""
+    """Return the mistake of a file, without its path."""
     return error.what if isinstance(error, RefusedFile) else str(error.got)
 
 

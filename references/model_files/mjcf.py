@@ -26,7 +26,7 @@ from .files import inline, load_mesh, refuse
 from .pieces import ONE, Link, Piece, Reading, join, join_links, make_pose, rounding_of, weigh
 
 _HALF = {"capsule": (1, 2), "cylinder": (1, 2), "box": (2, 2, 2), "ellipsoid": (1, 1, 1), "sphere": (1,)}
-"""Shapes, and the factors from sizes in MJCF, which are half lengths, to those of `weigh`."""
+"""Shapes, and the factors from sizes in MJCF, which are half lengths, to the sizes of `weigh`."""
 
 
 class NotRead(Exception):
@@ -164,7 +164,7 @@ def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequ
 
 
 def _pose(element: Any, options: Any, own: Array | None = None) -> Array:
-    """Return the pose (4, 4) of an element in its body from its `own`, with those of the frames around it."""
+    """Return the pose (4, 4) of an element in its body from its `own` and the poses of the frames around it."""
     own = make_pose(element.pos, _turn(element.quat, element.alt, options)) if own is None else own
     return own if element.frame is None else _pose(element.frame, options) @ own
 

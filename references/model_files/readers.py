@@ -74,13 +74,13 @@ class Model(Reading):
 
     @property
     def _repaired(self) -> bool:
-        """Whether the reference reader is an engine that has repaired an impossible inertia."""
+        """True if the reference reader is an engine that has repaired an impossible inertia."""
         bad = self.kind == "sdf" and self.own and (self.own.flaw or self.own.excess)
         return bool(bad and self.reference and not (self.reference.flaw or self.reference.excess))
 
     @property
     def disagree(self) -> str:
-        """How the readers disagree; "" if they do not, or if no body is like any reading."""
+        """Disagreement of the readers; "" if they agree, or if no body is like any reading."""
         if not self.own or self._repaired or all(part.flaw for part in (self.own, self.reference) if part):
             return ""
         if self.reference and (far := differing(self.reference, self.own, AGREE)):
@@ -89,7 +89,7 @@ class Model(Reading):
 
     @property
     def flaw(self) -> str:
-        """Why no body is like that of the file; "" if one is, or if the readers disagree about it."""
+        """Reason that no body is like the file's; "" if a body can be, or if the readers disagree about it."""
         return "" if self.disagree else self.truth.flaw
 
     @property
@@ -99,7 +99,7 @@ class Model(Reading):
 
     @property
     def lonely(self) -> str:
-        """Why there is one reader only; "" if there are two."""
+        """Reason that there is one reader only; "" if there are two."""
         if self.own and not self.reader:
             how = {"sdf": "conservative engines install drake"}.get(self.kind, "pip install pin")
             return f"no reference reader is installed ({how})"
@@ -119,7 +119,7 @@ class Model(Reading):
         return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *excuse]))
 
     def alone(self, engine: str) -> bool:
-        """Whether an engine would be compared with itself."""
+        """Return True if an engine would be compared with itself."""
         return self.own is None and engine in FAMILY.get(self.kind, ())
 
     def asked_for(self, engine: str, seen: Piece, tolerance: float) -> str:

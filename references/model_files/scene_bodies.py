@@ -1,7 +1,7 @@
 """Bodies out of model files (URDF, SDF, MJCF, USD) for scene files, by the readers of `conservative verify`.
 
 A body turns about its joint. Bodies welded to it are included; bodies on further joints are not. A free body turns about its
-centre of mass. Body axes are those of the link, or of the body of MJCF or USD.
+centre of mass. Body axes are the axes of the link, or of the body of MJCF or USD.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rigid bodies of USD files, twice: as usd-core computes them, and from the attributes by the rules of UsdPhysics.
 
-usd-core opens the stage in both, after a look at what its layers refer to. Volumes of shapes are those of `weigh` in both; a
+usd-core opens the stage in both, after a look at the references of its layers. Volumes of shapes are from `weigh` in both; a
 round shape whose scale differs by axis is an ellipsoid in one, as it is drawn, and has the largest scale in the other, as in
 the schema's parser.
 """
@@ -64,7 +64,7 @@ class Stage:
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self.joints = [prim for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get() is not False]
         children = [target for prim in self.joints for target in UsdPhysics.Joint(prim).GetBody1Rel().GetTargets()]
-        self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are those of the root
+        self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are the root's
 
     def pose(self, prim: Any) -> tuple[Array, Array]:
         """Return the pose (4, 4) of a prim, m, and its linear map (3, 3) in these axes, the scale. A body has no shear."""
@@ -78,7 +78,7 @@ class Stage:
         return make_pose(self.metre * world[:3, 3], R), R.T @ world[:3, :3]
 
     def colliders(self, body: Any) -> list[Any]:
-        """Return the enabled colliders of a body, without those of enabled bodies below it."""
+        """Return the enabled colliders of a body, without the colliders of enabled bodies below it."""
         from pxr import Usd
 
         colliders, prims, api = [], iter(Usd.PrimRange(body, Usd.TraverseInstanceProxies())), self.physics.CollisionAPI

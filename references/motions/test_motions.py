@@ -11,7 +11,7 @@ ANGLE = 0.01  # |w| h, rad: 0.1, 0.03 or 0.01
 SINGLE = False  # single precision
 HAS = {"rotor", "torque", "damping", "fixed point", "orbit"}  # motions that need anything else are skipped
 NAMES = "attitude", "rates", "energy", "momentum"
-NEAR = 0.8  # sum of the squares of four logarithms, of errors over those of a mistake that explains them
+NEAR = 0.8  # sum of the squares of four logarithms: errors over the errors of a mistake that explains them
 
 
 # YOUR ENGINE
@@ -45,7 +45,7 @@ def rotate(q, v):
 
 
 def errors(m, i, q, w):
-    """Return the error of the attitude, rad, and those of rates, energy and momentum relative to the scales of the motion."""
+    """Return the errors of the attitude, rad, and of rates, energy and momentum relative to the scales of the motion."""
     L, exact, scale = [dot(row, w) for row in m["inertia_B"]], m["quaternion_wxyz"][i], m["scale"]
     energy = dot(L, w) / 2 + m.get("weight", 0) * rotate(q, m.get("com_B", [0, 0, 0]))[2]
     momentum = rotate(q, [x + y for x, y in zip(L, m.get("rotor_momentum_B", [0, 0, 0]))])
@@ -66,7 +66,7 @@ def worst(m, steps):
 
 
 def distance(found, limit, known):
-    """Return how far errors are from those of a mistake, where they are above the tolerance."""
+    """Return the distance of errors above the tolerance from the errors of a mistake."""
     return sum(math.log(max(x, y) / max(known[name], y)) ** 2 for x, y, name in zip(found, limit, NAMES))
 
 

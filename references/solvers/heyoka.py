@@ -47,7 +47,7 @@ class Heyoka(Method):
 
     Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
     vectorised within a step). `fast_math` is on for base vectors only, which then take 14 % less to 8 % more time. Samples are
-    values of the steps' Taylor polynomials and as accurate as the steps. Fields are those of
+    values of the steps' Taylor polynomials and as accurate as the steps. Fields are in
     `conservative.references.heyoka_equations.accelerations`.
 
     Parameters

@@ -38,7 +38,7 @@ _COMPILED: dict[str, dict[str, Any]] = {
     **{"DOP853": {"name": "dop853"}, "RK45": {"name": "dopri5"}, "LSODA": {"name": "lsoda"}},
     **{"BDF": {"name": "vode", "method": "bdf", "with_jacobian": True}, "Adams": {"name": "vode", "method": "adams"}},
 }
-"""Settings of `scipy.integrate.ode` for those of its integrators that are like ours."""
+"""Settings of `scipy.integrate.ode` for its integrators that are like ours."""
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
 
 Derivative = Callable[[float, Array], Array]
@@ -146,7 +146,7 @@ def solve_pieces(
 ) -> tuple[Array, Counters, str]:
     """Return states (n, 7), a quaternion and rates in principal axes, at increasing times t (n,), s, from a solver.
 
-    `pieces` are those of `list_derivatives`, for the same `last`: the solver starts again in each. The integrated rates are
+    `pieces` are from `list_derivatives`, for the same `last`: the solver starts again in each. The integrated rates are
     J^-1 (J w + h): a motor changes h, but not the sum. Return also the steps and evaluations, and the reason if the states end
     early.
     """
@@ -258,7 +258,7 @@ class Ode(Settings):
     def _make(self, f: Derivative, longest: float, steps: int | None = None) -> Any:
         failures, nothing = list[BaseException](), np.full(7, np.nan)
 
-        def guarded(t: float, y: Array) -> Array:  # `dop853` never ends after an exception, such as that of Ctrl-C
+        def guarded(t: float, y: Array) -> Array:  # `dop853` never ends after an exception, such as Ctrl-C's
             try:
                 return f(t, y)
             except BaseException as failure:

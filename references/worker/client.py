@@ -148,7 +148,7 @@ class Worker:
     folder
         Folder in which each process gets a working directory, removed when it ends; by default the current directory.
     variables
-        Environment variables of the process; by default those of this one.
+        Environment variables of the process; by default the same as of this one.
     memory
         Memory limit in bytes, which only Linux supports; 0 for none.
     show_output

@@ -53,7 +53,7 @@ if COMPILED:
         return builder.asm(ir.FunctionType(value.type, [value.type]), "", "=r,0", [value], False)
 
     class Memory:
-        """Registers like that of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
+        """Registers like the register of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
 
         def __init__(self, number):
             self.builder, self._places, self.register = number.builder, {}, ir.VectorType(DOUBLE, number.width or FOUR)

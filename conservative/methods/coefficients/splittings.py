@@ -57,8 +57,8 @@ SEQUENCES = {
         ),
     )
 }
-"""Sequences by order. Their errors on random bodies are below a twentieth (order 4) and a thousandth (order 6) of those of the
-composition with the same step."""
+"""Sequences by order. Their errors on random bodies are below a twentieth (order 4) and a thousandth (order 6) of the errors
+of the composition with the same step."""
 
 
 def lengths_of(order: int, exact: bool) -> Lengths:
