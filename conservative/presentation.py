@@ -123,7 +123,7 @@ def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Lite
         starts, ends = (np.linspace(0, n - 1, MOST_DRAWN + 1).astype(int)[part] for part in (slice(-1), slice(1, None)))
     t, tables = (trajectory.t[starts] + trajectory.t[ends]) / 2 / length, []
     for name, values in series.items():  # an interval has both its ends, so that bands join
-        low, high = (each(each.reduceat(values, starts), values[ends]) for each in (np.minimum, np.maximum))
+        low, high = (extreme(extreme.reduceat(values, starts), values[ends]) for extreme in (np.minimum, np.maximum))
         tables.append(pd.DataFrame({"t": t, "of": name, "value": high, "low": low}))
     base = alt.Chart(pd.concat(tables), width=_WIDTH, height=_HEIGHT).encode(
         x=alt.X("t:Q", title=f"time, {unit}"),

@@ -114,7 +114,7 @@ class Ensemble:
         import pandas as pd
 
         if rows == "samples":
-            samples = [sample_rows(each) for each in self]
+            samples = [sample_rows(body) for body in self]
             frame = pd.DataFrame(np.concatenate(samples), columns=columns(self[0]))
             frame.insert(0, "body", np.repeat(np.arange(len(samples)), [len(sample) for sample in samples]))
         else:
