@@ -122,11 +122,11 @@ def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
     Parameters and exceptions are those of `observed_order`.
     """
     h, e = check_points(steps, errors)
-    known = np.isfinite(e)
-    if np.count_nonzero(known) < MIN_POINTS:
+    finite = np.isfinite(e)
+    if np.count_nonzero(finite) < MIN_POINTS:
         return False
-    last = e[known][np.argmin(h[known])]
-    return bool(last > max(GROWTH * e[known].min(), NO_ROUND_OFF))
+    last = e[finite][np.argmin(h[finite])]
+    return bool(last > max(GROWTH * e[finite].min(), NO_ROUND_OFF))
 
 
 def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:

@@ -153,11 +153,11 @@ class Recommendation:
     @property
     def winners(self) -> dict[str, Advice | None]:
         """The cheapest advice that reaches the error: of all, of our general integrators, and of the engines."""
-        good = sorted((each for each in self.advice if each.reached and not math.isnan(each.cost)), key=lambda each: each.cost)
+        good = sorted((row for row in self.advice if row.reached and not math.isnan(row.cost)), key=lambda row: row.cost)
         return {
             "cheapest": next(iter(good), None),
-            "cheapest_general": next((each for each in good if each.role == Role.OURS and each.general), None),
-            "cheapest_engine": next((each for each in good if each.role == Role.ENGINE), None),
+            "cheapest_general": next((row for row in good if row.role == Role.OURS and row.general), None),
+            "cheapest_engine": next((row for row in good if row.role == Role.ENGINE), None),
         }
 
 

@@ -180,10 +180,10 @@ def attempt(
     sentence, which `build` has. None if the mistakes cannot be applied.
     """
     if case.screen is not None:
-        found = _attempt(case.screen, trial, start, small, most, known)
-        if found is None or (not found.explains and found.rest > HALF):
-            return found
-        start = [found.values[number.name] for number in trial.numbers]
+        explanation = _attempt(case.screen, trial, start, small, most, known)
+        if explanation is None or (not explanation.explains and explanation.rest > HALF):
+            return explanation
+        start = [explanation.values[number.name] for number in trial.numbers]
     return _attempt(case, trial, start, small, most, known)
 
 

@@ -45,5 +45,5 @@ def find_version(text: str, package: str) -> str:
         rf'"(?:node_modules/)?{name}":\s*{{\s*"version":\s*"([^"]+)"',  # package-lock.json
         rf'"{name}":\s*"v?(\d[\w.+-]*)"',  # package.json
     )
-    found = (re.search(form, text, re.MULTILINE | re.IGNORECASE) for form in forms)
-    return next((match[1] for match in found if match), "")
+    matches = (re.search(form, text, re.MULTILINE | re.IGNORECASE) for form in forms)
+    return next((match[1] for match in matches if match), "")

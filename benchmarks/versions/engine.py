@@ -91,7 +91,7 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     if isinstance(first, Outcome):
         return replace(observation, outcome=first)
     done = [first, *map(study.attempt, cases[1:])]
-    runs = [each.trajectory for each in done if isinstance(each, Success)]
+    runs = [attempt.trajectory for attempt in done if isinstance(attempt, Success)]
     return replace(
         observation,
         points=tuple(_points(study, scene, method)),
@@ -161,9 +161,9 @@ class EngineSide:
 
     def measure(self, scene: str) -> Iterator[tuple[str, Observation]]:
         """Yield an observation for each setting on a scene, by the setting as tables show it."""
-        (value,) = (each for each in self.study.scenes if each.name == scene)
+        (definition,) = (candidate for candidate in self.study.scenes if candidate.name == scene)
         for method in self.methods:
-            yield method.setting(), observe(self.study, value, method, self.version.name)
+            yield method.setting(), observe(self.study, definition, method, self.version.name)
 
 
 def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str]) -> tuple[EngineSide, ...]:
@@ -183,7 +183,7 @@ def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_na
     if not settings:
         family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
         settings = tuple(settings_text(method) for method in family.settings_in_tables())
-    methods = [tuple(registry.method(f"{engine}@{each.name}:{setting}") for setting in settings) for each in versions]
+    methods = [tuple(registry.method(f"{engine}@{version.name}:{setting}") for setting in settings) for version in versions]
     every = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
     taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in every))

@@ -27,9 +27,9 @@ Array = np.ndarray[Any, Any]
 _scene = lru_cache(maxsize=64)(registry.scene)
 
 
-def prepare(given: SimpleNamespace) -> Callable[[], Any]:
+def prepare(task: SimpleNamespace) -> Callable[[], Any]:
     """Return the run of a task, "solve", "probe" or "time"."""
-    return {"solve": solve, "probe": probe, "time": keep_running}[given.task](given)
+    return {"solve": solve, "probe": probe, "time": keep_running}[task.task](task)
 
 
 def list_methods(names: list[str], project: str = "") -> Answer:
@@ -78,10 +78,10 @@ def describe_pair(scene: str, method: str) -> Answer:
     return {"unsupported": reason, "longest_step": float(chosen.longest_step(built))}
 
 
-def solve(given: SimpleNamespace) -> Callable[[], Answer]:
+def solve(task: SimpleNamespace) -> Callable[[], Answer]:
     """Integrate a `scene` by a `method` from `w_WB_B0` over a grid (`dt`, `n_steps`, `every`), and check the result."""
-    scene, method = replace(_scene(given.scene), w_WB_B0=given.w_WB_B0), registry.method(given.method)
-    grid = Grid(given.dt, given.n_steps, given.every)
+    scene, method = replace(_scene(task.scene), w_WB_B0=task.w_WB_B0), registry.method(task.method)
+    grid = Grid(task.dt, task.n_steps, task.every)
     run = method.prepare(scene, grid)
 
     def solve_once() -> Answer:
@@ -95,12 +95,12 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
     return solve_once
 
 
-def probe(given: SimpleNamespace) -> Callable[[], Answer]:
+def probe(task: SimpleNamespace) -> Callable[[], Answer]:
     """Integrate a body of principal `moments` about a fixed point, with a `weight` at `com`, and do not check the result."""
-    field = UniformGravity(given.weight, given.com) if given.weight else None
-    scene = Scene("probe", RigidBody(given.moments), given.R_WB0, given.w_WB_B0, 1.0, potential=field)
+    field = UniformGravity(task.weight, task.com) if task.weight else None
+    scene = Scene("probe", RigidBody(task.moments), task.R_WB0, task.w_WB_B0, 1.0, potential=field)
     try:
-        run = registry.method(given.method).prepare(scene, Grid(given.dt, given.n_steps, given.every))
+        run = registry.method(task.method).prepare(scene, Grid(task.dt, task.n_steps, task.every))
     except Unsupported as error:
         raise NotImplementedError(str(error)) from None
 
@@ -111,6 +111,6 @@ def probe(given: SimpleNamespace) -> Callable[[], Answer]:
     return solve_once
 
 
-def keep_running(given: SimpleNamespace) -> Callable[[], Any]:
+def keep_running(task: SimpleNamespace) -> Callable[[], Any]:
     """Return the run of a `scene` by a `method` over `n_steps` steps `dt`, final state only, for the worker to time."""
-    return registry.method(given.method).prepare(_scene(given.scene), Grid(given.dt, given.n_steps, given.n_steps))
+    return registry.method(task.method).prepare(_scene(task.scene), Grid(task.dt, task.n_steps, task.n_steps))

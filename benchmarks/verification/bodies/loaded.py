@@ -135,28 +135,28 @@ def verify_files(
         for program in programs:
             stack.callback(program.worker.close)
         if any(model.kind == "sdf" for model in models) and "drake" in installed:
-            reader = next((each for each in programs if each.engine == "drake"), None) or Program("drake")
+            reader = next((program for program in programs if program.engine == "drake"), None) or Program("drake")
             stack.callback(reader.worker.close)
             for model in models:
                 if model.kind == "sdf" and model.own:
                     model.reader = f"libsdformat in {reader.label}"
                     model.reference, model.reference_refuses = reader.read(model)
-        found: dict[str, list[tuple[Finding, LoadedBody]]] = {model.label: [] for model in models}
+        loaded: dict[str, list[tuple[Finding, LoadedBody]]] = {model.label: [] for model in models}
         for number, program in enumerate(programs):
             for done, model in enumerate(models):
                 tell((number + done / len(models)) / len(programs), f"{program.label}: {model.label}")
-                found[model.label].append(program.check(model))
-    return [_join(file, list(same), found) for file, same in groupby(models, key=lambda model: model.file)]
+                loaded[model.label].append(program.check(model))
+    return [_join(file, list(same), loaded) for file, same in groupby(models, key=lambda model: model.file)]
 
 
-def _join(file: str, models: list[Model], found: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
+def _join(file: str, models: list[Model], loaded: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
     """Return the verification of a file from those of its bodies."""
-    pairs = [pair for model in models for pair in found[model.label]]
+    pairs = [pair for model in models for pair in loaded[model.label]]
     notes = [note if len(models) == 1 else f"{model.body.name}: {note}" for model in models for note in model.notes]
     findings = [finding for finding, _ in pairs]
-    tested = [each for each in findings if each.verdict is not Verdict.NOT_TESTED]
-    right = sum(each.verdict is Verdict.RIGHT for each in tested)
-    wrong = dict.fromkeys(each.subject for each in tested if each.verdict is Verdict.WRONG)
+    tested = [finding for finding in findings if finding.verdict is not Verdict.NOT_TESTED]
+    right = sum(finding.verdict is Verdict.RIGHT for finding in tested)
+    wrong = dict.fromkeys(finding.subject for finding in tested if finding.verdict is Verdict.WRONG)
     reason = f"{right} of {len(tested)} answers of engines are right" if tested else "no engine loads files of this format"
     reason += f"; wrong in {', '.join(wrong)}" * bool(wrong)
     details = tuple(body for _, body in pairs)
@@ -181,7 +181,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     far = errors(wanted, body) if body else dict.fromkeys(QUANTITIES, np.inf)
     if wanted.excess and not flaw:  # within the rounding of its moments
         far["inertia"] -= wanted.rounding / np.abs(wanted.inertia).max()
-    differs = [name for name, each in far.items() if not each < tolerance]
+    differs = [name for name, distance in far.items() if not distance < tolerance]
     error = max(0.0, *far.values())
     doubt = model.doubt(engine, differs) or (DIGITS if wanted.excess and prints and not flaw else "")
     has = seen.value if isinstance(seen, NoBody) else f"it has {describe(seen)}"
@@ -369,11 +369,11 @@ class Program:
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:
         if self.formats and kind not in self.formats:
             raise NotImplementedError(f"no loader for {kind.upper()}")
-        given = {"adapter": self._adapter, "path": path, "kind": kind}
+        request = {"adapter": self._adapter, "path": path, "kind": kind}
         try:
             if not self.formats:
-                return self.worker.ask("call", **given, engine=self.engine, function="probe", cases=cases)
-            result = self.worker.ask("load", **given, velocities=cases[:, 0], forces=cases[:, 1])
+                return self.worker.ask("call", **request, engine=self.engine, function="probe", cases=cases)
+            result = self.worker.ask("load", **request, velocities=cases[:, 0], forces=cases[:, 1])
         except EngineError as error:  # also at the first step
             return {"refused": error.reason}
         try:

@@ -358,8 +358,8 @@ class Design:
     @property
     def name(self) -> str:
         """The design in words."""
-        words = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
-        return ", ".join([*words, *["single"] * self.single])
+        parts = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
+        return ", ".join([*parts, *["single"] * self.single])
 
     def run(
         self, motions: Sequence[Motion], parts: int, after: Callable[[Array], Array] | None = None

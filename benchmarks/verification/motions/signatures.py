@@ -69,12 +69,12 @@ def signatures(motions: Sequence[Motion]) -> list[dict[str, Found]]:
     out: list[dict[str, Found]] = [{} for _ in motions]
     for name, mistake, numbers in _all():
         if isinstance(mistake, Habit):
-            for made, found in zip(out, EXACT.run(motions, PARTS[-1], _keep(mistake, numbers)), strict=True):
-                made[name] = found
+            for made, samples in zip(out, EXACT.run(motions, PARTS[-1], _keep(mistake, numbers)), strict=True):
+                made[name] = samples
             continue
         for motion, made in zip(motions, out, strict=True):
-            if (one := _with(motion, mistake, numbers)) is not None:
-                made[name] = one
+            if (samples := _with(motion, mistake, numbers)) is not None:
+                made[name] = samples
     for motion, made in zip(motions, out, strict=True):
         made[_BOTH] = _solve(Equations(motion.scene, gyroscopic=0.0, damping=BOTH[2]), motion.t)
     return out

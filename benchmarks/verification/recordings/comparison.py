@@ -117,7 +117,7 @@ def _choose_order(scene: Scene, recording: Recording, t: Array, start: float) ->
     usual = allow()
     first = Compared(scene, t, (R, w), start, 1.0, usual.errors, usual.noise)
     other = first.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
-    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda each: float(each[0].error.mean()))
+    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda candidate: float(candidate[0].error.mean()))
     options = replace(recording.options, quaternion=order)
     return replace(recording, data=case.data, order_known=True, options=options), case.scene
 
@@ -157,9 +157,9 @@ def _find_noise(
             motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
             resolved &= (motion < 0.3 * noise) | (noise < TINY)
-            told = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
-            better = told & (~resolved | (other[0] < noise))
-            noise, resolved = np.where(better, other[0], noise), resolved | told
+            apart = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
+            better = apart & (~resolved | (other[0] < noise))
+            noise, resolved = np.where(better, other[0], noise), resolved | apart
     return np.where(resolved & (noise / sizes <= MOST_NOISE), noise / sizes, 0.0), resolved
 
 
@@ -234,8 +234,8 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
                 if good < len(part.t) and whole and (reached := _reach(extended)[0]) <= good:
                     extended, part, end = extended.take(slice(0, reached)), part.take(slice(0, reached)), reached
                     fitted = extended
-                fitted = min(fitted, extended, key=lambda each: each.size(each.error))
-            part = min(part, fitted, key=lambda each: each.size(each.error))
+                fitted = min(fitted, extended, key=lambda part: part.size(part.error))
+            part = min(part, fitted, key=lambda candidate: candidate.size(candidate.error))
         parts.append(part)
         if end >= len(rest.t) or len(parts) > 200 or not part.passes(part.error):
             break

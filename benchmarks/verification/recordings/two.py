@@ -94,59 +94,64 @@ def verify_two(
             raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
     tell("difference")
     a, b = made[first[0]], made[second[0]]
-    found = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
+    difference = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
     names = f"{a.subject} and {b.subject}"
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
-    verdict = Verdict.NOT_TESTED if found.missing else Verdict.RIGHT if found.agrees else verdict
-    worse = 0 if found.missing else found.worse
+    verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else verdict
+    worse = 0 if difference.missing else difference.worse
     finding = Finding(
         names,
         "recording",
         "difference",
         verdict,
-        found.error[worse],
-        found.allowed[worse],
+        difference.error[worse],
+        difference.allowed[worse],
         UNITS[worse],
         rows[first[0]].allowed.by[worse],
-        detail=found.missing,
+        detail=difference.missing,
     )
-    notes = [f"{each.subject}: {note}" for each in (a, b) for note in each.notes]
-    return Verification(names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, found), notes, Two(a, b, found))
+    notes = [f"{verification.subject}: {note}" for verification in (a, b) for note in verification.notes]
+    return Verification(
+        names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, difference), notes, Two(a, b, difference)
+    )
 
 
-def _reason(a: Verification, b: Verification, found: Difference) -> str:
+def _reason(a: Verification, b: Verification, difference: Difference) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    size = "" if found.missing else f"{number(found.error[found.worse])} {UNITS[found.worse]}"
+    size = "" if difference.missing else f"{number(difference.error[difference.worse])} {UNITS[difference.worse]}"
     both = (a.verdict, b.verdict)
-    (one,), (other,) = a.findings, b.findings
+    (first,), (second,) = a.findings, b.findings
     if both == (Verdict.RIGHT, Verdict.RIGHT):
-        if found.missing:
-            return f"both are right; they are not compared with each other: {found.missing}"
-        if found.agrees:
+        if difference.missing:
+            return f"both are right; they are not compared with each other: {difference.missing}"
+        if difference.agrees:
             return f"both are right, and differ by at most {size}"
         return (
-            f"both are motions of this body, from different starts: they differ by {size} at {found.time:g} s. "
+            f"both are motions of this body, from different starts: they differ by {size} at {difference.time:g} s. "
             "--start scene decides"
         )
     if both == (Verdict.WRONG, Verdict.WRONG):
-        same = bool(one.mistake) and one.mistake == other.mistake
-        if found.agrees and (not same or one.mistake in BODIES):
+        same = bool(first.mistake) and first.mistake == second.mistake
+        if difference.agrees and (not same or first.mistake in BODIES):
             return (
                 f"both have the same motion (they differ by at most {size}), but not the motion of this body: check --body. "
                 f"{a.subject}: {a.reason}"
             )
         if same:
             numbers = (
-                "" if one.causes[0].sentence == other.causes[0].sentence else f" ({b.subject}: {other.causes[0].sentence})"
+                "" if first.causes[0].sentence == second.causes[0].sentence else f" ({b.subject}: {second.causes[0].sentence})"
             )
-            return f"both are wrong by the same mistake: {one.causes[0].sentence}{numbers}"
-    return ". ".join(f"{each.subject} is {each.verdict}: {each.reason}" for each in sorted((a, b), key=_order))
+            return f"both are wrong by the same mistake: {first.causes[0].sentence}{numbers}"
+    return ". ".join(
+        f"{verification.subject} is {verification.verdict}: {verification.reason}"
+        for verification in sorted((a, b), key=_order)
+    )
 
 
-def _order(each: Verification) -> bool:
+def _order(verification: Verification) -> bool:
     """Sort the right one before the other one."""
-    return each.verdict is not Verdict.RIGHT
+    return verification.verdict is not Verdict.RIGHT
 
 
 def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], object]:
