@@ -57,12 +57,12 @@ class Processes(ExitStack):
         for number, other in enumerate(self._others if runs else (), start=1):
             work = partial(_time_there, [prepares[key] for key in runs], {**how, "seed": number})
             try:
-                found = run_within(limit, work, shared, other)
+                measured = run_within(limit, work, shared, other)
             except NotTransferable:
                 break
             except IntegrationFailed as failure:  # the process crashed or took too long
-                found = [Timing(math.nan, math.nan, 0, 0, failure.outcome)] * len(runs)
-            for key, timing in zip(runs, found, strict=True):
+                measured = [Timing(math.nan, math.nan, 0, 0, failure.outcome)] * len(runs)
+            for key, timing in zip(runs, measured, strict=True):
                 timings[key].append(timing)
         return timings
 

@@ -109,10 +109,10 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     """
     wanted = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
     if names is not None:
-        known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
+        engines = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
-            if (base := registry.read_name(name, "engines").base) not in known:
-                raise BadInput("engines", repr(name), nearest(base, known))
+            if (base := registry.read_name(name, "engines").base) not in engines:
+                raise BadInput("engines", repr(name), nearest(base, engines))
         wanted = list(selection.methods(names))
     lines = {selection.series(method): method for method in reversed(wanted)}
     return tuple(reversed(lines.values()))

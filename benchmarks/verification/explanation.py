@@ -119,8 +119,8 @@ class Explanation:
         if self.trial is None or self.trial.anew is not None:
             return None
         fitted = {number.name for number in self.trial.numbers}
-        known = {name: value for name, value in self.values.items() if name not in fitted}
-        return attempt(case, self.trial, [self.values[number.name] for number in self.trial.numbers], known=known)
+        others = {name: value for name, value in self.values.items() if name not in fitted}
+        return attempt(case, self.trial, [self.values[number.name] for number in self.trial.numbers], known=others)
 
 
 def explain(

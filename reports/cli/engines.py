@@ -69,7 +69,7 @@ def install(
             yield install(name, Source(find_links, allow_build), force)
 
     done = _show(install_each(), installation_line, as_json, f"installing {', '.join(names)}")
-    ctx.exit(int(any(each.trouble for each in done)))
+    ctx.exit(int(any(engine.trouble for engine in done)))
 
 
 @engines.command(

@@ -64,8 +64,8 @@ class OldName(click.ClickException):
 
     def __init__(self, old: str, arguments: Iterable[str] = ()) -> None:
         new = OLD_NAMES[old]
-        given = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
-        super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
+        rest = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
+        super().__init__(f"{old} is now {new}. Run: conservative {new} {rest}".rstrip())
 
 
 class GoneOption(click.ClickException):

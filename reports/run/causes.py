@@ -37,10 +37,10 @@ def _find(solve: Solve, setting: Mapping[str, Any], free: bool) -> Explained:
     findings, named, _ = motion_findings("", answers)
     wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
     if wrong and not named:
-        sentence = next((each.detail for each in wrong if each.detail), UNKNOWN)
-        moved = any(math.isfinite(each.error) for each in wrong)  # a run that ended has no motion: its row says so
+        sentence = next((finding.detail for finding in wrong if finding.detail), UNKNOWN)
+        moved = any(math.isfinite(finding.error) for finding in wrong)  # a run that ended has no motion: its row says so
         return Explained("unknown" if moved else "", sentence)
-    causes = [[explanation.cause for explanation in each.explanations] for each in named]
+    causes = [[explanation.cause for explanation in group.explanations] for group in named]
     return Explained(
         "; ".join(" or ".join(cause.key for cause in same) for same in causes),
         "; ".join(" or ".join(cause.sentence for cause in same) for same in causes),

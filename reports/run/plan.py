@@ -73,7 +73,10 @@ class Plan:
         """The locks of the environments that engines run in, sorted by name."""
         methods = (*self.methods, *self.engines)
         used = {method.environment.folder: method.environment for method in methods if isinstance(method, EngineMethod)}
-        locks = (LockedEngine(f"{each.engine}=={each.version}", each.runtime, each.packages) for each in used.values())
+        locks = (
+            LockedEngine(f"{environment.engine}=={environment.version}", environment.runtime, environment.packages)
+            for environment in used.values()
+        )
         return tuple(sorted(locks, key=lambda lock: lock.name))
 
     @property
@@ -133,26 +136,26 @@ def plan_report(
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     shared = {"truth": remember_truths(), "skip_missing": skip_missing}
 
-    def methods_of(each: Declaration) -> tuple[Method, ...]:
+    def methods_of(declared: Declaration) -> tuple[Method, ...]:
         """Return the methods of a study; none if the report does not have it."""
-        if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
+        if declared.extent > kind.extent or (declared.draw and not bodies) or (declared.scenes and names):
             return ()
-        if each.named is Named.ONLY:
+        if declared.named is Named.ONLY:
             return named
-        if each.draw and few:
+        if declared.draw and few:
             return tuple(method for method in compared if method.name in FEW_METHODS)
-        mine = every if each.draw else compared
-        return each.in_report((*mine, *named) if each.named is Named.TOO else mine)
+        mine = every if declared.draw else compared
+        return declared.in_report((*mine, *named) if declared.named is Named.TOO else mine)
 
     made: list[Study] = []
-    for each in STUDIES.values():
-        if not (taken := methods_of(each)):
+    for declared in STUDIES.values():
+        if not (taken := methods_of(declared)):
             continue
-        limit = kind.time_limit if time_limit is None and each.named is not Named.ONLY else time_limit
-        extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if each.draw else shared
-        settings = {"quick": quick or (few and each.draw is not None), "time_limit": limit, **extent, **dict(each.more)}
-        study = each.plan(taken, () if each.scenes else chosen, kind.processes, **settings)
-        if each.draw and few:
+        limit = kind.time_limit if time_limit is None and declared.named is not Named.ONLY else time_limit
+        extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if declared.draw else shared
+        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent, **dict(declared.more)}
+        study = declared.plan(taken, () if declared.scenes else chosen, kind.processes, **settings)
+        if declared.draw and few:
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
         made.append(study)
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}

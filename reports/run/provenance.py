@@ -59,12 +59,12 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
 
     Commands call it before any work: files and the commit can change meanwhile.
     """
-    words = sys.argv[1:] if arguments is None else arguments
+    command = sys.argv[1:] if arguments is None else arguments
     packages = {package.metadata["Name"]: package.version for package in distributions()}
     here = Path(__file__)
     tracked = git(here.parent, "ls-files", "--error-unmatch", here.name)  # False inside another project's working tree
     return Provenance(
-        shlex.join(["conservative", *words]),
+        shlex.join(["conservative", *command]),
         machine(),
         f"{platform.python_implementation()} {platform.python_version()}",
         dict(sorted(packages.items(), key=lambda item: item[0].lower())),

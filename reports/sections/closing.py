@@ -64,14 +64,14 @@ def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
     orders = lines.orders(of_study(table, convergence.STUDY.name, scene.name))
     timed = of_study(table, speed.STUDY.name, scene.name)
     steps, seconds = (
-        of_measure(timed, each).groupby("method")["value"].last() for each in (Measure.TIME_PER_STEP, Measure.TIME)
+        of_measure(timed, measure).groupby("method")["value"].last() for measure in (Measure.TIME_PER_STEP, Measure.TIME)
     )
     for _, line in accuracy.groupby("method" if named else "series", sort=False):
         rows = line[line["method"] == line["method"].iloc[-1]]
         method, family, series = rows[["method", "family", "series"]].iloc[0]
         values = (
-            float(known.get(key, math.nan))
-            for known, key in ((orders, method), (steps, method), (seconds, method), (reached, series))
+            float(column.get(key, math.nan))
+            for column, key in ((orders, method), (steps, method), (seconds, method), (reached, series))
         )
         yield Line(
             display_name(family, "", rows["setting" if named else "series_setting"].iloc[0]),

@@ -106,12 +106,12 @@ def figure(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Figure | N
     if not len(points):
         return None
     picture = figures.random_ratios(points, bodies, seed)
-    words = (
+    text = (
         f"Bodies in each field: {bodies}. Line: geometric mean; band: from the worst body to the best; above the dashed "
         "line ours is faster."
     )
     title = "Random bodies: the fastest engine's time divided by ours"
-    return Figure("random_bodies", title, words, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
+    return Figure("random_bodies", title, text, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:

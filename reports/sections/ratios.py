@@ -26,7 +26,7 @@ _RATIOS = (
 
 def section(measured: Measured) -> Section:
     """Return the section."""
-    source = {"study": tuple(each.STUDY.name for each in (random, work_precision, each_step))}
+    source = {"study": tuple(module.STUDY.name for module in (random, work_precision, each_step))}
     blocks: list[Block] = [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]
     return Section("Where an engine is faster", blocks, "ratios", source=source)
 
@@ -53,7 +53,7 @@ def ratio_table(measured: Measured) -> Table:
                         for speed_ratio in speed_ratios
                         if speed_ratio.theirs and cells[speed_ratio.error].grade is Grade.BAD
                     )
-                    names = dict.fromkeys(each.name for each in faster)
+                    names = dict.fromkeys(cost.name for cost in faster)
                     rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]
     body: list[Row] = [

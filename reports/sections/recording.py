@@ -27,8 +27,8 @@ def recording_blocks(verification: Verification) -> list[Block]:
         sentences.append(f"{sentence}.")
     proven, candidates = details.explaining, details.candidates
     left = [
-        f"{each.sentence}: leaves {details.show(each.left)} of {details.show(each.plain)}"
-        for each in (proven if len(proven) > 1 else candidates)
+        f"{explanation.sentence}: leaves {details.show(explanation.left)} of {details.show(explanation.plain)}"
+        for explanation in (proven if len(proven) > 1 else candidates)
     ]
     heading = "These explain the file equally well:" if len(proven) > 1 else ""
     if verification.verdict is Verdict.WRONG and not proven:
@@ -40,7 +40,7 @@ def recording_blocks(verification: Verification) -> list[Block]:
         f"Not used: {', '.join(name for name, why in details.unused.items() if why == reason)}: {reason}." for reason in reasons
     ]
     quantities = [[quantity.name, bound(quantity.largest), bound(quantity.final)] for quantity in details.quantities]
-    tried = [] if proven else [[each.name, details.show(each.left)] for each in details.tried[:LISTED]]
+    tried = [] if proven else [[explanation.name, details.show(explanation.left)] for explanation in details.tried[:LISTED]]
     return filled(
         Paragraph(" ".join(sentences)) if sentences else None,
         Paragraph(heading) if heading else None,
@@ -55,4 +55,7 @@ def two_blocks(verification: Verification) -> list[Block]:
     """Return the blocks on two recordings: those of each, in a section of its own."""
     details = verification.details
     assert isinstance(details, Two)
-    return [Section(f"{each.subject}: {each.verdict}", recording_blocks(each)) for each in (details.first, details.second)]
+    return [
+        Section(f"{recording.subject}: {recording.verdict}", recording_blocks(recording))
+        for recording in (details.first, details.second)
+    ]

@@ -60,14 +60,14 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
 
 def pictures(name: str, table: pd.DataFrame) -> list[Figure]:
     """Return the figures of named rows of a study, one for each scene; none for studies without a chart of their own."""
-    found = [str(scene) for scene in table["scene"].dropna().unique()]
+    names = [str(scene) for scene in table["scene"].dropna().unique()]
     if name == work_precision.STUDY.name:
         measured = points(table)
-        return [scenes.work_figure(of_scene(measured, scene), scene) for scene in found if scene in set(measured["scene"])]
+        return [scenes.work_figure(of_scene(measured, scene), scene) for scene in names if scene in set(measured["scene"])]
     if name == convergence.STUDY.name:
         errors = lines.errors(table, Measure.ATTITUDE_MAX)
-        each = {scene: of_scene(errors, scene) for scene in found}
-        return [scenes.convergence_figure(rows, lines.fits(rows), scene) for scene, rows in each.items() if len(rows)]
+        by_scene = {scene: of_scene(errors, scene) for scene in names}
+        return [scenes.convergence_figure(rows, lines.fits(rows), scene) for scene, rows in by_scene.items() if len(rows)]
     return []
 
 

@@ -15,7 +15,7 @@ from conservative.files import make_folder, write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
 from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
-from .signatures import Found, signatures
+from .signatures import Samples, signatures
 
 FACTOR = 2.0
 """Smallest error of a mistake that is listed, over the tolerance of order 2 at the smallest step."""
@@ -23,7 +23,7 @@ ROUND_OFF = 1e-11
 """Errors that depend on the machine."""
 
 
-def describe(motion: Motion, measured: Measured, signature: dict[str, Found]) -> dict[str, Any]:
+def describe(motion: Motion, measured: Measured, signature: dict[str, Samples]) -> dict[str, Any]:
     """Return a motion as the keys and values of its JSON file; README.md of references/motions explains them."""
     exact = motion.exact
     parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
@@ -49,7 +49,7 @@ def describe(motion: Motion, measured: Measured, signature: dict[str, Found]) ->
     }
 
 
-def catches(motion: Motion, allowed: Array, signature: dict[str, Found]) -> list[dict[str, Any]]:
+def catches(motion: Motion, allowed: Array, signature: dict[str, Samples]) -> list[dict[str, Any]]:
     """Return the mistakes that the tolerances of order 2 show, with their errors, first the one with the largest error."""
     (scale,) = sizes([motion])
     made = {name: error(motion, scale, samples) for name, samples in signature.items()}
