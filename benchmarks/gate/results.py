@@ -18,6 +18,7 @@ FOLDER = Path(".benchmarks") / "gate"
 """Path of the results of a gated run, relative to the root of the project."""
 FILE = "results.json"
 HISTORY = "bencher.json"
+"""The rows once more, for the service Bencher, which draws them over time."""
 RUNAWAY = 1.0
 """Relative energy drift above which a run has failed, even if it ended without an error."""
 ENERGY_DRIFT = Value(Measure.DRIFT_MAX, RUNAWAY, "energy").key

@@ -1,7 +1,7 @@
-"""The code that runs in the environment of a version: the worker loads this file, and its imports are those of that version.
+"""The code that runs in the environment of a version. The worker loads this file there, and it imports that version.
 
 It uses only parts of `conservative` that old versions have as well: names of methods and scenes, `Grid`, `prepare`, `check`.
-The worker calls its functions, or prepares a run whose task is in `given`.
+The worker calls its functions, or prepares the run of a task.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def prepare(task: SimpleNamespace) -> Callable[[], Any]:
 def list_methods(names: list[str], project: str = "") -> Answer:
     """List the settings of the methods `names` in the suite.
 
-    The default is what the project registers with the role `Role.OURS`. If it registers nothing, all methods of that role are
-    listed.
+    By default they are the methods with the role `Role.OURS` that the project registers, or all of that role if it registers
+    none.
     """
     families: dict[str, Any] = dict(registry.list_families())
     registered = set()
@@ -53,7 +53,7 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         family = families.get(name)
         if family and hasattr(family, "settings_for"):
             methods += family.settings_for("suite")
-        elif family:  # of a version without `card` and `method_info`
+        elif family:  # a version before `settings_for`
             methods += getattr(family, "suite_settings", family.variants)()
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             methods.append(registry.method(name))
@@ -71,10 +71,10 @@ def describe_pair(scene: str, method: str) -> Answer:
     built, chosen = _scene(scene), registry.method(method)
     reason = chosen.unsupported(built) or ""
     try:
-        if not reason:  # an engine may refuse a scene only when it gets it
+        if not reason:  # some engines refuse a scene only when they build it
             chosen.prepare(built, Grid(built.dt, 1, 1))
     except Unsupported as error:
-        reason = str(error.__context__ or error)
+        reason = str(error.__context__ or error)  # the engine's own message, which its adapter has wrapped
     return {"unsupported": reason, "longest_step": float(chosen.longest_step(built))}
 
 
@@ -102,7 +102,7 @@ def probe(task: SimpleNamespace) -> Callable[[], Answer]:
     try:
         run = registry.method(task.method).prepare(scene, Grid(task.dt, task.n_steps, task.every))
     except Unsupported as error:
-        raise NotImplementedError(str(error)) from None
+        raise NotImplementedError(str(error)) from None  # the worker answers that the scene is unsupported
 
     def solve_once() -> Answer:
         trajectory = run()

@@ -196,7 +196,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     if flaw:
         impossible = body and body.flaw
         text = f"{flaw}, and it changes the body; {changes}" if body and not impossible else f"{flaw}; {has}"
-        if prints and not (differs and impossible):
+        if prints and not (differs and impossible):  # a warning is enough, unless another impossible body follows it
             return Opinion(Verdict.RIGHT, f"{text}{printed}")
         warning = "" if prints else " without a warning"
         return Opinion(Verdict.WRONG, f"it accepts an impossible body{warning}: {text}{printed}")
@@ -282,6 +282,10 @@ class Program:
         return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen)
 
     def _verify(self, model: Model) -> tuple[Loaded, Opinion]:
+        """Return the answer of the engine and the verdict. After a wrong one, a copy that has nothing but the mass is tried.
+
+        What the engine does not accept may be a visual, a sensor or a floor of the file, which say nothing about its loader.
+        """
         loaded = self._measure(model)
         opinion = self._decide(model, loaded)
         if opinion.verdict is Verdict.WRONG and model.body.bare and loaded.answer is not Answer.CRASHED:
@@ -292,8 +296,9 @@ class Program:
                     return again
                 copy = "it loads a copy without visuals, sensors and all else beside the mass"
                 return loaded, Opinion(Verdict.UNDECIDED, f"{copy}, and refuses the file: {loaded.text}")
-            if isinstance(loaded.seen, NoBody):  # the file may have a floor that the body touches
+            if isinstance(loaded.seen, NoBody):  # the body may touch a floor of the file
                 return self._verify(bare)
+        # Rounding to single precision can hide a body with very different moments.
         if opinion.verdict is Verdict.WRONG and loaded.seen is NoBody.NOT_RIGID and self.single:
             return loaded, Opinion(Verdict.UNDECIDED, f"{opinion.detail}, in single precision")
         return loaded, opinion
@@ -333,7 +338,8 @@ class Program:
     def _identify(self, model: Model, cases: Array, measured: Array, near: Piece) -> Piece | None:
         """Return the body that explains the accelerations, or None if no body does.
 
-        Forces that suit the body of the file may be lost in the round-off of another one, so others are tried as well.
+        The forces suit the body of the file. In an engine with a very different body, their effect is lost in round-off. Then
+        the forces for a unit body are tried, and each result gives the forces for the next load.
         """
         unit = Piece(1.0, np.zeros(3), np.eye(3))
         for start in (near, unit):
@@ -357,7 +363,10 @@ class Program:
         return None
 
     def _load(self, model: Model, cases: Array) -> dict[str, Any]:
-        """Return the answer of `loaders.probe`, or that of a program to `load` in the same form. Raise as `Worker.ask`."""
+        """Return the answer of `loaders.probe`, or a program's answer to `load` in the same form. Raise as `Worker.ask`.
+
+        The folder of the file is removed from its texts: findings do not depend on where a file is.
+        """
         with time_limit(LIMIT):
             result = self._ask(str(model.path.resolve()), model.kind, cases)
         for name in ("refused", "output"):
