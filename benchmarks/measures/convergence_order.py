@@ -77,7 +77,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
        not determine it. Coarser points have not begun to converge. If one of them is as small as the end of the descent, the
        descent was chance and there is no order.
     2. Points finer than the end of the descent have reached the floor, the largest error from there on. Points within
-       `ABOVE_FLOOR` of it are not used. If the slope of the last pair is less than half that of the rest, its finer point is
+       `ABOVE_FLOOR` of it are not used. If the last pair has less than half the slope of the rest, its finer point is
        not used either.
     3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
        the scatter decreases by more than `CALMER`, and at least four points remain.
@@ -119,7 +119,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
 def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
     """Return whether the error at the shortest step is more than `GROWTH` times the smallest one, and no round-off.
 
-    Parameters and exceptions are those of `observed_order`.
+    Parameters and exceptions as in `observed_order`.
     """
     h, e = check_points(steps, errors)
     finite = np.isfinite(e)

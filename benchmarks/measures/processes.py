@@ -68,6 +68,6 @@ class Processes(ExitStack):
 
 
 def _time_there(prepares: Sequence[Callable[[], Callable[[], Any]]], how: dict[str, Any]) -> list[Timing]:
-    """Return the timing of each run, prepared here. All succeeded in another process; a failure here is that of the process."""
+    """Return the timing of each run, prepared here. All succeeded in another process: this process fails if one fails."""
     timings = time_interleaved({i: prepare() for i, prepare in enumerate(prepares)}, **how)
     return list(timings.values())

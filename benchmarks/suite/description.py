@@ -56,7 +56,7 @@ def _energies(potential: Any, t_end: float, probes: Array) -> Iterator[float]:
 
 
 def _describe_load(load: Any, t_end: float, probes: Array) -> Iterator[list[float]]:
-    """Yield 1 for world axes, a table, and values at some times; those of a function of the attitude also at the probes."""
+    """Yield 1 for world axes, a table, and values at some times; values of a function of the attitude also at the probes."""
     if hasattr(load, "at"):
         yield [float(getattr(load, "frame", "body") == "world")]
         varying = getattr(load, "of_time", load)  # of a damping

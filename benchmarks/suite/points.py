@@ -101,8 +101,8 @@ def points() -> Iterator[Point]:
 def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str, float]]:
     """Return the values that should not change, of a run that reaches its end, and how much round-off alone changes each.
 
-    They are errors, drifts, work and, in the paper's scenes, the observed order. Round-off is that of the method's precision.
-    `few` is for slow methods: fewer nudges, and orders from runs that are shorter than that of the scene.
+    They are errors, drifts, work and, in the paper's scenes, the observed order. Round-off depends on the method's precision.
+    `few` is for slow methods: fewer nudges, and orders from runs that are shorter than the scene.
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []

@@ -27,7 +27,7 @@ ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 TINY = 1e-11  # of noise, which is round-off
 SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
-LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
+LONGER = 30.0  # stretches of a trial motion over stretches of the exact one: a large number makes it as stiff
 PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 SENSITIVE = 1e6  # factor by which a motion may multiply an error, beyond which solutions need more digits
@@ -118,7 +118,7 @@ class Compared:
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
-    alone decides, it is that. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
+    alone decides, this one. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
     which the quaternion of the file changes its sign; None if the file has no quaternions.
     """
 
@@ -139,7 +139,7 @@ class Compared:
 
     @property
     def from_row(self) -> bool:
-        """Whether the initial state is that of the first row."""
+        """Whether the initial state is the state of the first row."""
         return self.start == float(self.t[0])
 
     def take(self, rows: Any) -> Compared:
@@ -228,7 +228,7 @@ class Compared:
         return replace(self, data=take_part(second, self.data)).errors(*first).max(axis=1)
 
     def passes(self, error: Array) -> bool:
-        """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
+        """Return whether digits and noise explain errors (2, n): the largest ones, and the means of squares."""
         n = error.shape[1]
         mean = np.sqrt((error**2).mean(axis=1))
         noisy = (self.noise * SIGMAS > 0.5 * self.allowed) & (self.rounded < self.allowed)

@@ -118,7 +118,7 @@ def _normalised(explanation: Explanation) -> bool:
 
 
 def _before_divergence(case: Compared) -> Compared:
-    """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
+    """Return the rows before rates exceed three times the exact rates; errors are relative to the largest rate there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
     size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
     if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
@@ -485,7 +485,7 @@ def _rows(case: Compared, asked: _Asked) -> Explanations:
 
 
 def _off_rows(error: Array) -> Any:
-    """Return which rows are off, if all others are much nearer: those of one residue, or up to a tenth of the rows."""
+    """Return which rows are off, if all others are much nearer: rows of one residue, or up to a tenth of all rows."""
     n = len(error)
     for period in range(2, 7):
         for first in range(period):

@@ -62,7 +62,7 @@ class Explanation:
 
     `left` and `plain` are the largest errors with them and without, over the rows that they were tried on: of attitudes, rad,
     and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
-    units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
+    units of the noise, and `explains` is True if what is left is allowed. `numbers` counts the fitted ones, and `made` is
     the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
     `of_program` is True if a program answered, and not a file.
     """

@@ -48,7 +48,7 @@ ROWS = 40
 NEAR = 3.0
 """Errors up to so many tolerances are right if they fall with the step as the declared order says."""
 FEW = 3
-"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is that of the method."""
+"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is an error of the method."""
 HANGS = 2
 """Motions of a program that does not answer, after which the others are not run."""
 SLOPE = 0.5

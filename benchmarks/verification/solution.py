@@ -297,7 +297,7 @@ def closed(scene: Scene) -> bool:
 
 
 def truth(scene: Scene, start: float, t: Array) -> tuple[Array, Array]:
-    """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is that at `start`."""
+    """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is the state at `start`."""
     if not closed(scene):
         R, w = Equations(scene).solve(start, scene.R_WB0[None], scene.w_WB_B0[None], t)
         return R[0], w[0]

@@ -29,7 +29,7 @@ class Price:
 
 
 def read_prices(texts: Sequence[str], file: Path) -> dict[str, Price]:
-    """Return the prices by method: those of a file, which need a reason, and those of texts `NAME=6x` or `NAME=6x: reason`.
+    """Return the prices by method: from a file, where each needs a reason, and from texts `NAME=6x` or `NAME=6x: reason`.
 
     Raises `BadInput` for a text or a line that is not one.
     """

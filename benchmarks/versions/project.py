@@ -92,7 +92,7 @@ class ProjectSide:
     """A version and its process, with its own folder of compiled kernels.
 
     `names` are the compared methods, by default those that the project registers with the role `Role.OURS`. `few` are the rows
-    that are measured with fewer points: those of the earlier version, because values of other points cannot be compared.
+    that are measured with fewer points: the points of the earlier version, because values of other points cannot be compared.
     `explain` finds the mistakes of a setting; without it no row has a cause.
     """
 

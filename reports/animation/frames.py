@@ -29,7 +29,7 @@ MOST = 1e6
 """Largest angular momentum in the data of a panel, relative to the initial one; the arrow ends before."""
 ERROR = "attitude error, rad"
 LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
-"""Largest values that are good, and fair, of the attitude error; those of drifts are 1e-10 and 1e-3."""
+"""Largest values that are good, and fair, of the attitude error; for drifts they are 1e-10 and 1e-3."""
 FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
 COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
@@ -237,7 +237,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     share = np.clip((times - t[before]) / np.where(after > before, t[after] - t[before], 1.0), 0.0, 1.0)
     start, stop = Rotation.from_matrix(trajectory.R_WB[before]), Rotation.from_matrix(trajectory.R_WB[after])
     R_WB = (start * Rotation.from_rotvec(share[:, None] * (start.inv() * stop).as_rotvec())).as_matrix()
-    last = np.append(before[:-1], len(t) - 1)  # the last numbers are those of the whole run
+    last = np.append(before[:-1], len(t) - 1)  # the last numbers belong to the whole run
     lengths = np.linalg.norm(trajectory.momentum_W, axis=1)
     tip = np.asarray(getattr(scene.potential, "com_B", np.zeros(3))) @ body.R_BP
     solid = _solid_of(body.moments, tip)

@@ -76,7 +76,7 @@ def _about_bars(data: pd.DataFrame) -> str:
 
 
 def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
-    """Return dashed rising lines of known slopes with labels, from the two ends of each: columns text, and those of x and y."""
+    """Return dashed rising lines of known slopes with labels, from the two ends of each: columns of text, x and y."""
     base = alt.Chart(ends).encode(x=x, y=y)
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
     logs: Any = ends.set_index("text").apply(np.log).groupby("text")

@@ -16,7 +16,7 @@ def _refuse(figure: Figure) -> str:
 
 
 def escape(value: object) -> str:
-    """Return a text without the characters that Markdown would not show, such as those of a name with HTML in it."""
+    """Return a text without the characters that Markdown would not show, such as HTML in a name."""
     return re.sub(r"`[^`]+`|[<*\[\]\\]|&(?=#?\w+;)|(?<!\w)_|_(?!\w)|^[#>+-](?= )", _escape_match, str(value))
 
 

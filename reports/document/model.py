@@ -218,7 +218,7 @@ class Section:
     folded: bool = False
     """True if the page shows only the title until a reader opens it."""
     source: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
-    """Columns and values that select the rows of its tables in `measurements.csv`, within those of the section around it."""
+    """Columns and values that select the rows of its tables in `measurements.csv`, within the rows of the section around it."""
 
 
 Block = Paragraph | Items | Links | Facts | Table | Figure | Motion | Section

@@ -21,7 +21,7 @@ from .provenance import LockedEngine
 class Kind:
     """A kind of report: its longest studies, whether it has all methods, and the random bodies in each field.
 
-    `time_limit` is the time budget of a run, s, None for that of `Study`; `processes` is the number that time in turn.
+    `time_limit` is the time budget of a run, s, None for the default of `Study`; `processes` is the number that time in turn.
     """
 
     extent: Extent
@@ -107,12 +107,12 @@ def plan_report(
     full, quick
         The kind of the report, see `KINDS`; `quick` also for each study.
     skip_missing, time_limit
-        See `Study`. The default limit is that of the kind.
+        See `Study`. The default limit depends on the kind.
     png, latex
         True if pictures are also written as PNG, and a table as LaTeX.
     bodies, seed
-        Random bodies in each field, and their seed. Default: those of the kind; in a default report in `FEW_BODIES` fields, and
-        none if a scene or a method is named; in a full one none if a scene is named.
+        Random bodies in each field, and their seed. The default depends on the kind: `FEW_BODIES` in a default report, and none
+        if a scene or a method is named; in a full one none if a scene is named.
 
     Raises
     ------

@@ -30,7 +30,7 @@ class Provenance:
     """Everything that is needed to repeat a report.
 
     `resumed` has a sentence for each earlier process that measured a part. `environments` are the locks of the engines'
-    environments. `commit` is that of the source, with "+changes" if files differ from it, or "unknown" outside git.
+    environments. `commit` is the commit of the source, with "+changes" if files differ from it, or "unknown" outside git.
     """
 
     command: str
@@ -55,7 +55,7 @@ class Provenance:
 
 
 def provenance(arguments: list[str] | None = None) -> Provenance:
-    """Return the provenance of this process; `arguments` are those of the command, default this process's.
+    """Return the provenance of this process; `arguments` are the command's, by default this process's.
 
     Commands call it before any work: files and the commit can change meanwhile.
     """

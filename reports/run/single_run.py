@@ -69,7 +69,7 @@ class Planned:
 def read_error(error: float | None, dt: float | None, names: Sequence[str]) -> float | None:
     """Return the attitude error, rad, for which a command chooses the method and the step, or None if it does not.
 
-    The default is that of `integrate`. Raise `BadInput` for an error and a method.
+    The default is as in `integrate`. Raise `BadInput` for an error and a method.
     """
     if error is not None and names:
         raise BadInput("methods", ", ".join(names), "none together with --error, which chooses the method")
@@ -107,9 +107,9 @@ def run_methods(
 ) -> tuple[list[dict[str, Any]], Trajectory]:
     """Return the summary of each method on a scene, with its errors, and the trajectory of the last one.
 
-    `target` is the attitude error, rad, for which method and step are chosen (`read_error`). The errors are those of
-    `find_errors`. Of several methods, `wall_time`, s, is that of the fastest run after a short first one, which compiles; a
-    method that does not support the scene has the outcome "unsupported".
+    `target` is the attitude error, rad, for which method and step are chosen (`read_error`). The errors come
+    from `find_errors`. Of several methods, `wall_time`, s, is the time of the fastest run after a short first one, which
+    compiles; a method that does not support the scene has the outcome "unsupported".
 
     Raises
     ------
@@ -234,7 +234,7 @@ def find_errors(
     """Return the largest errors against the reference solution, or the reason why there are none; see `compare`.
 
     `attitude` is in rad and `rate` in rad/s. If the attitude error is above `LARGE`, `better` is the result of `find_better`.
-    `scene_name` and `t_end` are those of the command; without a name there is no search.
+    `scene_name` and `t_end` are options of the command; without a name there is no search.
     """
     if wanted is not False and not trajectory.ok:
         return {"reason": "not computed, because the run did not reach its end"}

@@ -30,7 +30,7 @@ def plan_study(
 ) -> Study:
     """Return a study by name. Omitted scenes, methods and engines are the defaults of the study.
 
-    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are those of random bodies.
+    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are of random bodies.
     For the others see `Study`.
 
     Raises

@@ -101,7 +101,7 @@ def plan(
     method: Sequence[str],
     **settings: Any,
 ) -> Sweep:
-    """Return the sweep. `varied` is a result of `read_spread`, and the settings are those of `integrate_many`.
+    """Return the sweep. `varied` is a result of `read_spread`, and the settings are arguments of `integrate_many`.
 
     `method` has one name or none. Without a method and a step dt, s, both are chosen for an error, rad (`read_error`).
 

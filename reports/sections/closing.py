@@ -52,7 +52,7 @@ class Line:
 def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Iterator[Line]:
     """Yield a line for each method on a scene, in the order of measurement.
 
-    The table is that of `names.with_names`; the points are those of the scene (see `rows.points`). If the methods were `named`,
+    The table comes from `names.with_names`; the points belong to the scene (see `rows.points`). If the methods were `named`,
     each has its line, also if it does not support the scene or is not installed. Otherwise such methods have none, and methods
     that differ only in tolerance are one line, with the drifts and errors of the default tolerance, which is the last.
     """

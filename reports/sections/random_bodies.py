@@ -47,7 +47,7 @@ TERMS = (
 
 @dataclass(frozen=True)
 class RandomRatios(Ratios):
-    """The ratios of an engine's time to ours at an error in one field; `indices` are those of the bodies, by scene."""
+    """The ratios of an engine's time to ours at an error in one field; `indices` are the numbers of the bodies, by scene."""
 
     field: str
     engine: str

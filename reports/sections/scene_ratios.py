@@ -66,7 +66,7 @@ def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DE
 def as_table(points: pd.DataFrame, interval: float, each_step: EachStep | None = None) -> Table:
     """Return the fastest method of each class of ours and of the engines at each decade of the error, and the ratios.
 
-    `points` are those of one scene (see `rows.points`), whose samples are `interval` s apart. `each` adds the last rows.
+    `points` belong to one scene (see `rows.points`), whose samples are `interval` s apart. `each_step` adds the last rows.
     """
     decades = _rows(costs(points, DECADES), interval, DECADES)
     rows: list[Row] = [[numeric(error, tolerance(error)), *row] for error, row in decades]

@@ -57,7 +57,7 @@ class Result:
 def results(measured: Measured) -> list[Result]:
     """Return the results on the main scene: engines, the largest error first, then ours.
 
-    If methods are named, they are all. Otherwise they are those in the charts: engines, the paper's map and our fastest method.
+    If methods are named, they are all. Otherwise the charts have them: engines, the paper's map and our fastest method.
     """
     plan, scene = measured.plan, measured.main_scene
     rows, here = of_study(measured.rows, motion.STUDY.name, scene.name), measured.rows[measured.rows["scene"] == scene.name]
@@ -118,7 +118,7 @@ def animation(measured: Measured, scene: Scene, results: Sequence[Result]) -> li
 def _sentence(results: Sequence[Result], scene: Scene) -> str:
     """Return the largest error and change of energy, and the errors at both ends of what is compared.
 
-    They are those of this engine, of the most accurate engine, and of our methods, each at its worst and at its best setting.
+    They belong to this engine, to the most accurate engine, and to our methods, each at its worst and at its best setting.
     """
     compared = [result for result in results if result.outcome.ok and not math.isnan(result.error)]
     if not compared and any(result.outcome.ok for result in results):

@@ -1,4 +1,4 @@
-"""Steps: the motion is the one of an integrator with a step that is too long."""
+"""Steps: an integrator makes the motion, with a step that is too long."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ OFFSET = np.array((0.3, -0.2, 0.5))
 
 
 def reframe(body: Description, R_FG: Array, shift: Array | float = 0.0) -> Description:
-    """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from that of F."""
+    """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from the origin of F."""
     turned: dict[str, Any] = {"com": R_FG.T @ (body.com - shift), "inertia": _symmetric(R_FG.T @ body.inertia @ R_FG)}
     return replace(body, R0=body.R0 @ R_FG, w0=R_FG.T @ body.w0, **turned)
 

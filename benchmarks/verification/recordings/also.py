@@ -41,7 +41,7 @@ class Other:
 def compare_others(R: Array | None, values: Array, layout: Layout, options: Options) -> list[Other]:
     """Return the other attitudes of a file, which are in `values` (n, k), next to attitudes R (n, 3, 3).
 
-    Units, orders and sequences that no name has are those that fit best.
+    If no name has the unit, order or sequence, the one that fits best is used.
     """
     out, place = list[Other](), 0
     for kind, names in layout.also.items():

@@ -173,7 +173,7 @@ def _sort_angles(layout: Layout, chosen: dict[str, list[str]], kind: str, option
 
 
 def _choose_time(layout: Layout, split: Mapping[str, str], matches: Sequence[str]) -> list[str]:
-    """Return the column of the time, or those of seconds and their fractions; other times have it as their reason."""
+    """Return the column of the time, or the two of seconds and their fractions; other times are unused, with it as reason."""
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in layout.names if len(name) <= LONGEST_NAME}
     for key, name in plain.items():
         if (match := _FRACTIONS.fullmatch(key)) and (

@@ -123,7 +123,7 @@ def _choose_order(scene: Scene, recording: Recording, t: Array, start: float) ->
 
 
 def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Array:
-    """Return the errors (2,) that the digits of a file make: those of attitudes, of rates, and of times along the motion."""
+    """Return the errors (2,) that the digits of a file make: digits of attitudes, of rates, and of times along the motion."""
     time, attitude, rate = recording.digits
     w, acceleration = recording.data[1], 0.0
     if w is not None:
@@ -170,7 +170,7 @@ class Comparison:
     `worst` has the largest errors of all rows in the file, `compared` their number, and `outliers` single rows that are off.
     `alone` are the largest errors (2,) from the first row of each stretch where a fitted start has smaller ones. `undecided`
     is what would decide, "" if nothing is open; `shape` is the largest departure from a rotation, and its time, s; `shift` is
-    added to times of the case for those of the file.
+    added to times of the case to get times of the file.
     """
 
     case: Compared
@@ -261,7 +261,7 @@ def _reach(rest: Compared) -> tuple[int, float]:
     first = 3 * (rest.data[0] is None)
     flow = linearise(thin)[2][:, first:, first:]
     back = np.nan_to_num(np.linalg.pinv(np.nan_to_num(flow)))
-    # Errors of the file's own steps grow from any row on: near a separatrix more than those of the first row.
+    # Errors of the file's own steps grow from any row on: near a separatrix more than errors of the first row.
     growth = np.array([np.linalg.norm(flow[k] @ back[: k + 1], axis=(1, 2)).max() for k in range(len(some))])
     over = np.flatnonzero(growth * ROUND_OFF > rest.allowed.min() / 10)
     end = max(2, int(some[over[0]])) if len(over) else len(rest.t)
@@ -307,7 +307,7 @@ def _compare_all(
 
 
 def _late(case: Compared) -> bool:
-    """Return whether errors that pass as noise lie along the motion, as those of times do: noise has all directions."""
+    """Return whether errors that pass as noise lie along the motion, as errors of times do: noise has all directions."""
     (R, w), n = case.exact, len(case.t)
     if n < 14 or (case.error.max(axis=1) <= np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))).all():
         return False

@@ -116,7 +116,7 @@ class Details:
 
     @property
     def worse(self) -> int:
-        """0 if errors of attitudes are larger beside what is allowed, 1 if those of rates are."""
+        """The quantity with the larger ratio of error and allowed error: 0 for attitudes, 1 for rates."""
         return int(np.argmax([e / a * bool(u.size) for e, a, u in zip(self.error, self.allowed, self.units, strict=True)]))
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -317,7 +317,7 @@ def _series(comparison: Comparison, recording: Recording, from_row: bool) -> tup
 
 
 def _instability(comparison: Comparison) -> list[str]:
-    """Return the note on energies that approach that of the intermediate axis."""
+    """Return the note on energies that approach the energy of rotation about the intermediate axis."""
     scene, w = comparison.case.scene, comparison.case.data[1]
     if w is None or not scene.free or scene.body.rotor_momentum is not None or comparison.errors.max() <= FAR:
         return []
@@ -330,11 +330,13 @@ def _instability(comparison: Comparison) -> list[str]:
 def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
-    energy = None if case.scene.potential else find_energy(case.scene.invariants)  # rates alone determine that of a free body
+    energy = (
+        None if case.scene.potential else find_energy(case.scene.invariants)
+    )  # rates alone determine the energy of a free body
     for invariant in case.scene.invariants if w is not None else ():
         if w is not None and invariant.supplied is None and (R is not None or invariant is energy):
             R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R
             drift = Trajectory(case.scene, case.t, R_WB, w, "file").drift(invariant)
-            # The initial value is that at t = 0, and the field may have turned until the first row.
+            # The initial value is the value at t = 0, and the field may have turned until the first row.
             drifts[f"drift of {invariant.name}"] = sizes(drift - drift[0] if from_row else drift)
     return drifts
