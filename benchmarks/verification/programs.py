@@ -376,7 +376,7 @@ def order_finding(subject: str, answers: Answers, order: float) -> Finding:
         detail = f"this program has order {order:.2f}, {declared} was declared"
         return Finding(subject, "order", "", Verdict.WRONG, order, float(declared), "", "declared", detail=detail)
     if order > declared + SLOPE:
-        detail += f"; {declared} was declared, so that tolerances are those of order {declared}"
+        detail += f"; {declared} was declared, and its tolerances apply"
     return Finding(subject, "order", "", Verdict.RIGHT, order, float(declared), "", "declared", detail=detail)
 
 

@@ -77,7 +77,7 @@ def install(
     epilog=epilog("conservative engines add ./my_engine", "conservative engines add 'node engine.js' --project"),
 )
 @click.argument("command")
-@click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
+@click.option("--name", default="", help="Name of the engine.  [default: the name of the program's file]")
 @click.option("--project", is_flag=True, help="Register it in conservative.toml of this project, not for the user.")
 @json_option
 def add(command: str, name: str, project: bool, as_json: bool) -> None:

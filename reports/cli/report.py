@@ -63,7 +63,7 @@ from .options import (
     "--time-limit",
     type=float,
     metavar="S",
-    help="Time budget per run, s. Slower methods get fewer points. Slow runs of a study on a scene, such as those of an own "
+    help="Time budget per run, s. Slower methods get fewer points. Slow runs of a study on a scene, such as runs of an own "
     "potential in Python, take up to 100 budgets together; the others are skipped, with the reason. A run beyond ten times the "
     "budget (at least 60 s) is stopped.  [default: 0.15, with --full 0.6]",
 )

@@ -111,8 +111,8 @@ def plan_report(
     png, latex
         True if pictures are also written as PNG, and a table as LaTeX.
     bodies, seed
-        Random bodies in each field, and their seed. The default depends on the kind: `FEW_BODIES` in a default report, and none
-        if a scene or a method is named; in a full one none if a scene is named.
+        Random bodies in each field, and their seed. The default depends on the kind. A default report has one in each of
+        `FEW_BODIES` fields, and none if a scene or a method is named; a full one has none if a scene is named.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def unsupported(table: pd.DataFrame) -> Table:
         [*map(str, key), ", ".join(members["name"].unique())]
         for key, members in rows.groupby(["scene", "outcome", "reason"], sort=False)
     ]
-    return Table(["scene", "outcome", "reason (its numbers are those of the first run)", "methods"], body)
+    return Table(["scene", "outcome", "reason (with the numbers of the first run)", "methods"], body)
 
 
 def truths(table: pd.DataFrame) -> Table:

@@ -22,7 +22,7 @@ from ..rows.points import pooled
 TERMS = (
     "Heavy tops and free bodies all differ: asymmetric, in rotated frames, no point on an axis, drawn from a seed. One body "
     "is a heavy top with different initial states; numbers=compiled means that its numbers are constants of heyoka's code. "
-    "Each runs for 12 s, final state only; the time is that of a prepared run, and preparation is separate. A body whose "
+    "Each runs for 12 s, final state only; a time is the time of a prepared run, without its preparation. A body whose "
     "two reference solutions disagree is dropped. The error of "
     "a setting on a body is its largest attitude error at twelve instants; the table uses the median of the bodies, or "
     "the 95th percentile. Times between two settings of a line are interpolated, and isolated good results are ignored. "

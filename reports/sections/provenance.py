@@ -22,9 +22,9 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     timing = f"{processes} processes in turn" if processes > 1 else "one process, so ratios are rough"
     resumed = " It was interrupted and resumed: compare times only within one study." if source.resumed else ""
     text = (
-        f"{kind}A time is that of the fastest of several rounds, in which methods take turns: of the method's own loop, final "
-        f"state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one confirms. "
-        "All tables are below, behind a click."
+        f"{kind}A time is the shortest of several rounds, in which methods take turns. The method's own loop is timed, "
+        f"final state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one "
+        "confirms. All tables are below, behind a click."
     )
     facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]

@@ -34,9 +34,9 @@ ROUGH = "All times are of one process, so ratios are rough: two identical progra
 TERMS = (
     "Each body is drawn from a seed: asymmetric, from long and thin to flat, in a rotated frame, with no point and no rate on "
     "an axis, from slow pendulums to fast tops, in uniform gravity, on a spring, attracted to a point, or in a gravity "
-    "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by that of our fastest "
-    "general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, final "
-    "state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
+    "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by the time of our "
+    "fastest general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, "
+    "final state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
     "processes, of a mean over bodies and processes. A body is won or lost if 1 is outside of its interval, or if a side is "
     "alone in reaching the error; otherwise it is open. The error is the largest of twelve instants. The error of a setting "
     "is the largest of its own and of all finer settings, so isolated good results are ignored. An engine is compared on "

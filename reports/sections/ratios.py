@@ -14,7 +14,7 @@ from .random_bodies import ANY, RandomRatios
 from .scene_ratios import sides
 
 _RATIOS = (
-    "The time of the fastest engine or ODE solver divided by that of our fastest method, at each decade of the largest "
+    "The time of the fastest engine or ODE solver divided by our fastest method's time, at each decade of the largest "
     "attitude error. ✓: ours is faster. ✗: the other is faster. ≈: open, 1 is within the interval, or 5 % from a ratio that "
     "one process measured. In parentheses is the interval of 95 % over processes, if several measured the times. Random "
     "bodies have the geometric mean, its interval over bodies and processes, and the number of bodies on which an engine is "

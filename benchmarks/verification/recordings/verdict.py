@@ -280,7 +280,7 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
     single = max(recording.digits[1:]) > 1e-9
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
-            f"The error is larger than the digits of the file allow, and as small as that of a good solver in "
+            f"The error is larger than the digits of the file allow, and as small as the error of a good solver in "
             f"{'single' if single else 'double'} precision. An allowed error decides: --error"
         )
     if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
