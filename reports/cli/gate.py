@@ -132,7 +132,7 @@ def _judge(options: dict[str, Any]) -> Document:
     from ..document.model import Document, Paragraph, Table, filled
 
     path = options["baseline"] or baseline.PATH
-    runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
+    runs = [results.read(path) for path in options["results"] or [results.FOLDER / results.FILE]]
     if options["update"] is None:
         before = baseline.read(path)
         verdicts = [decide(before, run) for run in runs]

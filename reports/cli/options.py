@@ -35,7 +35,7 @@ VOCABULARY: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxy
         "picture": (("--picture",), ()),
     }
 )
-"""Options of several commands: their names, and those of the last release, which work with a note until the next one."""
+"""Options of several commands: their names, and their names in the last release, which work with a note until the next one."""
 FAILED = "a run failed"
 FAILED_OR_INACCURATE = f"{FAILED}, or its attitude error is above 0.1 rad"
 EXIT_CODES = {
@@ -64,8 +64,8 @@ class OldName(click.ClickException):
 
     def __init__(self, old: str, arguments: Iterable[str] = ()) -> None:
         new = OLD_NAMES[old]
-        given = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
-        super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
+        rest = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
+        super().__init__(f"{old} is now {new}. Run: conservative {new} {rest}".rstrip())
 
 
 class GoneOption(click.ClickException):

@@ -118,7 +118,9 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         with progress() as step:
             compared = compare_engine(sides, step)
         with progress() as step:
-            found = [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
-        answer = build(compared, against is not None, made, changes(found) if checks else None)
+            verified = (
+                [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
+            )
+        answer = build(compared, against is not None, made, changes(verified) if checks else None)
         answer = write(answer)
     show(answer, as_json, silent=True)

@@ -126,7 +126,7 @@ def verify(
     out: Path | None,
     picture: Path | None,
     scripts: Path | None,
-    **given: Any,
+    **values: Any,
 ) -> None:
     """Decide whether each SUBJECT is right, and name the mistakes that explain the errors.
 
@@ -146,14 +146,14 @@ def verify(
 
     names = [name for text in subjects for name in split_subject(text)]
     if not names:
-        if not given["engines"]:
+        if not values["engines"]:
             raise click.UsageError("Missing argument 'SUBJECT...'.")
         from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
 
         names = [str(CATALOGUE)]
-    every = [each.kind for each in expand(names)]
+    every = [subject.kind for subject in expand(names)]
     kinds, alone = set(every), every == [Kind.RECORDING]
-    options = used({"picture": picture, "scripts": scripts, **given}, kinds)
+    options = used({"picture": picture, "scripts": scripts, **values}, kinds)
     if picture is not None and not alone:
         raise BadInput("picture", f"{len(every)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
@@ -161,19 +161,19 @@ def verify(
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        found = verify(names, tell=step, **options)
+        verifications = verify(names, tell=step, **options)
         made = {
-            "csv": lambda: section.findings_text(found),
-            "errors.csv": lambda: section.errors_text(found),
-            "errors.svg": lambda: draw(found),
-            "picture": lambda: draw(found, picture),
+            "csv": lambda: section.findings_text(verifications),
+            "errors.csv": lambda: section.errors_text(verifications),
+            "errors.svg": lambda: draw(verifications),
+            "picture": lambda: draw(verifications, picture),
         }
-        document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
+        document = section.build(verifications, {} if kinds == {Kind.RECORDING} else facts())
         written = write(document, **made)
     show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
     if scripts is not None:  # after the result, which a script that cannot be written must not cost
-        write_scripts(found, scripts, ctx.meta["force"])
-    ctx.exit(section.exit_code(found))
+        write_scripts(verifications, scripts, ctx.meta["force"])
+    ctx.exit(section.exit_code(verifications))
 
 
 def split_subject(text: str) -> list[str]:
@@ -181,13 +181,13 @@ def split_subject(text: str) -> list[str]:
     return [text] if Path(text).exists() or " " in text or "," not in text else split_names("subjects", (text,))
 
 
-def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
+def used(values: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
     """Return the options on the command line as `verify` takes them. Raise `BadInput` for one that no subject uses."""
     from conservative.benchmarks.verification.verify import USED_BY, Kind
 
     ctx, options = click.get_current_context(), dict[str, Any]()
     users_of = USED_BY | {"scripts": USED_BY["pairs"], "only": tuple(Kind)}
-    for name, value in given.items():
+    for name, value in values.items():
         if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
             continue
         users = users_of.get(name, (Kind.RECORDING,))
@@ -207,26 +207,26 @@ def facts() -> dict[str, str]:
     return provenance().facts
 
 
-def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
+def draw(verifications: Sequence[Verification], path: Path | None = None) -> bytes:
     """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures
 
-    (recording,) = found
+    (recording,) = verifications
     details: Any = recording.details
     limits = {quantity.name: quantity.allowed for quantity in details.quantities if math.isfinite(quantity.allowed)}
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 
-def write_scripts(found: Sequence[Verification], folder: Path, force: bool) -> None:
+def write_scripts(verifications: Sequence[Verification], folder: Path, force: bool) -> None:
     """Write a script of each pair that differs into a folder."""
     from conservative.benchmarks.verification.pairs import PairFinding
     from conservative.benchmarks.verification.pairs.script import MARK
     from conservative.files import make_folder, write_text
 
-    findings = [finding for each in found for finding in each.findings]
-    scripts = {each.script_file: each.script for each in findings if isinstance(each, PairFinding) and each.script}
+    findings = [finding for verification in verifications for finding in verification.findings]
+    scripts = {pair.script_file: pair.script for pair in findings if isinstance(pair, PairFinding) and pair.script}
     for name in scripts:
         require_replaceable(folder / name, MARK, "scripts", force)
     if scripts:

@@ -30,7 +30,7 @@ def plan_study(
 ) -> Study:
     """Return a study by name. Omitted scenes, methods and engines are the defaults of the study.
 
-    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are those of random bodies.
+    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are of random bodies.
     For the others see `Study`.
 
     Raises
@@ -42,10 +42,12 @@ def plan_study(
     """
     choice("name", name, tuple(studies.STUDIES))
     declared = studies.STUDIES[name]
-    given = {"scenes": scenes, "methods": methods, "sizes": sizes, "bodies": bodies, "seed": seed}
-    _require_options(declared, {option: value for option, value in given.items() if value not in (None, (), [])})
+    options = {"scenes": scenes, "methods": methods, "sizes": sizes, "bodies": bodies, "seed": seed}
+    _require_options(declared, {option: value for option, value in options.items() if value not in (None, (), [])})
     counts = tuple(read_count("sizes", size) for size in sizes)
-    extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
+    extent = {
+        key: value for key, value in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if value is not None
+    }
     if declared.named is Named.ONLY and not methods:
         compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
     else:
@@ -57,9 +59,9 @@ def plan_study(
     return declared.plan(compared, selection.scenes(scenes) if scenes else (), processes, **settings)
 
 
-def _require_options(declared: Declaration, given: Mapping[str, Any]) -> None:
+def _require_options(declared: Declaration, options: Mapping[str, Any]) -> None:
     """Raise `BadInput` if an option is given that the study does not have."""
-    for option, value in given.items():
+    for option, value in options.items():
         if option not in declared.options:
             own = [*declared.options, *(["engines"] if declared.named is Named.ONLY else [])]
             text = ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)

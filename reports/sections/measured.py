@@ -47,7 +47,7 @@ class Measured:
     @cached_property
     def scene_rows(self) -> pd.DataFrame:
         """The rows of the studies that compare methods on scenes, without those that have a section of their own."""
-        together = [name for name, each in STUDIES.items() if not each.apart]
+        together = [name for name, study in STUDIES.items() if not study.apart]
         return self.rows[self.rows["study"].isin(together)].reset_index(drop=True)
 
     @cached_property
