@@ -17,6 +17,7 @@ from .deferred_imports import PACKAGES, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, RemovedAttribute, nearest, require_extra
 from .grid import Grid
 from .invariants import Invariant, sizes
+from .number_texts import rounded_up
 from .outcome import OK, Outcome
 from .outcome import Choice as Choice
 from .outcome import Counters as Counters
@@ -227,7 +228,7 @@ class Trajectory:
             ("work", ", ".join(f"{count} {name}" for name, count in self.work.items())),
         ]
         drifts = ((invariant.name, sizes(self.drift(invariant)).max(initial=0.0)) for invariant in self.scene.invariants)
-        rows += [(f"drift of {name}", f"{presentation.rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
+        rows += [(f"drift of {name}", f"{rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
         return presentation.html_table("Trajectory", rows)
 
     def __len__(self) -> int:

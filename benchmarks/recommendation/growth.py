@@ -10,7 +10,7 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.invariants import sizes
 from conservative.methods.trials import ASYMPTOTIC
-from conservative.presentation import number
+from conservative.number_texts import number
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope

@@ -22,7 +22,7 @@ from conservative.attitude import Array, to_quaternion
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.presentation import number
+from conservative.number_texts import number
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.engine_method import EngineMethod

@@ -18,8 +18,9 @@ from ..check import choice as require_choice
 from ..drifts import arrange_drifts, drifts_of, list_drifts
 from ..errors import IntegrationFailed, RemovedAttribute, require_extra
 from ..grid import Grid
+from ..number_texts import rounded_up
 from ..outcome import OK, Choice, Counters, Outcome
-from ..presentation import columns, html_table, rounded_up
+from ..presentation import columns, html_table
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory

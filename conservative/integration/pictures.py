@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import unit_vector
-from ..presentation import LEAST_DRAWN, short_power, time_unit
+from ..number_texts import short_power
+from ..presentation import LEAST_DRAWN, time_unit
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"

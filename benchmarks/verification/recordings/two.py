@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
-from conservative.presentation import number
+from conservative.number_texts import number
 from conservative.scene import Scene
 
 from ..compare import Compared, differ

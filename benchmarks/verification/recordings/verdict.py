@@ -13,7 +13,7 @@ from conservative.attitude import Array
 from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
 from conservative.invariants import find_energy, kinetic_energy, sizes
-from conservative.presentation import number
+from conservative.number_texts import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
