@@ -295,8 +295,8 @@ def compare_projects(
 
 def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]:
     """Return the methods of which no version has a setting."""
-    families = {registry.read_name(setting).base for setting in settings}
-    return [name for name in methods if registry.read_name(name, "methods").base not in families]
+    families = {registry.read_name(setting).family for setting in settings}
+    return [name for name in methods if registry.read_name(name, "methods").family not in families]
 
 
 def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Decision:
