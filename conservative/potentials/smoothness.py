@@ -125,8 +125,8 @@ def _find_jumps(function: Callable[[float], Array], times: Array, values: Array,
             else:
                 a, low = middle, value
         if np.linalg.norm(high - low) > change[i] / 4:  # otherwise the function is only steep
-            again = 1.0 if other is None else np.linalg.norm(_value(other, float(b)) - _value(other, float(a)))
-            if again > AGREED * change[i]:
+            again = other and np.linalg.norm(_value(other, float(b)) - _value(other, float(a)))
+            if again is None or again > AGREED * change[i]:
                 jumps.append(float(b))
     return jumps
 
