@@ -36,7 +36,7 @@ def credit(errors: Sequence[float]) -> list[float]:
 
 def first_within(credited: Sequence[float], error: float) -> int | None:
     """Return the index of the coarsest setting that is credited with at most `error`, or None."""
-    return next((i for i, each in enumerate(credited) if each <= error), None)
+    return next((i for i, credit in enumerate(credited) if credit <= error), None)
 
 
 def list_deciding(errors: Sequence[float], error: float) -> list[int]:
@@ -57,11 +57,11 @@ def cost(errors: Sequence[float], times: Sequence[float], error: float) -> float
     first = first_within(credited, error)
     if first is None:
         return math.nan
-    known = [time for time in times[first:] if not math.isnan(time)]
+    reaching = [time for time in times[first:] if not math.isnan(time)]
     if first > 0 and not (math.isnan(times[first]) or math.isnan(times[first - 1])):
         share = math.log(error / credited[first - 1]) / math.log(credited[first] / credited[first - 1])
-        known.append(times[first - 1] * (times[first] / times[first - 1]) ** share)
-    return min(known, default=math.nan)
+        reaching.append(times[first - 1] * (times[first] / times[first - 1]) ** share)
+    return min(reaching, default=math.nan)
 
 
 def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = LINE) -> pd.DataFrame:
@@ -88,12 +88,13 @@ def costs(points: pd.DataFrame, errors: Iterable[float], line: Sequence[str] = L
     rows = []
     for key, settings in points.groupby(list(line), sort=False):
         measured = settings["error"].tolist()
-        given = settings["times" if "times" in settings else "time"]  # a setting that was not timed has NaN in both
-        processes = list(zip_longest(*(each if isinstance(each, tuple) else (each,) for each in given), fillvalue=math.nan))
+        timings = settings["times" if "times" in settings else "time"]  # a setting that was not timed has NaN in both
+        by_setting = (timing if isinstance(timing, tuple) else (timing,) for timing in timings)
+        processes = list(zip_longest(*by_setting, fillvalue=math.nan))
         for error in errors:
             times = tuple(cost(measured, process, error) for process in processes)
-            if known := [math.log(time) for time in times if not math.isnan(time)]:
-                rows.append((*key, error, math.exp(math.fsum(known) / len(known)), times))
+            if logs := [math.log(time) for time in times if not math.isnan(time)]:
+                rows.append((*key, error, math.exp(math.fsum(logs) / len(logs)), times))
     return pd.DataFrame(rows, columns=[*line, "error", "time", "times"])
 
 
@@ -129,8 +130,8 @@ class SpeedRatio:
         if not (self.ours and self.theirs):
             return []
         pairs = zip(self.theirs.times, self.ours.times, strict=False)
-        known = [math.log(theirs / ours) for theirs, ours in pairs if not math.isnan(theirs + ours)]
-        return known or [math.log(self.theirs.time / self.ours.time)]
+        logs = [math.log(theirs / ours) for theirs, ours in pairs if not math.isnan(theirs + ours)]
+        return logs or [math.log(self.theirs.time / self.ours.time)]
 
     @property
     def ratio(self) -> float:
@@ -197,45 +198,42 @@ class Ratios:
     @cached_property
     def both(self) -> list[SpeedRatio]:
         """Cases in which both sides reach the error, smallest ratio first."""
-        return sorted(
-            (speed_ratio for speed_ratio in self.speed_ratios if speed_ratio.ours and speed_ratio.theirs),
-            key=lambda each: each.ratio,
-        )
+        return sorted((pair for pair in self.speed_ratios if pair.ours and pair.theirs), key=lambda pair: pair.ratio)
 
     @property
     def only_ours(self) -> int:
         """Number of bodies on which only our side reaches the error."""
-        return sum(speed_ratio.theirs is None and speed_ratio.ours is not None for speed_ratio in self.speed_ratios)
+        return sum(pair.theirs is None and pair.ours is not None for pair in self.speed_ratios)
 
     @property
     def only_theirs(self) -> int:
         """Number of bodies on which only the other side reaches the error."""
-        return sum(speed_ratio.ours is None and speed_ratio.theirs is not None for speed_ratio in self.speed_ratios)
+        return sum(pair.ours is None and pair.theirs is not None for pair in self.speed_ratios)
 
     @property
     def won(self) -> int:
         """Number of bodies on which ours is faster beyond the interval of the body, or alone in reaching the error."""
-        return sum(speed_ratio.won for speed_ratio in self.speed_ratios)
+        return sum(pair.won for pair in self.speed_ratios)
 
     @property
     def lost(self) -> int:
         """The same for theirs."""
-        return sum(speed_ratio.lost for speed_ratio in self.speed_ratios)
+        return sum(pair.lost for pair in self.speed_ratios)
 
     @property
     def open(self) -> int:
         """Number of bodies on which both sides reach the error and neither is faster beyond the interval."""
-        return sum(not (each.won or each.lost) for each in self.both)
+        return sum(not (pair.won or pair.lost) for pair in self.both)
 
     @property
     def ratio(self) -> float:
         """Geometric mean; NaN without a ratio."""
-        return math.exp(math.fsum(math.log(each.ratio) for each in self.both) / len(self.both)) if self.both else math.nan
+        return math.exp(math.fsum(math.log(pair.ratio) for pair in self.both) / len(self.both)) if self.both else math.nan
 
     @cached_property
     def interval(self) -> tuple[float, float]:
         """Interval of the geometric mean over bodies and processes like these (see `bootstrap`)."""
-        return bootstrap([each.logs for each in self.both])
+        return bootstrap([pair.logs for pair in self.both])
 
     @property
     def worst(self) -> float:

@@ -35,5 +35,5 @@ def __getattr__(name: str) -> object:
             value = load_entry(PACKAGES, PACKAGES, name)
         else:
             value = _load(name)
-        globals()[name] = value
+        globals()[name] = value  # found there from now on, without this function
         return value

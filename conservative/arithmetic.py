@@ -188,7 +188,7 @@ def in_body(q: Sequence[Any], v: Vector) -> Any:
 
 
 def in_long_body(q: Sequence[Any], v: Vector) -> Any:
-    """Return one over |q|^2, and |q|^2 times `in_body`. Rounding |q|^2, which is nearly constant, changes the length only."""
+    """Return 1 / |q|^2 and |q|^2 times the result of `in_body`, apart: an error of |q|^2 then changes no direction."""
     u = (-q[1], -q[2], -q[3])
     t, uv = cross(u, v), dot(u, v)
     along, across, rest = 2.0 * uv, 2.0 * q[0], fuse(q[0], q[0], -dot(u, u))
@@ -216,7 +216,7 @@ def halfway(a: Vector, c: Vector) -> Any:
 
 
 def accumulate(total: Any, carry: Any, increment: Any) -> Any:
-    """Return a compensated (Kahan) sum and its rounding error, which goes into the next call."""
+    """Return a compensated (Kahan) sum, and by how much it is too large after rounding: the `carry` of the next call."""
     wanted = increment - carry
     new = total + wanted
     return new, (new - total) - wanted

@@ -75,8 +75,8 @@ class RigidBody(PickledByFields):
         breaks: ArrayLike = (),
     ) -> None:
         if motor is None and rotor_momentum is not None:
-            given = RotorMomentum(rotor_momentum, breaks)
-            motor, rotor_momentum = None if given.constant else given, given.at(0.0)
+            momentum = RotorMomentum(rotor_momentum, breaks)
+            motor, rotor_momentum = None if momentum.constant else momentum, momentum.at(0.0)
         rotor = None if rotor_momentum is None else np.asarray(rotor_momentum, dtype=float)
         rotor = None if rotor is None or not rotor.any() else read_only(rotor)
         set_fields(self, inertia=read_inertia(inertia), rotor_momentum=rotor, motor=motor)
@@ -119,14 +119,14 @@ class RigidBody(PickledByFields):
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
     def momentum(self, w_WB_B: ArrayLike, t: ArrayLike = 0.0) -> Array:
-        """Return the angular momentum (..., 3), kg m^2/s, with that of the rotor, for rates (..., 3), rad/s; body axes.
+        """Return the angular momentum (..., 3), kg m^2/s, including the rotor's, for rates (..., 3), rad/s; body axes.
 
         Times (...), s, matter if the rotor has a motor.
         """
         of_body = numbers("w_WB_B", w_WB_B) @ self.inertia
         if self.motor is not None:
             times = numbers("t", t)
-            return of_body + np.array([self.motor.at(each) for each in times.ravel().tolist()]).reshape(*times.shape, 3)
+            return of_body + np.array([self.motor.at(time) for time in times.ravel().tolist()]).reshape(*times.shape, 3)
         return of_body if self.rotor_momentum is None else of_body + self.rotor_momentum
 
     def rotor_along(self, R_BF: Array) -> tuple[float, float, float] | None:

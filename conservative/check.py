@@ -60,7 +60,7 @@ def has_masked(value: object) -> bool:
     NumPy and other packages with masked arrays have the attribute `mask`.
     """
     if isinstance(value, list | tuple):
-        return any(type(each) is not float and has_masked(each) for each in value)
+        return any(type(item) is not float and has_masked(item) for item in value)
     return isinstance(value, np.ndarray) and type(value) is not np.ndarray and bool(np.any(getattr(value, "mask", False)))
 
 
@@ -272,7 +272,7 @@ class PickledByFields:
 
 def _restore(kind: type[T], values: dict[str, Any]) -> T:
     return build_unchecked(
-        kind, **{name: read_only(each) if isinstance(each, np.ndarray) else each for name, each in values.items()}
+        kind, **{name: read_only(field) if isinstance(field, np.ndarray) else field for name, field in values.items()}
     )
 
 

@@ -65,7 +65,7 @@ def reads_of(code: CodeType) -> Reads:
         elif kind in ("STORE_DEREF", "DELETE_DEREF") and name in code.co_freevars:
             written.add(name)
         elif kind.startswith("LOAD_"):
-            after = tuple(each for _, each in takewhile(lambda step: step[0] in _ATTRIBUTES, steps[i + 1 :]))
+            after = tuple(attribute for _, attribute in takewhile(lambda step: step[0] in _ATTRIBUTES, steps[i + 1 :]))
             if ("FAST" in kind or "DEREF" in kind) and name in bound:
                 origin = bound[name]
                 reads.append(origin._replace(attributes=origin.attributes + after))

@@ -20,7 +20,7 @@ METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "co
 ENGINES = "conservative.engines"
 """Groups of entry points; see `conservative.registry`."""
 PACKAGES = "conservative.packages"
-"""Group of what the core uses of the packages above it, which it cannot import."""
+"""Group of the objects that the core uses from the packages above it, which it must not import."""
 DEFAULT_METHOD = "reduced"
 """Name of the method of `integrate` for a given step, `Reduced()`."""
 _LISTS = {SCENES: "conservative list", METHODS: "conservative list", ENGINES: "conservative engines list"}
@@ -41,7 +41,7 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 
     entries = list(entry_points(group=group))
     if group == ENGINES and (programs := list_programs()):
-        module = find_entry(PACKAGES, PACKAGES, "programs").value
+        module = find_entry(PACKAGES, PACKAGES, "programs").value  # its attributes are the classes of programs, by name
         for name in programs.keys() & {*list_entries(METHODS), *(entry.name for entry in entries)}:
             raise BadInput(str(programs[name].file), f"{name!r}, the name of a method or an engine", "another name")
         entries += [EntryPoint(name, f"{module}:{name}", group) for name in programs]
@@ -50,13 +50,13 @@ def list_entries(group: str) -> dict[str, EntryPoint]:
 
 def find_entry(group: str, argument: str, name: str) -> EntryPoint:
     """Return the entry point of a name in a group. `argument` is the name of the argument in messages. Raise `BadInput`."""
-    known = list_entries(group)
-    if name in known:
-        return known[name]
+    entries = list_entries(group)
+    if name in entries:
+        return entries[name]
     if group == PACKAGES:
         raise BadInput(argument, f"no entry point {name!r}", REINSTALL)
     files = "; or give a file whose name ends with .toml" if group == SCENES else ""
-    raise BadInput(argument, repr(name), nearest(name, known, _LISTS.get(group, "")) + files)
+    raise BadInput(argument, repr(name), nearest(name, entries, _LISTS.get(group, "")) + files)
 
 
 def load_entry(group: str, argument: str, name: str) -> Any:

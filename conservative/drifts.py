@@ -33,18 +33,18 @@ def measure_drifts(
     The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of the invariants that the method
     conserves. They are nan for a body with samples that are not finite, and for all bodies if the times are not the grid's.
     Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes. In scenes with
-    loads, drifts are those of the balances with `supplied` (n, m, 4), as in `Trajectory`; nan for a body that has none.
+    loads, drifts belong to the balances with `supplied` (n, m, 4), as in `Trajectory`; nan for a body that has none.
     """
     drifts, rotor, potential = np.empty((len(reference), 5)), bodies.scene.body.rotor_momentum, bodies.scene.potential
     V, impulse = _NO_ENERGIES if potential is None else field_energies(bodies, t, R_WB, w_WB_B), None
     if supplied is not None:
-        known = np.where(np.isnan(supplied), 0.0, supplied)
-        work, impulse = known[..., 0], np.ascontiguousarray(known[..., 1:])
+        sums = np.where(np.isnan(supplied), 0.0, supplied)
+        work, impulse = sums[..., 0], np.ascontiguousarray(sums[..., 1:])
         if isinstance(potential, Turning):
             work = work - impulse @ (potential.orbit.rate * potential.orbit.normal_W)
         V = V - work if len(V) else -work
         if (motor := bodies.scene.body.motor) is not None:  # a change of h counts as an impulse of the opposite sign
-            change = np.array([motor.at(each) for each in t.tolist()]) - motor.at(0.0)
+            change = np.array([motor.at(time) for time in t.tolist()]) - motor.at(0.0)
             impulse = impulse - (R_WB @ change[:, :, None])[..., 0]
     kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, drifts)
     if supplied is not None:
@@ -90,19 +90,19 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Ar
         rows[:, 7] = np.nan_to_num(bodies.symmetry_axes_B) / momentum[:, None]
         rows[:, 8, 2] = np.einsum("ni,ni->n", rows[:, 7], L_B)
     own = [invariant for invariant in scene.invariants if invariant not in scene.extra_invariants]
-    if any(each.unit == "J" for each in own):
+    if any(invariant.unit == "J" for invariant in own):
         V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], w[:, None])
         rows[:, 8, 0], rows[:, 8, 1] = kinetic + (V[:, 0] if len(V) else 0.0), 1 / scale
-    for each in own:
-        if each.name in conserved and each.unit == "J":
+    for invariant in own:
+        if invariant.name in conserved and invariant.unit == "J":
             rows[:, 9, 0] = 1.0
-        elif each.name in conserved:
-            rows[:, 9, 2 if each.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
+        elif invariant.name in conserved:
+            rows[:, 9, 2 if invariant.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
     return rows
 
 
 def list_drifts(bodies: Batch) -> tuple[str, ...]:
-    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight those of the rotation."""
+    """Return the names of drifts: orthonormality, and the invariants of the scene; in free flight of the rotation only."""
     return (ORTHONORMALITY, *(invariant.name for invariant in bodies.scene.rotation_only.invariants))
 
 

@@ -72,7 +72,7 @@ REMOVED: Mapping[str, str] = MappingProxyType(
         "to_xarray": "to_pandas(), which returns the same samples as a table",
     }
 )
-"""What is gone since the last release, and what to use instead: endings of files, options, studies, and attributes."""
+"""Removals since the last release, and what to use instead: endings of files, options, studies, and attributes."""
 
 
 class RemovedAttribute:
@@ -287,20 +287,20 @@ class LoadNotResolved(UserWarning):
 
     def __init__(self, dt: float, step: float, interval: tuple[float, float], corners: int = 0) -> None:
         self.dt, self.step, self.interval, self.corners = dt, step, interval, corners
-        said = f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: "
+        message = f"Steps of {dt:g} s do not resolve a torque, damping or motor between {interval[0]:g} and {interval[1]:g} s: "
         if corners:
-            said += (
+            message += (
                 f"its table has {corners} corners, more than there are steps. Steps are divided at the corners, so samples are "
                 f"not affected, but they do not show the motion in between. Use steps of at most {step:g} s to see it"
             )
         elif step:
-            said += (
+            message += (
                 f"its integral changes with the step. Use steps of at most {step:g} s, or declare the times at which the "
                 "function is not smooth: breaks=(...)"
             )
         else:
-            said += "it is noise there, which no step resolves. Give it as a table (times, values)"
-        super().__init__(said)
+            message += "it is noise there, which no step resolves. Give it as a table (times, values)"
+        super().__init__(message)
 
 
 class SceneNotCompared(UserWarning):
@@ -367,8 +367,8 @@ def nearest(name: str, known: Iterable[str], command: str = "") -> str:
     If there are more than `MOST_LISTED`, the text has the nearest ones and the `command` that lists all.
     """
     known = sorted(known)
-    cases = {each.lower(): each for each in known}
-    close = [cases[each] for each in get_close_matches(name.lower(), cases, n=3)]
+    cases = {other.lower(): other for other in known}
+    close = [cases[match] for match in get_close_matches(name.lower(), cases, n=3)]
     few = len(known) <= MOST_LISTED or not command
     others = "" if few else "".join(f", {other!r}" for other in close[1:])
     everything = f"one of {', '.join(known)}" if few else f"one of {len(known)} names; list them with: {command}"

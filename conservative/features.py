@@ -52,9 +52,9 @@ ROTATION: Features = FIELDS | {Feature.FLIGHT}
 
 def read_features(argument: str, value: Any) -> Features:
     """Return a set of members of `Feature`. Raise `BadInput` for anything else, such as texts, which no method supports."""
-    wrong = [each for each in value if not isinstance(each, Feature)] if isinstance(value, set | frozenset) else [value]
+    wrong = [member for member in value if not isinstance(member, Feature)] if isinstance(value, set | frozenset) else [value]
     if wrong:
-        allowed = f"a set of members of conservative.Feature: {', '.join(f'Feature.{each.name}' for each in Feature)}"
+        allowed = f"a set of members of conservative.Feature: {', '.join(f'Feature.{feature.name}' for feature in Feature)}"
         raise BadInput(argument, describe(wrong[0]), allowed)
     return frozenset(value)
 
@@ -75,7 +75,7 @@ def lacking(supports: Features, features: Features, why: str = "") -> str:
 
     `why` is what the method itself says about it.
     """
-    missing = [each.value for each in Feature if each in features - supports]
+    missing = [feature.value for feature in Feature if feature in features - supports]
     return f"it does not support {join(missing)}{why and f' ({why})'}; {_advise(features)}"
 
 

@@ -2,7 +2,7 @@
 
     c(t) = c(0) + c'(0) t - g t^2/2 e_z     p_WB = c - R_WB com_B     v_WB = c' - R_WB (w x com_B)
 
-Gravity exerts no torque about C, so the rotation is that of a free body, and C moves on a parabola. Methods of this package
+Gravity exerts no torque about C, so the body rotates like a free body, and C moves on a parabola. Methods of this package
 integrate the rotation only. Engines integrate both, in the coordinates of their free joint.
 
 Source: any mechanics textbook, such as Goldstein, Classical Mechanics, sections 1.2 and 4.9.
@@ -65,26 +65,27 @@ class Flight:
         return self.fall_from(*self.centre(*start), t)
 
     def fall_from(self, c: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """Return what `fall` does from other positions and velocities of the centre of mass, (1, 3) or (n, 3)."""
+        """Return the result of `fall` for other initial positions c and velocities v of the centre, (1, 3) or (n, 3)."""
         gt = np.outer(t, (0.0, 0.0, -self.g))
         return c + t[:, None] * (v + gt / 2), v + gt
 
     def follow(self, centre: tuple[Array, Array], R_WB: Array, w_WB_B: Array) -> tuple[Array, Array]:
-        """Return position (n, 3), m, and velocity (n, 3), m/s, of the frame from the centre of mass: `centre` inverted."""
+        """Return position (n, 3), m, and velocity (n, 3), m/s, of the frame from the result of `centre`, which it inverts."""
         arm, slope = self._arm(R_WB, w_WB_B)
         return centre[0] - arm, centre[1] - slope
 
     def invariants(self, scene: Any) -> tuple[InvariantInTime, ...]:
         """Return linear momentum, angular momentum about the world's origin, and total energy.
 
-        The first two are without the impulse of gravity, which is exact: m g t downwards, and its moment m g t about the
-        centre of mass at t/2 on its parabola.
+        Gravity changes the first two by an impulse that is known exactly: m g t downwards. Its moment is as if all of it acted
+        at the position of the centre of mass at t/2. Both are subtracted, so that the rest is constant.
         """
         m, down = self.mass, np.array([0.0, 0.0, -self.g])
+        # Reference scales follow from bounds: the speed of any point of the frame, and the distance of the centre of mass.
         (c0,), (v0,) = self.fall(scene, np.zeros(1))
-        fall = abs(self.g) * scene.t_end
-        speed = float(np.linalg.norm(v0) + fall + np.linalg.norm(scene.w_WB_B0) * np.linalg.norm(self.com_B))
-        reach = float(np.linalg.norm(c0) + (np.linalg.norm(v0) + fall / 2) * scene.t_end)
+        gained = abs(self.g) * scene.t_end
+        speed = float(np.linalg.norm(v0) + gained + np.linalg.norm(scene.w_WB_B0) * np.linalg.norm(self.com_B))
+        reach = float(np.linalg.norm(c0) + (np.linalg.norm(v0) + gained / 2) * scene.t_end)
         spin = float(np.linalg.norm(scene.body.momentum(scene.w_WB_B0)))
 
         def linear(R: Array, w: Array, p: Array, v: Array, t: Array) -> Array:
@@ -92,13 +93,14 @@ class Flight:
 
         def angular(R: Array, w: Array, p: Array, v: Array, t: Array) -> Array:
             c, velocity = self.centre(R, w, p, v)
+            # The parabola is c0 + v0 t + down t^2 / 2. Its last part has no moment, because it is along the force.
             impulse = np.cross(np.outer(t, c0) + np.outer(t * t / 2, v0), m * down)
             return (R @ scene.body.momentum(w)[..., None])[..., 0] + m * np.cross(c, velocity) - impulse
 
         def energy(R: Array, w: Array, p: Array, v: Array, t: Array) -> Array:
             c, velocity = self.centre(R, w, p, v)
-            spins = np.sum(scene.body.momentum(w) * w, axis=-1) / 2
-            return np.asarray(spins + m * (np.sum(velocity * velocity, axis=-1) / 2 - c @ down))
+            rotation = np.sum(scene.body.momentum(w) * w, axis=-1) / 2
+            return np.asarray(rotation + m * (np.sum(velocity * velocity, axis=-1) / 2 - c @ down))
 
         whole = scene.kinetic_energy0 + m * (speed * speed / 2 + abs(self.g) * reach)
         return (

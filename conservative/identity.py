@@ -211,7 +211,7 @@ class _Walk:
         if kind is list:
             yield self._all(value)
         elif kind in (dict, MappingProxyType):
-            yield [(self.follow(key), self.follow(each)) for key, each in value.items()]
+            yield [(self.follow(key), self.follow(item)) for key, item in value.items()]
         elif kind is set:
             yield sorted(self._all(value))
         elif isinstance(value, ModuleType):
@@ -253,7 +253,7 @@ class _Walk:
                 cells[name] = MISSING
         yield self._follow_code(code, value.__globals__, cells)
         yield self._all((value.__defaults__, value.__kwdefaults__))
-        yield [(name, self.follow(each)) for name, each in sorted(vars(value).items())]
+        yield [(name, self.follow(attribute)) for name, attribute in sorted(vars(value).items())]
         self.in_library = before
 
     def _follow_code(self, code: CodeType, known: Mapping[str, Any], cells: Mapping[str, Any]) -> str:
@@ -267,19 +267,19 @@ class _Walk:
         parts: list[Any] = [code.co_code, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars, code.co_flags]
         parts += [code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_exceptiontable]
         for read in reads.reads:
-            found, name = resolve(read, known, cells, _is_pure)
-            if found is LOCAL:
+            value, name = resolve(read, known, cells, _is_pure)
+            if value is LOCAL:
                 continue
-            if found is MISSING and (read.imported or "." in name):  # not yet imported, or made by the module when it is read
+            if value is MISSING and (read.imported or "." in name):  # not yet imported, or made by the module when it is read
                 raise _NotFollowed(f"{code.co_name}, which reads {name}")
-            self.makes |= any(found is maker for maker in _MAKERS)
-            self.reads += not (found is MISSING or _library_name(found) is not None)
-            if isinstance(found, ModuleType) and not self.in_library:
+            self.makes |= any(value is maker for maker in _MAKERS)
+            self.reads += not (value is MISSING or _library_name(value) is not None)
+            if isinstance(value, ModuleType) and not self.in_library:
                 raise _NotFollowed(f"{code.co_name}, which passes on the module {name}")
             if name == "__class__":  # for `super`
-                parts.append((name, self._follow_class(found, called=False)))
+                parts.append((name, self._follow_class(value, called=False)))
             else:
-                parts.append((name, "missing" if found is MISSING else self.follow(found)))
+                parts.append((name, "missing" if value is MISSING else self.follow(value)))
         inside = {**cells, **dict.fromkeys(code.co_cellvars, LOCAL)}
         for name, read in reads.bound.items():
             if name in code.co_cellvars:
@@ -292,7 +292,7 @@ class _Walk:
 
     def _list_of_keeper(self, value: Any) -> Iterator[Any]:
         """Follow compiled code or a cache, with earlier values of what their function reads: it may read libraries only."""
-        function = next((found for name in ("py_func", "__wrapped__") if (found := getattr(value, name, None))), None)
+        function = next((wrapped for name in ("py_func", "__wrapped__") if (wrapped := getattr(value, name, None))), None)
         if not isinstance(function, FunctionType):
             raise _NotFollowed(f"a value of type {type(value).__name__}")
         reads, self.reads = self.reads, 0
@@ -316,11 +316,11 @@ class _Walk:
             described = [
                 (field.name, field.init, field.kw_only, field.default, field.default_factory) for field in fields(value)
             ]
-            yield [self._all(each) for each in described]
-            left_out |= {name for name, each in vars(value).items() if _is_generated(each)}
-        own = ((name, each) for name, each in sorted(vars(value).items()) if name not in left_out)
+            yield [self._all(field) for field in described]
+            left_out |= {name for name, attribute in vars(value).items() if _is_generated(attribute)}
+        own = ((name, attribute) for name, attribute in sorted(vars(value).items()) if name not in left_out)
         slots = MemberDescriptorType, GetSetDescriptorType
-        yield [(name, "a slot" if isinstance(each, slots) else self.follow(each)) for name, each in own]
+        yield [(name, "a slot" if isinstance(attribute, slots) else self.follow(attribute)) for name, attribute in own]
 
     def _follow_class(self, value: Any, called: bool) -> str:
         """Return the text of a class: its name in a library, otherwise its parts."""
@@ -347,8 +347,8 @@ class _Walk:
         before, self.in_library = self.in_library, _top(name) in (_PACKAGE, "numpy", "scipy")
         derived = _derived_names(kind)
         attributes = sorted(getattr(value, "__dict__", {}).items())
-        own = [(key, each) for key, each in attributes if key not in derived and type(each).__module__ != _OF_KERNELS]
-        yield [(key, self.follow(each)) for key, each in own]
+        own = [(key, part) for key, part in attributes if key not in derived and type(part).__module__ != _OF_KERNELS]
+        yield [(key, self.follow(part)) for key, part in own]
         for base in kind.__mro__:
             for key, slot in sorted(vars(base).items()):
                 if isinstance(slot, MemberDescriptorType):
@@ -362,7 +362,7 @@ class _Walk:
             if isinstance(reduced, str):
                 raise _NotFollowed(f"{reduced}, a value of type {name}")
             make, arguments, state, *others = (*reduced, None, None, None)[:5]
-            yield ["its class" if each is kind else self.follow(each) for each in (make, *arguments)]
+            yield ["its class" if part is kind else self.follow(part) for part in (make, *arguments)]
             yield self.follow(state)
             yield [self.follow(list(other)) for other in others if other is not None]
         self.in_library = before
@@ -376,7 +376,7 @@ def _library_name(value: Any) -> str | None:
         return full if _is_pure(full) else None
     if isinstance(value, np.ufunc):
         name = value.__name__
-        module = next((each for each in ("numpy", "scipy.special") if _is_in(each, name, value)), "")
+        module = next((library for library in ("numpy", "scipy.special") if _is_in(library, name, value)), "")
     owner = getattr(value, "__self__", None)
     if isinstance(owner, ModuleType):
         module = owner.__name__
@@ -390,10 +390,10 @@ def _library_name(value: Any) -> str | None:
 
 def _is_in(module: str, name: str, value: object) -> bool:
     """Return whether a module that was imported has the value under a dotted name."""
-    found: Any = builtins if module == "builtins" else sys.modules.get(module)
-    for each in name.split("."):
-        found = getattr(found, each, None)
-    return found is value
+    owner: Any = builtins if module == "builtins" else sys.modules.get(module)
+    for part in name.split("."):
+        owner = getattr(owner, part, None)
+    return owner is value
 
 
 def _is_generated(method: Any) -> bool:

@@ -34,7 +34,7 @@ class Invariant:
     that turn with the field (`Scene.in_field_axes`).
 
     In a scene with a torque or damping, I(t) - I(0) equals what these loads supplied. `supplied` returns it, (n,) or (n, 3),
-    from `Trajectory.supplied`, and the drift is that of the balance I(t) - I(0) - supplied.
+    from `Trajectory.supplied`, and the drift belongs to the balance I(t) - I(0) - supplied.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def invariants_of(
 
     These are the energy, unless the field depends on time; the Jacobi integral in a turning field; the world momentum (a
     vector) of a free body, or its component along the axis of the field (the vertical in uniform gravity); and the axial
-    momentum if body and field are symmetric about one axis. Momenta include that of a rotor.
+    momentum if body and field are symmetric about one axis. Momenta include a rotor's.
 
     The initial rates (3,) are in rad/s, the reference scale of the energy in J, above 0. `axis` is the unit vector (3,), body
     axes, about which body and field are symmetric, or None (`axial_direction`).
@@ -135,11 +135,11 @@ def balance_of(invariant: Invariant, potential: AnyPotential | None) -> Invarian
     """Return the balance that replaces an invariant of body and potential in a scene with a torque or damping."""
     line = None if potential is None else potential.axis_W
 
-    def supplied(given: Array) -> Array:
+    def supplied(sums: Array) -> Array:
         if invariant.unit == "J":
             turning = potential.orbit.rate * potential.orbit.normal_W if isinstance(potential, Turning) else np.zeros(3)
-            return np.asarray(given[:, 0] - given[:, 1:] @ turning)
-        return given[:, 1:] if line is None else np.asarray(given[:, 1:] @ line)
+            return np.asarray(sums[:, 0] - sums[:, 1:] @ turning)
+        return sums[:, 1:] if line is None else np.asarray(sums[:, 1:] @ line)
 
     return replace(invariant, name=f"{invariant.name} balance", supplied=supplied)
 
@@ -175,7 +175,9 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     of_motion = (
         invariant for invariant in scene.invariants if invariant.name in kept and invariant not in scene.extra_invariants
     )
-    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in of_motion}
+    return {
+        invariant: max(invariant.scale, most) if invariant.unit == MOMENTUM_UNIT else invariant.scale for invariant in of_motion
+    }
 
 
 NEARLY_SPHERICAL = 0.005

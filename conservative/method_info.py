@@ -1,4 +1,4 @@
-"""What a family of methods declares: its settings for tables and benchmarks, its place in the automatic choice, its colour.
+"""Declaration of a family of methods: its settings for tables and benchmarks, its place in the automatic choice, its colour.
 
 Settings are texts as in the name of a method, such as "RK4" or "order=4,tol=1e-9", and "" for the defaults.
 """
@@ -93,7 +93,7 @@ class MethodInfo:
     as_installed
         The engine as installed, with nothing set but the step; () if its user has to choose a setting.
     usual_dt
-        The engine's own default step, s, which its users take; None if it has none.
+        The engine's own default step, s, which its users take; None for an engine without a default.
     rank
         Rank in the automatic choice, `integrate(scene, error=...)`; the lowest comes first. None: the family is not considered.
     group
@@ -116,7 +116,7 @@ class MethodInfo:
         The features of scenes that the method supports (`conservative.features`); default: fields that depend on the attitude
         only. If a scene has others, `Method.unsupported` says so. Methods of the rotation alone also take free flight.
     removed
-        Settings of earlier versions, and for the error message what a name has instead.
+        Names of settings of earlier versions, with the text of the error message: what to use instead.
     """
 
     variants: tuple[str, ...] = ("",)

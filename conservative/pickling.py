@@ -40,8 +40,8 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     import cloudpickle
 
     with LOCK, ExitStack() as stack:
-        known = cloudpickle.list_registry_pickle_by_value() if by_value else ()
-        for module in (sys.modules[name] for name in by_value if name not in known):
+        registered = cloudpickle.list_registry_pickle_by_value() if by_value else ()
+        for module in (sys.modules[name] for name in by_value if name not in registered):
             cloudpickle.register_pickle_by_value(module)
             stack.callback(cloudpickle.unregister_pickle_by_value, module)
         try:
@@ -71,10 +71,12 @@ def _pickler() -> Any:
     require_extra("a limit on the time of a run", "report", "cloudpickle")
     from cloudpickle import CloudPickler
 
-    class Pickler(CloudPickler):  # type: ignore[misc]  # of a package without types
+    class Pickler(CloudPickler):  # type: ignore[misc]  # cloudpickle has no types
+        """Writes the places of `shared` objects instead of the objects."""
+
         def __init__(self, stream: io.BytesIO, shared: Sequence[object]) -> None:
             super().__init__(stream)
-            self.places = {id(each): place for place, each in enumerate(shared)}
+            self.places = {id(value): place for place, value in enumerate(shared)}
 
         def persistent_id(self, value: object) -> int | None:
             return self.places.get(id(value))
@@ -83,10 +85,11 @@ def _pickler() -> Any:
             """Return how pickle restores a value."""
             if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
                 return read_only, (value.copy(order="K"),)
-            if isinstance(value, BaseException):  # whatever arguments its constructor takes
+            if isinstance(value, BaseException):  # without its constructor, whose arguments may differ from `args`
                 return restore, (type(value), value.args, vars(value))
             kind: Any = type(value)
             cached = _cached_names(kind)
+            # `PickledByFields` leaves out caches itself.
             if not isinstance(value, PickledByFields) and not cached.isdisjoint(getattr(value, "__dict__", ())):
                 return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
             return super().reducer_override(value)

@@ -1,4 +1,4 @@
-"""What only some systems have. Elsewhere each function does nothing, or returns that the value is unknown.
+"""Functions that only some systems have. Elsewhere each function does nothing, or returns that the value is unknown.
 
 No other file imports a module of one system, except the program of a worker, which uses no other file.
 """
@@ -65,10 +65,10 @@ def is_own(file: Path) -> bool:
     """Return whether a file belongs to this user, and no other one can write or replace it; True on Windows."""
     if not hasattr(os, "geteuid"):
         return True
-    found, folder = file.stat(), file.parent.stat()
+    status, folder = file.stat(), file.parent.stat()
     sticky = folder.st_mode & stat.S_ISVTX  # as /tmp: only the owner of a file can replace it
-    writable = (found.st_mode | (0 if sticky else folder.st_mode)) & stat.S_IWOTH
-    return found.st_uid == os.geteuid() and not writable
+    writable = (status.st_mode | (0 if sticky else folder.st_mode)) & stat.S_IWOTH
+    return status.st_uid == os.geteuid() and not writable
 
 
 def physical_memory() -> int:

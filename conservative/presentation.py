@@ -5,9 +5,7 @@ The argument `trajectory` is always a `Trajectory`, whose file imports this one.
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
-from decimal import ROUND_UP, Context, Decimal
 from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -44,30 +42,6 @@ TIME_UNITS = (("days", 86400.0), ("h", 3600.0), ("s", 1.0))
 """Units of time axes by their length, s. A unit is used from a duration of two on."""
 
 _WIDTH, _HEIGHT = 480, 160
-DASH = "–"
-"""In place of a number that was not measured."""
-
-
-def rounded_up(value: float, digits: int) -> float:
-    """Return a size, such as an error or a drift, rounded away from 0 to `digits` digits: what is shown is never too small."""
-    if not math.isfinite(value):
-        return value
-    # Of the 15 digits that a double has for certain, so that 0.1 and 100 * 0.07 = 7.000000000000001 stay 0.1 and 7.
-    return float(Context(digits, ROUND_UP).create_decimal(Decimal(f"{value:.15g}")))
-
-
-def number(value: float, digits: int = 2) -> str:
-    """Return a number to `digits` significant digits, a dash for NaN."""
-    if math.isnan(value):
-        return DASH
-    plain = value == 0 or 0.01 <= abs(value) < 1e6
-    return f"{float(f'{value:.{digits}g}'):,g}" if plain else short_power(f"{value:.{digits - 1}e}")
-
-
-def short_power(text: str) -> str:
-    """Return a number with a short exponent: `1e-3` for `1e-03`."""
-    mantissa, _, exponent = text.partition("e")
-    return f"{mantissa}e{int(exponent)}" if exponent else text
 
 
 def samples(trajectory: Any) -> Array:
@@ -149,7 +123,7 @@ def _lines(trajectory: Any, series: dict[str, Array], quantity: str, scale: Lite
         starts, ends = (np.linspace(0, n - 1, MOST_DRAWN + 1).astype(int)[part] for part in (slice(-1), slice(1, None)))
     t, tables = (trajectory.t[starts] + trajectory.t[ends]) / 2 / length, []
     for name, values in series.items():  # an interval has both its ends, so that bands join
-        low, high = (each(each.reduceat(values, starts), values[ends]) for each in (np.minimum, np.maximum))
+        low, high = (extreme(extreme.reduceat(values, starts), values[ends]) for extreme in (np.minimum, np.maximum))
         tables.append(pd.DataFrame({"t": t, "of": name, "value": high, "low": low}))
     base = alt.Chart(pd.concat(tables), width=_WIDTH, height=_HEIGHT).encode(
         x=alt.X("t:Q", title=f"time, {unit}"),

@@ -87,10 +87,10 @@ def read_name(text: str, argument: str = "method", settings: bool = True) -> Nam
     another form.
     """
     printable_text(argument, text, _NAME)
-    given, colon, rest = text.replace("==", "@").partition(":")
-    base, at, version = given.partition("@")
+    name, colon, rest = text.replace("==", "@").partition(":")
+    base, at, version = name.partition("@")
     version = version.lower()  # versions of packages have no case
-    if not base or "=" in given or bool(at) != bool(_VERSION.fullmatch(version)) or (colon and not settings):
+    if not base or "=" in name or bool(at) != bool(_VERSION.fullmatch(version)) or (colon and not settings):
         form = "NAME, NAME@VERSION or NAME==VERSION, such as mujoco@3.6.0"
         raise BadInput(argument, repr(text), form + (", and settings after a colon" if settings else ", without settings"))
     return Name(base, version, rest if colon else None)
@@ -141,9 +141,9 @@ def method(text: str) -> Method:
     name = read_name(text)
     base, version, settings = name
     methods, engines = list_entries(METHODS), list_entries(ENGINES)
-    known = set(engines) if version else {*engines, *methods}
-    if base not in known:
-        allowed = nearest(base, known, "conservative list, and conservative engines list")
+    names = set(engines) if version else {*engines, *methods}
+    if base not in names:
+        allowed = nearest(base, names, "conservative list, and conservative engines list")
         without = f"{base!r} without a version, or an engine: " if base in methods else ""
         raise BadInput("method", repr(name.family), without + allowed)
     # The class that runs in this process, or in an environment if a version is named or there is no other.

@@ -139,10 +139,10 @@ class Scene(PickledByFields):
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
         try:
-            given: tuple[Any, ...] = tuple(extra_invariants)
+            invariants: tuple[Any, ...] = tuple(extra_invariants)
         except Exception:  # not an iterable, or one that fails
-            given = (extra_invariants,)
-        if not all(isinstance(each, Invariant) for each in given):
+            invariants = (extra_invariants,)
+        if not all(isinstance(invariant, Invariant) for invariant in invariants):
             raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
         step = dt
         if step is None:
@@ -159,7 +159,7 @@ class Scene(PickledByFields):
             dt=positive_number("dt", step, "a finite step above 0, s"),
             torque=torque,
             damping=damping,
-            extra_invariants=given,
+            extra_invariants=invariants,
             group=printable_text("group", group, "a text"),
             source=printable_text("source", source, "a text"),
             flight=flight,
@@ -188,12 +188,13 @@ class Scene(PickledByFields):
     @property
     def identity(self) -> Identity:
         """The key, and the part that cannot be followed, if there is one."""
-        known: Identity | None = vars(self).get("_identity")
-        if known is not None:
-            return known
+        identity: Identity | None = vars(self).get("_identity")
+        if identity is not None:
+            return identity
         now = identify(self)
         if now.fixed:
             vars(self)["_identity"] = now
+        # `identify` returns another text each time if a part is unknown. The scene keeps the first, so that it equals itself.
         return replace(now, text=vars(self).setdefault("_alone", now.text)) if now.unknown else now
 
     @cached_property
@@ -203,7 +204,10 @@ class Scene(PickledByFields):
         return not self.features.isdisjoint(fields_of_users) or any(callable(load.value) for load in self.loads)
 
     def _call_loads(self) -> None:
-        """Raise `BadInput` unless the loads have values; keep the key, for `now`, unless functions change what they read."""
+        """Raise `BadInput` unless the loads have values. Keep the key for `now`, unless calls change what functions read.
+
+        `_current` is the key for which the caches are valid, and the copy with these caches; None for the scene itself.
+        """
         before = self.key if self.changeable else ""
         for load in self.loads:
             load.require(self.t_end, self.R_WB0)
@@ -215,8 +219,8 @@ class Scene(PickledByFields):
     def now(self) -> Scene:
         """Return the scene as its functions are now: itself, or a copy without caches if they changed, or may have.
 
-        Break points, scales and compiled code are cached with a scene and its parts. Functions that read a global variable are
-        others when it changes, and those that cannot be followed may be others in each call.
+        Break points, scales and compiled code are cached with a scene and its parts. A function that reads a global variable
+        changes with it, and a function that cannot be followed may change with each call.
         """
         if not self.changeable:
             return self
@@ -254,7 +258,7 @@ class Scene(PickledByFields):
 
     @property
     def calls_python(self) -> bool:
-        """True if steps call Python functions, so that one takes as long as the functions need."""
+        """True if steps call Python functions, so that a step takes as long as the functions."""
         return bool(self.loads) or not self.features.isdisjoint((Feature.FUNCTION, Feature.TIME))
 
     @property
@@ -268,8 +272,8 @@ class Scene(PickledByFields):
         return self.now().smoothness().breaks
 
     def smoothness(self, t_end: float = 0.0) -> Smoothness:
-        """Return the break points of a run to t_end, s, at least that of the scene, and the step that resolves its loads."""
-        end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # not beyond it by rounding
+        """Return the break points of a run to t_end, s, at least to the scene's, and the step that resolves its loads."""
+        end = self.t_end if t_end * EARLIER <= self.t_end else t_end  # rounding can put the last step after t_end
         return examine(self.loads, end) if self.loads else SMOOTH
 
     @property
@@ -298,7 +302,7 @@ class Scene(PickledByFields):
 
     @cached_property
     def energies(self) -> float:
-        """The sum of these energies, J, which is 0 for a body at rest without a field and a load."""
+        """The sum of the energies in `energy_scale`, J; 0 for a body at rest without a field and a load."""
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         if self.body.motor is not None:
             size += self.body.motor.require(self.t_end) ** 2 / (2 * float(self.body.moments.min()))
@@ -323,13 +327,13 @@ class Scene(PickledByFields):
     def invariants(self) -> tuple[Invariant, ...]:
         """Conserved quantities of the exact motion: energy, momenta or their balances, and `extra_invariants`.
 
-        In free flight, energy and momentum are those of the rotation about the centre of mass, and those of `flight` follow.
+        In free flight, energy and momentum belong to the rotation about the centre of mass. The invariants of `flight` follow.
         """
         own = invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale, self.symmetry_axis_B)
         if self.loaded:
-            own = tuple(balance_of(each, self.potential) for each in own)
+            own = tuple(balance_of(invariant, self.potential) for invariant in own)
         if self.body.motor is not None:  # its work is not part of the motion of the body
-            own = tuple(in_time(each, self.body) for each in own if each.unit != "J")
+            own = tuple(in_time(invariant, self.body) for invariant in own if invariant.unit != "J")
         return (*own, *self.extra_invariants, *(self.flight.invariants(self) if self.flight else ()))
 
     def initial_value(self, invariant: Invariant) -> Array:
@@ -353,14 +357,14 @@ class Scene(PickledByFields):
 
     def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
         """Return `function(self, *settings)`, cached with the scene, which never changes. Settings are hashable."""
-        known, key = self._derivations, (function, settings)
+        cache, key = self._derivations, (function, settings)
         try:
-            return known[key]
+            return cache[key]
         except KeyError:
             result = function(self, *settings)
-            if len(known) >= MOST_DERIVATIONS:
-                known.clear()
-            known[key] = result
+            if len(cache) >= MOST_DERIVATIONS:
+                cache.clear()
+            cache[key] = result
         return result
 
     def forget(self) -> None:
@@ -378,7 +382,7 @@ class Scene(PickledByFields):
 
 
 def _copy(value: Any) -> Any:
-    """Return a copy of a frozen dataclass of this package, and of those in it, without caches; another value itself."""
+    """Return a copy without caches of a frozen dataclass of this package and the dataclasses in it; other values unchanged."""
     if not is_dataclass(value) or not type(value).__module__.startswith(f"{__package__}."):
         return value
     return replace_unchecked(value, **{field.name: _copy(getattr(value, field.name)) for field in fields(value)})

@@ -81,7 +81,7 @@ class MassDistribution:
         """Return the distribution rotated by `R_BS` (3, 3), which maps its present axes S to body axes."""
         R = rotation("R_BS", R_BS)
         inertia_com = R @ self.inertia_com @ R.T
-        return MassDistribution(self.mass, R @ self.com_B, (inertia_com + inertia_com.T) / 2)
+        return MassDistribution(self.mass, R @ self.com_B, (inertia_com + inertia_com.T) / 2)  # symmetric in spite of rounding
 
     def about(self, com_B: ArrayLike) -> MassDistribution:
         """Return the distribution with its centre of mass `com_B` (3,) from the fixed point, m, body axes."""

@@ -186,8 +186,8 @@ def key_lines(source: str) -> dict[Key, int]:
     return lines
 
 
-def _line_of(found: re.Match[str]) -> int:
-    return found.string.count("\n", 0, found.start()) + 1
+def _line_of(token: re.Match[str]) -> int:
+    return token.string.count("\n", 0, token.start()) + 1
 
 
 def _line_of_deepest(source: str) -> int | None:
@@ -223,11 +223,11 @@ def _is_deep(value: object) -> bool:
     level = [value]
     for _ in range(DEEPEST):
         level = [
-            each
-            for one in level
-            if isinstance(one, list | dict)
-            for each in (one.values() if isinstance(one, dict) else one)
-            if isinstance(each, list | dict)
+            item
+            for container in level
+            if isinstance(container, list | dict)
+            for item in (container.values() if isinstance(container, dict) else container)
+            if isinstance(item, list | dict)
         ]
     return bool(level)
 

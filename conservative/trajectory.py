@@ -17,6 +17,7 @@ from .deferred_imports import PACKAGES, load_entry
 from .errors import BadInput, Diverged, IntegrationFailed, NotConserved, RemovedAttribute, nearest, require_extra
 from .grid import Grid
 from .invariants import Invariant, sizes
+from .number_text import rounded_up
 from .outcome import OK, Outcome
 from .outcome import Choice as Choice
 from .outcome import Counters as Counters
@@ -87,7 +88,7 @@ class Trajectory:
     def p_WB(self) -> Array | None:
         """Positions (n, 3), m, world axes, of the origin of the body frame in free flight, otherwise None.
 
-        They are those of the engine. If the method integrates the rotation only, they follow from its attitudes and the
+        They are the engine's. If the method integrates the rotation only, they follow from its attitudes and the
         exact parabola of the centre of mass.
         """
         return self.place[0] if self.scene.flight else None
@@ -132,7 +133,7 @@ class Trajectory:
         """Return the drift (I - I0) / scale of an invariant I, (n,) or (n, 3); I0 is its value in the scene's initial state.
 
         The invariant is one of `scene.invariants`, or its name, such as "energy". `conservative.invariants.sizes` returns
-        magnitudes. In a scene with a torque or damping, the drift is that of the balance I - I0 - supplied, and nan if the
+        magnitudes. In a scene with a torque or damping, the drift belongs to the balance I - I0 - supplied, and nan if the
         method does not provide `supplied`.
 
         Raises
@@ -141,7 +142,7 @@ class Trajectory:
             The scene has no such invariant.
         """
         if isinstance(invariant, str):
-            by_name = {each.name: each for each in self.scene.invariants}
+            by_name = {entry.name: entry for entry in self.scene.invariants}
             if invariant not in by_name:
                 raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
             invariant = by_name[invariant]
@@ -156,7 +157,7 @@ class Trajectory:
         return invariant.evaluate(self.scene.in_field_axes(self.R_WB, self.t), self.w_WB_B, *more)
 
     def error(self, truth: Trajectory) -> Array:
-        """Return the attitude error (n,), rad: the angle between this attitude and that of `truth` at each sample.
+        """Return the attitude error (n,), rad: the angle between this attitude and the attitude of `truth` at each sample.
 
         Raises
         ------
@@ -212,11 +213,11 @@ class Trajectory:
             their own samples. If the samples of the truth have other times, they are moved there by integration.
         """
         shown = [self, *others]
-        if truth is not None and not any(each is truth for each in shown):
+        if truth is not None and not any(trajectory is truth for trajectory in shown):
             shown.append(truth)
-        index = next((number for number, each in enumerate(shown) if each is truth), None)
+        index = next((number for number, trajectory in enumerate(shown) if trajectory is truth), None)
         animation = load_entry(PACKAGES, PACKAGES, "animation")
-        return animation(shown, labels or [each.label for each in shown], index)
+        return animation(shown, labels or [trajectory.label for trajectory in shown], index)
 
     def _repr_html_(self) -> str:
         rows = [
@@ -227,7 +228,7 @@ class Trajectory:
             ("work", ", ".join(f"{count} {name}" for name, count in self.work.items())),
         ]
         drifts = ((invariant.name, sizes(self.drift(invariant)).max(initial=0.0)) for invariant in self.scene.invariants)
-        rows += [(f"drift of {name}", f"{presentation.rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
+        rows += [(f"drift of {name}", f"{rounded_up(drift, 3):.2e} (relative)") for name, drift in drifts]
         return presentation.html_table("Trajectory", rows)
 
     def __len__(self) -> int:
@@ -291,7 +292,7 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
         if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
     frame: Any = result.frame
-    if frame is not None and (scene.flight is None or [np.shape(each) for each in frame] != [(n, 3)] * 2):
+    if frame is not None and (scene.flight is None or [np.shape(part) for part in frame] != [(n, 3)] * 2):
         return "positions and velocities that are not two arrays (n, 3) in free flight"
     return None
 

@@ -56,8 +56,8 @@ def collocate(scene: Scene, grid: Grid, parts: int, every: int = 1) -> Trajector
                 y = _step(slope, start + h * k, y, h)
                 states.append(y[:, 0])
             t = np.append(t, [*(start + h * np.arange(1, parts)), stop])
-        row, found = np.searchsorted(t, ends, side="right") - 1, np.array(states)
-        samples, gaps = found[row], ends - t[row]
+        row, solution = np.searchsorted(t, ends, side="right") - 1, np.array(states)
+        samples, gaps = solution[row], ends - t[row]
         for some in np.array_split(np.flatnonzero(gaps), math.ceil(len(ends) / AT_ONCE)):
             if len(some):
                 samples[some] = _step(slope, t[row[some]], samples[some].T, gaps[some]).T
@@ -107,12 +107,12 @@ def _slope(scene: Scene) -> Slope:
             (a, b, c, d, L1, L2, L3), (x, y_, z) = y, J_inverse @ (y[4:] - momentum)
             T = np.zeros_like(y[4:]) if field is None else np.array(field.body_torque((a, b, c, d)))
             turn = -b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x
-            D, given = acting or loads(times, from_quaternion(np.array([a, b, c, d]).T.astype(float)))
+            D, torque = acting or loads(times, from_quaternion(np.array([a, b, c, d]).T.astype(float)))
             if D is not None:
                 T = T - np.einsum("nij,jn->in", D, np.array([x, y_, z]))
-            if given is not None and scene.torque is not None:
-                T = T + (given if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(given))))
-            L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # the rates are those of the body's own momentum
+            if torque is not None and scene.torque is not None:
+                T = T + (torque if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(torque))))
+            L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # rates follow from the body's own momentum
             spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
             return np.array([*(rate / 2 for rate in turn), *spin])
 
@@ -126,7 +126,7 @@ def wheel(scene: Scene, t: Reals) -> Reals:
     motor = scene.body.motor
     if motor is None:
         return np.zeros((3, len(t)), dtype=np.longdouble)
-    return np.array([motor.at(float(each)) for each in t], dtype=np.longdouble).T
+    return np.array([motor.at(float(time)) for time in t], dtype=np.longdouble).T
 
 
 def _inverse(scene: Scene) -> Reals:

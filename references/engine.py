@@ -33,7 +33,7 @@ STEP_LIMIT = 10_000_000
 PACE_STEPS = 1000
 """After so many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
 SHARE = 15 / 16
-"""Mass of a body about a fixed point, relative to the largest possible one: that of the paper's cone."""
+"""Mass of a body about a fixed point, relative to the largest possible one: the mass of the paper's cone."""
 LONG = 1e5
 """Rotation in a run, rad, above which heyoka's pace is checked first. Shorter runs stay far below the limit."""
 
@@ -137,7 +137,7 @@ class EngineAxes:
         R_WB, w_WB_B, finite = to_body_axes(grid.t, states, self.R_BF[None])
         good = int(finite[0])
         if frame:
-            good = min(good, *(int(np.append(np.isfinite(each).all(axis=1), False).argmin()) for each in frame))
+            good = min(good, *(int(np.append(np.isfinite(part).all(axis=1), False).argmin()) for part in frame))
             frame = frame[0][:good], frame[1][:good]
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
         return Trajectory(self.scene, grid.t[:good], R_WB[0, :good], w_WB_B[0, :good], label, work, failure, frame=frame)

@@ -236,7 +236,7 @@ def _solver(
 
     def solve(t: Reals, scene: Scene | None) -> tuple[str, int, Reals]:
         with integrators.borrow() as integrator:
-            # heyoka does not store unused parameters at the end, such as those of a spring at the pivot.
+            # heyoka does not store unused parameters at the end, such as a pivot spring's.
             integrator.pars[:] = parameters[: len(integrator.pars)]
             integrator.time, integrator.state[:] = _real(0, bits), start
             reason = pace_reason(scene, integrator, float(t[-1])) if scene else ""

@@ -1,6 +1,6 @@
 """Samples in body axes from the states of engines: one compiled loop for all engines, as for our own methods.
 
-The form of a state is one of the integers below. Symbols: F are the axes of the engine's body, D those of its attitude,
+The form of a state is one of the integers below. Symbols: F are the axes of the engine's body, D the axes of its attitude,
 q a quaternion with the scalar first, w rates in F, l the momentum, u = l/J1 in D, n the third axis of F in D. Engines return
 attitudes without orthonormalisation, so the norm error of a quaternion is visible in the samples.
 """
@@ -63,7 +63,7 @@ def to_body_axes(t: Array, states: States, R_BF: Array) -> tuple[Array, Array, A
     R_WD = np.broadcast_to(np.eye(3), (n, 3, 3)) if states.R_WD is None else states.R_WD
     constants = np.zeros((n, 4)) if states.constants is None else states.constants
     # Copies, because numba compiles a function again for arrays that are read-only.
-    arrays = [np.array(each, float, order="C") for each in (t, states.values, R_BF, constants, R_WD)]
+    arrays = [np.array(array, float, order="C") for array in (t, states.values, R_BF, constants, R_WD)]
     _convert(states.kind, states.rates_in_world, *arrays, R_WB, w_WB_B, finite)
     return R_WB, w_WB_B, finite
 

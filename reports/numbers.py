@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from conservative.presentation import DASH as DASH
-from conservative.presentation import number as number
-from conservative.presentation import rounded_up
-from conservative.presentation import short_power as short_power
+from conservative.number_text import DASH as DASH
+from conservative.number_text import number as number
+from conservative.number_text import rounded_up
+from conservative.number_text import short_power as short_power
 
 
 def bound(value: float, digits: int = 2) -> str:

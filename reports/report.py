@@ -92,13 +92,13 @@ def render(document: Document, folder: Path, png: bool) -> Document:
     return replace(document, pages=pages)
 
 
-def write_page(document: Document, draw: Callable[[Figure], str], page: Path, words: Path) -> Document:
+def write_page(document: Document, draw: Callable[[Figure], str], page: Path, markdown_path: Path) -> Document:
     """Write a document as HTML and as Markdown with its pictures, and return it as `render` does."""
     from .document import html, markdown
 
     document, pictures = with_pictures(document, draw, AGAIN)
     document = write_text(document, page, html.render)
-    return write_text(document, words, lambda part: markdown.render(part, lambda figure: pictures[figure.name]))
+    return write_text(document, markdown_path, lambda part: markdown.render(part, lambda figure: pictures[figure.name]))
 
 
 def write_text(document: Document, path: Path, render: Callable[[Document], str]) -> Document:
@@ -122,7 +122,7 @@ def with_pictures(document: Document, draw: Callable[[Figure], str], then: str =
     def tried(block: Block) -> list[Block]:
         match block:
             case Section():
-                return [replace(block, blocks=[each for part in block.blocks for each in tried(part)])]
+                return [replace(block, blocks=[shown for part in block.blocks for shown in tried(part)])]
             case Motion():
                 made: object = attempt("The animation", lambda: html.motion(block), then)
                 return [made if isinstance(made, Paragraph) else block]
@@ -136,7 +136,7 @@ def with_pictures(document: Document, draw: Callable[[Figure], str], then: str =
                 return [replace(block, text=f"{block.text} {then}")]
         return [block]
 
-    return replace(document, blocks=[each for part in document.blocks for each in tried(part)]), pictures
+    return replace(document, blocks=[shown for part in document.blocks for shown in tried(part)]), pictures
 
 
 def draw_into(folder: Path, png: bool) -> Callable[[Figure], str]:

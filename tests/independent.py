@@ -166,7 +166,7 @@ def field_torque(case: Case, t: Any, R: Any) -> Any:
         n = np.asarray(normal, dtype=R.dtype)
         half = R.dtype.type(rate) * t / 2
         R = matrix_of(np.array((np.cos(half), *(np.sin(half) * n / np.sqrt(n @ n))))).T @ R
-    first, *vectors = (np.asarray(each, dtype=R.dtype) for each in numbers)
+    first, *vectors = (np.asarray(number, dtype=R.dtype) for number in numbers)
     if kind == "gravity":
         return cross(vectors[0], -first * R[2])
     if kind == "gradient":

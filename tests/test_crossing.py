@@ -178,13 +178,13 @@ def integrate_error(cell: Cell) -> None:
 
 def pickled(cell: Cell) -> None:
     scene = cell.row.scene()
-    named = [each.name for each in scene.invariants]  # cached with the scene
+    named = [invariant.name for invariant in scene.invariants]  # cached with the scene
     again = pickle.loads(pickle.dumps(scene))
-    assert [each.name for each in again.invariants] == named
+    assert [invariant.name for invariant in again.invariants] == named
     assert again.key == scene.key
     found = pickle.loads(pickle.dumps(cv.integrate(again, 0.005, t_eval=cell.row.t)))
     cell.check(cell.row.t, found.R_WB)
-    assert all(np.isfinite(found.drift(each)).all() for each in found.scene.invariants)
+    assert all(np.isfinite(found.drift(invariant)).all() for invariant in found.scene.invariants)
 
 
 def keys(cell: Cell) -> None:
@@ -372,7 +372,7 @@ def check_rows(rows: Any) -> None:
     """Some attitude error is small, and so the truth is not another motion."""
     errors = [row["value"] for row in rows if "attitude" in row["measure"]]
     assert errors
-    assert min(each for each in errors if each is not None) < 1e-4
+    assert min(error for error in errors if error is not None) < 1e-4
 
 
 COMMANDS = {
@@ -511,7 +511,7 @@ def test_a_jump_of_all_components_is_a_break() -> None:
 def test_every_command_that_takes_a_scene_has_a_column() -> None:
     def supports(command: Any) -> bool:
         inner = getattr(command, "commands", {}).values()
-        return any(each.name in OF_SCENES for each in command.params) or any(map(supports, inner))
+        return any(param.name in OF_SCENES for param in command.params) or any(map(supports, inner))
 
     assert {name for name, command in main.commands.items() if supports(command)} == set(COMMANDS)
 

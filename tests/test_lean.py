@@ -34,7 +34,7 @@ def others():
     """Return the importable names of the packages that the package does not require."""
     lean = {*LEAN, "llvmlite", "pygments", "markdown-it-py", "mdurl", "conservative-rotation"}
     return ",".join(
-        name for name, packages in packages_distributions().items() if not lean & {each.lower() for each in packages}
+        name for name, packages in packages_distributions().items() if not lean & {package.lower() for package in packages}
     )
 
 

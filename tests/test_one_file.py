@@ -118,7 +118,7 @@ def test_a_method_needs_no_card(installed):
     assert method in hard_cases.settings(selection.methods())
     assert method in motion.select_methods(selection.methods())
     assert style.colours({"borrowed": "borrowed"})["borrowed"] not in style.PALETTE.values()
-    assert "borrowed" not in {each.family for each in search.candidates(cv.scenes.asymmetric_top())}
+    assert "borrowed" not in {candidate.family for candidate in search.candidates(cv.scenes.asymmetric_top())}
 
 
 NEEDY = SOURCE.replace(

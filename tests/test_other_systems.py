@@ -86,11 +86,11 @@ def test_modules_of_one_system_have_one_place():
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 names: list[str] = []
                 if isinstance(node, ast.Import):
-                    names = [each.name for each in node.names]
+                    names = [name.name for name in node.names]
                 elif isinstance(node, ast.ImportFrom) and not node.level:
                     names = [node.module or ""]
                 elif isinstance(node, ast.Call):
-                    names = [each.value for each in node.args if isinstance(each, ast.Constant)]
+                    names = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
                 if OF_ONE_SYSTEM & set(names):
                     found.add(str(path.relative_to(ROOT)))
     assert found <= PLACES

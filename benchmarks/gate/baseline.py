@@ -169,7 +169,7 @@ def read(path: Path, also_with_times: bool = False) -> Baseline:
     rows = {}
     for id, row in content["rows"].items():
         row.pop("time_ratios", None)
-        rows[id] = BaselineRow(**{**row, "measures": {name: Allowed(**each) for name, each in row["measures"].items()}})
+        rows[id] = BaselineRow(**{**row, "measures": {name: Allowed(**limit) for name, limit in row["measures"].items()}})
     return Baseline(rows, content["history"])
 
 

@@ -18,6 +18,7 @@ FOLDER = Path(".benchmarks") / "gate"
 """Path of the results of a gated run, relative to the root of the project."""
 FILE = "results.json"
 HISTORY = "bencher.json"
+"""The rows once more, for the service Bencher, which draws them over time."""
 RUNAWAY = 1.0
 """Relative energy drift above which a run has failed, even if it ended without an error."""
 ENERGY_DRIFT = Value(Measure.DRIFT_MAX, RUNAWAY, "energy").key
@@ -85,14 +86,14 @@ def write(results: Results, path: Path) -> None:
 
 def to_bencher(results: Results) -> dict[str, dict[str, dict[str, float]]]:
     """Return the rows that passed in Bencher's metric format: accuracy with its spread, and the time as `latency`, ns."""
-    found: dict[str, dict[str, dict[str, float]]] = {}
+    rows: dict[str, dict[str, dict[str, float]]] = {}
     for row in results.rows.values():
         if row.outcome.ok:
-            metrics = found[row.id] = {"latency": {"value": 1e9 * row.seconds}} if row.seconds > 0 else {}
+            metrics = rows[row.id] = {"latency": {"value": 1e9 * row.seconds}} if row.seconds > 0 else {}
             for name, value in row.values.items():
                 spread = row.spreads.get(name, 0.0)
                 metrics[name] = {"value": value, "lower_value": value - spread, "upper_value": value + spread}
-    return found
+    return rows
 
 
 def read(path: Path) -> Results:

@@ -24,8 +24,8 @@ class Range:
     def of(cls, values: Iterable[float]) -> Range:
         """Return the range of values; the first is the measured value, and NaN are ignored."""
         first, *rest = values
-        known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
-        return Range(first, min(known), max(known))
+        measured = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
+        return Range(first, min(measured), max(measured))
 
     @property
     def size(self) -> Range:

@@ -77,7 +77,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
        not determine it. Coarser points have not begun to converge. If one of them is as small as the end of the descent, the
        descent was chance and there is no order.
     2. Points finer than the end of the descent have reached the floor, the largest error from there on. Points within
-       `ABOVE_FLOOR` of it are not used. If the slope of the last pair is less than half that of the rest, its finer point is
+       `ABOVE_FLOOR` of it are not used. If the last pair has less than half the slope of the rest, its finer point is
        not used either.
     3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
        the scatter decreases by more than `CALMER`, and at least four points remain.
@@ -119,14 +119,14 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
 def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
     """Return whether the error at the shortest step is more than `GROWTH` times the smallest one, and no round-off.
 
-    Parameters and exceptions are those of `observed_order`.
+    Parameters and exceptions as in `observed_order`.
     """
     h, e = check_points(steps, errors)
-    known = np.isfinite(e)
-    if np.count_nonzero(known) < MIN_POINTS:
+    finite = np.isfinite(e)
+    if np.count_nonzero(finite) < MIN_POINTS:
         return False
-    last = e[known][np.argmin(h[known])]
-    return bool(last > max(GROWTH * e[known].min(), NO_ROUND_OFF))
+    last = e[finite][np.argmin(h[finite])]
+    return bool(last > max(GROWTH * e[finite].min(), NO_ROUND_OFF))
 
 
 def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:

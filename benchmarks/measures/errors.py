@@ -85,7 +85,7 @@ def measure_drifts(trajectory: Trajectory, truth: Trajectory | None = None) -> l
     scene, n = trajectory.scene, len(trajectory)
     relatives = {invariant.name: trajectory.drift(invariant) for invariant in scene.invariants}
     if truth is not None:
-        for balance in (each for each in scene.invariants if each.supplied):
+        for balance in (invariant for invariant in scene.invariants if invariant.supplied):
             off = trajectory.values_of(balance) - truth.values_of(balance)[:n]
             relatives[balance.name + OF_TRUTH] = np.asarray(off / balance.scale)
     for name, relative in relatives.items():

@@ -100,7 +100,7 @@ class Samples(Subject):
     value: Array
 
 
-_SUBJECT = tuple(each.name for each in fields(Subject))
+_SUBJECT = tuple(field.name for field in fields(Subject))
 _OUTCOME = ("outcome", "reason", "step", "time", "residual")
 COLUMNS = (*_SUBJECT, "bodies", "way", "process", "quantity", "measure", "value", "unit", *_OUTCOME, "detail")
 """Columns of the table of measurements, in order."""

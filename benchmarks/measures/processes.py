@@ -57,17 +57,17 @@ class Processes(ExitStack):
         for number, other in enumerate(self._others if runs else (), start=1):
             work = partial(_time_there, [prepares[key] for key in runs], {**how, "seed": number})
             try:
-                found = run_within(limit, work, shared, other)
+                measured = run_within(limit, work, shared, other)
             except NotTransferable:
                 break
             except IntegrationFailed as failure:  # the process crashed or took too long
-                found = [Timing(math.nan, math.nan, 0, 0, failure.outcome)] * len(runs)
-            for key, timing in zip(runs, found, strict=True):
+                measured = [Timing(math.nan, math.nan, 0, 0, failure.outcome)] * len(runs)
+            for key, timing in zip(runs, measured, strict=True):
                 timings[key].append(timing)
         return timings
 
 
 def _time_there(prepares: Sequence[Callable[[], Callable[[], Any]]], how: dict[str, Any]) -> list[Timing]:
-    """Return the timing of each run, prepared here. All succeeded in another process; a failure here is that of the process."""
+    """Return the timing of each run, prepared here. All succeeded in another process: this process fails if one fails."""
     timings = time_interleaved({i: prepare() for i, prepare in enumerate(prepares)}, **how)
     return list(timings.values())

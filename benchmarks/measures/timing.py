@@ -111,10 +111,10 @@ def time_interleaved(
     finally:
         if collects:
             gc.enable()
-    known = {name: [math.nan] if name in failed else times for name, times in taken.items()}
+    measured = {name: [math.nan] if name in failed else times for name, times in taken.items()}
     return {
         name: Timing(min(times), statistics.median(times), len(taken[name]), calls[name], failed.get(name, OK))
-        for name, times in known.items()
+        for name, times in measured.items()
     }
 
 

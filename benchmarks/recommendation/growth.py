@@ -10,7 +10,7 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.invariants import sizes
 from conservative.methods.trials import ASYMPTOTIC
-from conservative.presentation import number
+from conservative.number_text import number
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope
@@ -188,5 +188,5 @@ class Amplification:
 def amplification_of(t: Array, factor: Array, disturbance: float, label: str) -> Amplification:
     """Return the amplification up to the time at which the two motions become unrelated."""
     lost = factor * disturbance > ASYMPTOTIC
-    known = max(2, int(np.argmax(lost))) if lost.any() else len(t)
-    return Amplification(t[:known], factor[:known], disturbance, label, known < len(t))
+    n = max(2, int(np.argmax(lost))) if lost.any() else len(t)
+    return Amplification(t[:n], factor[:n], disturbance, label, n < len(t))

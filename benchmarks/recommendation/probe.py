@@ -170,7 +170,7 @@ class Conditions(Question):
         for end in sorted({min(until, self.short), until}):
             n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
             grid = Grid(end / n, n, max(1, n // DENSE))
-            pair = [method.solve(each, grid) for each in (scene, disturbed)]
+            pair = [method.solve(start, grid) for start in (scene, disturbed)]
             shared = min(map(len, pair))
             times.append(pair[0].t[:shared])
             factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
@@ -227,8 +227,8 @@ class Conditions(Question):
         """
         adaptive = tolerance_setting(method) is not None
         samples = self.window(self.spacing if adaptive else dt, cost, long)
-        each = 1 if adaptive else round(samples.dt / dt)
-        grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
+        stride = 1 if adaptive else round(samples.dt / dt)
+        grid = samples if adaptive else Grid(dt, samples.n_steps * stride, stride)
         run = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
         if isinstance(run, Outcome):
             length = samples.dt * samples.n_steps

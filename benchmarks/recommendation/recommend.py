@@ -3,7 +3,7 @@
 1. A trial run gives the angular velocity of the body, which determines the sampling interval and the length of probes.
 2. The reference solution is confirmed by a second one. A closed form covers the whole duration, others cover the probes.
 3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `Conditions`).
-4. Our methods are those of the automatic choice: its first choice, and if that has no truncation error, the best general
+4. Our methods are methods of the automatic choice: its first choice, and if that has no truncation error, the best general
    integrator as well. Each method is probed from coarse to fine (`refine`), and then until the error asked for lies between
    two settings that are close (`_enclose`). A stated law extrapolates errors to the duration.
 5. The resulting settings are timed against each other in interleaved rounds.
@@ -74,7 +74,7 @@ def ask(
 ) -> Question:
     """Return the question of a recommendation (see `Question`), after checking the arguments.
 
-    The default duration is that of the scene. Engines are named as in `("mujoco",)`; by default all that are installed.
+    The default duration is the duration of the scene. Engines are named as in `("mujoco",)`; by default all that are installed.
 
     Raises
     ------
@@ -103,16 +103,16 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     Raises
     ------
     BadInput
-        A name is not that of an engine.
+        A name does not belong to an engine.
     MissingEngine
         A named engine is not installed.
     """
     wanted = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
     if names is not None:
-        known = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
+        engines = {names_of(method)["family"] for method in wanted}.union(registry.list_engines())
         for name in names:
-            if (base := registry.read_name(name, "engines").base) not in known:
-                raise BadInput("engines", repr(name), nearest(base, known))
+            if (base := registry.read_name(name, "engines").base) not in engines:
+                raise BadInput("engines", repr(name), nearest(base, engines))
         wanted = list(selection.methods(names))
     lines = {selection.series(method): method for method in reversed(wanted)}
     return tuple(reversed(lines.values()))
@@ -153,11 +153,11 @@ class Recommendation:
     @property
     def winners(self) -> dict[str, Advice | None]:
         """The cheapest advice that reaches the error: of all, of our general integrators, and of the engines."""
-        good = sorted((each for each in self.advice if each.reached and not math.isnan(each.cost)), key=lambda each: each.cost)
+        good = sorted((row for row in self.advice if row.reached and not math.isnan(row.cost)), key=lambda row: row.cost)
         return {
             "cheapest": next(iter(good), None),
-            "cheapest_general": next((each for each in good if each.role == Role.OURS and each.general), None),
-            "cheapest_engine": next((each for each in good if each.role == Role.ENGINE), None),
+            "cheapest_general": next((row for row in good if row.role == Role.OURS and row.general), None),
+            "cheapest_engine": next((row for row in good if row.role == Role.ENGINE), None),
         }
 
 
@@ -271,7 +271,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
 def _enclose(conditions: Conditions, probes: list[Probe], long: bool) -> list[Probe]:
     """Return probes with more settings, until the error asked for lies between two that are close, if one reaches it.
 
-    Steps are tried up to the longest that a window has samples for, and tolerances between those of the probes.
+    Steps are tried up to the longest that a window has samples for, and tolerances between the tolerances of the probes.
     """
     while len(probes) < MOST_PROBES:
         good = [probe for probe in probes if probe.expected <= conditions.target]
@@ -289,7 +289,7 @@ def _enclose(conditions: Conditions, probes: list[Probe], long: bool) -> list[Pr
 
 
 def _step_between(conditions: Conditions, best: Probe, coarser: float) -> tuple[Method, float] | None:
-    """Return the method and a round step, s, between that of the best probe and a coarser one that fails, or twice the best."""
+    """Return the method and a round step, s, between the best probe's step and a coarser one that fails, or twice the best."""
     longest = conditions.longest_step
     wanted = min(2 * best.dt, longest) if math.isinf(coarser) else math.sqrt(best.dt * coarser)
     dt = conditions.round_step(wanted)

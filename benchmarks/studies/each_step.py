@@ -1,4 +1,4 @@
-"""Runs that store every step of a scene: the time for an attitude error.
+"""Runs that store every step: the time to reach an attitude error.
 
 `work_precision` reads twelve samples, so a method of high order can take one step from sample to sample. Samples at short
 intervals cost more: a method with a step size takes one or more steps per interval, and a method with a tolerance interpolates

@@ -1,4 +1,4 @@
-"""The hard cases: every registered scene with every method, one or two settings of each.
+"""The hard cases: every registered scene with every method, in one or two settings.
 
 Rows are errors of attitude and rates and drifts of all invariants over `TURN` rad at the scene's step size. Cases that a method
 does not support have rows with that outcome.

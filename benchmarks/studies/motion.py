@@ -1,4 +1,4 @@
-"""Motions that a report shows: those of the methods in the charts, at the steps of their users, and the exact one.
+"""Motions that a report shows: the methods in the charts, each at its usual step, and the exact motion.
 
 A run of a method in the charts has ten durations of its scene (`long_runs.end_of`), or one if it fails after that; a run of any
 other setting has one. It yields the errors and drifts of the first duration. Methods in the charts also have lines: attitudes

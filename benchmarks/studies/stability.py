@@ -1,4 +1,4 @@
-"""The longest step size of each method on the hard cases, and the failure at the next longer one.
+"""The longest step size at which each method succeeds on the hard cases, and the failure at the next longer step.
 
 A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| the initial rate of the scene, until one fails:
 

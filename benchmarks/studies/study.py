@@ -12,8 +12,8 @@ from conservative.check import positive_integer, positive_number
 from conservative.errors import BadInput, PotentialFailed, TorqueFailed
 from conservative.grid import ROUNDING, Grid
 from conservative.method import Method, Role
+from conservative.number_text import number
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.presentation import number
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.truth import Disagreement, Truth, Unsolvable, reference
 from conservative.scene import Scene

@@ -30,8 +30,8 @@ from conservative.check import positive_integer
 from conservative.errors import BadInput, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
+from conservative.number_text import number
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.presentation import number
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Disagreement, Truth
 from conservative.scene import Scene

@@ -56,13 +56,13 @@ def _energies(potential: Any, t_end: float, probes: Array) -> Iterator[float]:
 
 
 def _describe_load(load: Any, t_end: float, probes: Array) -> Iterator[list[float]]:
-    """Yield 1 for world axes, a table, and values at some times; those of a function of the attitude also at the probes."""
+    """Yield 1 for world axes, a table, and values at some times; values of a function of the attitude also at the probes."""
     if hasattr(load, "at"):
         yield [float(getattr(load, "frame", "body") == "world")]
         varying = getattr(load, "of_time", load)  # of a damping
         value = getattr(varying, "value", None)
         if isinstance(value, tuple):
-            yield from (np.ravel(each).tolist() for each in value)
+            yield from (np.ravel(item).tolist() for item in value)
         attitudes = [(R,) for R in probes] if getattr(varying, "of_attitude", False) else [()]
         for t in np.linspace(0.0, t_end, TIMES).tolist():
             yield from (np.ravel(load.at(t, *at)).tolist() for at in attitudes)

@@ -62,13 +62,13 @@ class Point:
         integrator.
         """
         shown = []
-        for position, each in enumerate(fields(self.method)):
-            value = getattr(self.method, each.name)
+        for position, setting in enumerate(fields(self.method)):
+            value = getattr(self.method, setting.name)
             if isinstance(value, str):
-                if position == 0 or value != each.default:
+                if position == 0 or value != setting.default:
                     shown.append(value.lower())
-            elif value != each.default:
-                shown.append({"order": "o", "stages": "s"}.get(each.name, each.name) + str(value))
+            elif value != setting.default:
+                shown.append({"order": "o", "stages": "s"}.get(setting.name, setting.name) + str(value))
         return f"{self.scene.name}-{'_'.join([self.method.family, *shown])}-dt{self.scene.dt:g}"
 
     @property
@@ -101,8 +101,8 @@ def points() -> Iterator[Point]:
 def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str, float]]:
     """Return the values that should not change, of a run that reaches its end, and how much round-off alone changes each.
 
-    They are errors, drifts, work and, in the paper's scenes, the observed order. Round-off is that of the method's precision.
-    `few` is for slow methods: fewer nudges, and orders from runs that are shorter than that of the scene.
+    They are errors, drifts, work and, in the paper's scenes, the observed order. Round-off depends on the method's precision.
+    `few` is for slow methods: fewer nudges, and orders from runs that are shorter than the scene.
     """
     exact = point.truths(point.scene, point.grid).trajectory
     scene, measured = point.scene, []
@@ -111,9 +111,9 @@ def measure(point: Point, few: bool = False) -> tuple[dict[str, float], dict[str
     for units in (0, *(NUDGES[1:-1] if few else NUDGES)):
         trajectory = point.method.solve(replace(scene, w_WB_B0=scene.w_WB_B0 + units * last_digit), point.grid)
         counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
-        found = errors.measure_errors(trajectory, exact)
-        measured.append({each.key: each.value for each in found if each.measure in LARGEST} | counters)
-    nudged = {name: [each[name] for each in measured] for name in measured[0]}
+        rows = errors.measure_errors(trajectory, exact)
+        measured.append({row.key: row.value for row in rows if row.measure in LARGEST} | counters)
+    nudged = {name: [values[name] for values in measured] for name in measured[0]}
     least = ROUND_OFF * float(np.finfo(number).eps)
     spreads = {name: max(max(values) - min(values), 0.0 if name in counters else least) for name, values in nudged.items()}
     order = fit_order(point, few) if _is_of_paper(point.scene.name) else {}
@@ -137,7 +137,7 @@ def fit_order(point: Point, few: bool = False) -> dict[str, float]:
     grids = [grid for grid in grids if grid.n_steps <= point.grid.n_steps] if few else grids
     attempts = [attempt(Case("order", scene, method, grid)) for grid in grids]
     sizes = np.array(
-        [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in attempts]
+        [errors.measure_errors(run.trajectory, exact)[0].value if isinstance(run, Success) else np.nan for run in attempts]
     )
     order = observed_order([grid.dt for grid in grids], np.where(sizes > ROUNDED, sizes, np.nan))
     return {} if order.reason else {Measure.ORDER.text: order.slope}

@@ -27,7 +27,7 @@ ROUND_OFF = 1e-13  # of double precision, which no fit goes below
 LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
 TINY = 1e-11  # of noise, which is round-off
 SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
-LONGER = 30.0  # stretches of a trial motion over those of the exact one: a large number makes it as stiff
+LONGER = 30.0  # stretches of a trial motion over stretches of the exact one: a large number makes it as stiff
 PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
 HUGE = 1e60  # of the largest rate: a difference that is not finite
 SENSITIVE = 1e6  # factor by which a motion may multiply an error, beyond which solutions need more digits
@@ -68,8 +68,8 @@ def allow(rounded: Any = (0.0, 0.0), noise: Any = (0.0, 0.0), error: float | Non
     if error is not None:
         return Allowed(np.full(2, error), (by, by), weight, np.full(2, error))
     digits, scattered = np.maximum(FLOOR, UNITS_OF_DIGITS * rounded), SIGMAS * noise
-    words = ["noise" if a > b else "digits" for a, b in zip(scattered, digits, strict=True)]
-    return Allowed(np.maximum(digits, scattered), (words[0], words[1]), weight, rounded)
+    causes = ["noise" if a > b else "digits" for a, b in zip(scattered, digits, strict=True)]
+    return Allowed(np.maximum(digits, scattered), (causes[0], causes[1]), weight, rounded)
 
 
 def take_rows(data: States, rows: Any) -> States:
@@ -118,7 +118,7 @@ class Compared:
     numbers of the initial state, turn and rates, are fitted to all rows, because the first one has digits or noise. `growth` is
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
-    alone decides, it is that. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
+    alone decides, this one. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
     which the quaternion of the file changes its sign; None if the file has no quaternions.
     """
 
@@ -139,7 +139,7 @@ class Compared:
 
     @property
     def from_row(self) -> bool:
-        """Whether the initial state is that of the first row."""
+        """Whether the initial state is the state of the first row."""
         return self.start == float(self.t[0])
 
     def take(self, rows: Any) -> Compared:
@@ -223,12 +223,12 @@ class Compared:
             [2 * np.arcsin(np.minimum(np.linalg.norm(d[..., :9], axis=-1) / 2, 1)), np.linalg.norm(d[..., 9:], axis=-1)]
         )
 
-    def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+    def apart(self, first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
         """Return the largest differences (2,) of two motions in the quantities of the data: rad, and relative to the scale."""
-        return replace(self, data=take_part(other, self.data)).errors(*one).max(axis=1)
+        return replace(self, data=take_part(second, self.data)).errors(*first).max(axis=1)
 
     def passes(self, error: Array) -> bool:
-        """Return whether errors (2, n) are those of digits and noise: the largest, and the mean of squares."""
+        """Return whether digits and noise explain errors (2, n): the largest ones, and the means of squares."""
         n = error.shape[1]
         mean = np.sqrt((error**2).mean(axis=1))
         noisy = (self.noise * SIGMAS > 0.5 * self.allowed) & (self.rounded < self.allowed)
@@ -256,12 +256,12 @@ class Compared:
         """The number of stretches after which a trial motion ends."""
         return LONGER * (2 + self.turned / ANGLE + len(self.scene.breaks))
 
-    def deviations(self, motion: Solution, found: Array, small: float) -> Array:
+    def deviations(self, motion: Solution, numbers: Array, small: float) -> Array:
         """Return the standard deviations (6 + k,) of fitted numbers for the noise of the rows; 0 where they are not free."""
-        moved = [*self.free, *range(6, len(found))]
-        R, w = self.evaluate(motion, found + small * np.vstack([0 * found, np.eye(len(found))[moved]]))
+        moved = [*self.free, *range(6, len(numbers))]
+        R, w = self.evaluate(motion, numbers + small * np.vstack([0 * numbers, np.eye(len(numbers))[moved]]))
         d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
-        slopes, out = (d[1:] - d[0]) / small, np.zeros(len(found))
+        slopes, out = (d[1:] - d[0]) / small, np.zeros(len(numbers))
         out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
         return out
 
@@ -377,12 +377,12 @@ class Compared:
         return replace(self, scene=self.scene.rename(self.scene.name, R_WB0=R0, w_WB_B0=w0))
 
 
-def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
+def largest_difference(first: tuple[Array, Array], second: tuple[Array, Array]) -> float:
     """Return the largest angle of attitudes, rad, or difference of rates over the largest rate, of two motions; inf for nan."""
-    scale = float(np.linalg.norm(one[1], axis=1).max()) or 1.0
+    scale = float(np.linalg.norm(first[1], axis=1).max()) or 1.0
     with np.errstate(all="ignore"):
-        rates = np.linalg.norm(one[1] - other[1], axis=1).max() / scale
-        apart = max(float(np.max(angle_between(one[0], other[0]))), float(rates))
+        rates = np.linalg.norm(first[1] - second[1], axis=1).max() / scale
+        apart = max(float(np.max(angle_between(first[0], second[0]))), float(rates))
     return apart if math.isfinite(apart) else math.inf
 
 
@@ -426,8 +426,8 @@ def exact(case: Compared) -> Solution:
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
         t = case.t[:n]
         if closed(case.scene) and ((t[-1] - case.start) * case.scale > 3 * LONGEST or case.growth > SENSITIVE):
-            each = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
-            return np.stack([a for a, _ in each]), np.stack([b for _, b in each])
+            motions = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
+            return np.stack([a for a, _ in motions]), np.stack([b for _, b in motions])
         return case.equations().solve(case.start, R, w, t)
 
     return motion
@@ -447,14 +447,14 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
         if i == 0:
             x = to_quaternion(values)
             x = x * np.cumprod(np.append(1.0, np.sign(np.sum(x[1:] * x[:-1], axis=1)) + 0.0))[:, None]
-        found = []
+        estimates = []
         for order in range(3, 10):
             near = np.stack([t[k : len(t) - order + k] for k in range(order + 1)])
             gaps = near[:, None] - near[None] + np.eye(order + 1)[:, :, None] * np.ptp(near, axis=0)
             weights = 1 / np.prod(gaps / np.ptp(near, axis=0), axis=1)
             weights = weights / np.sqrt((weights**2).sum(axis=0))
             d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
-            found.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
-        noise[i] = min(found)
-        resolved[i] = found[-1] > 0.5 * found[-3] or noise[i] < TINY
+            estimates.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
+        noise[i] = min(estimates)
+        resolved[i] = estimates[-1] > 0.5 * estimates[-3] or noise[i] < TINY
     return noise, resolved

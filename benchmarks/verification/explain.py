@@ -78,42 +78,47 @@ def diagnose(
             continue
         tell(name)
         case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # and what earlier parts have left
-        for each in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
-            if each is not None:
-                tried.append(each)
+        for explanation in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
+            if explanation is not None:
+                tried.append(explanation)
             if case.effort.over:
                 over = True
                 break
-        if search.ends and any(each.explains for each in tried):
+        if search.ends and any(explanation.explains for explanation in tried):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
-    tried = [each for each in tried if each.explains or bool((np.array(each.left) <= bounds).all())]  # none that is worse
-    tried.sort(key=lambda each: (not each.explains, each.share, each.keys))
+
+    def no_worse(explanation: Explanation) -> bool:
+        return explanation.explains or bool((np.array(explanation.left) <= bounds).all())
+
+    # A mistake that makes attitudes or rates worse than they are is not a candidate.
+    tried = [explanation for explanation in tried if no_worse(explanation)]
+    tried.sort(key=lambda explanation: (not explanation.explains, explanation.share, explanation.keys))
+    explaining = [explanation for explanation in tried if explanation.explains]
     # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
-    doubtful = all(each.rest > PROVEN and each.keys != (JITTERED.key,) for each in tried if each.explains)
-    if case.step is None and doubtful:
-        tried = [replace(each, explains=False) for each in tried]  # an error that noise hides says little about its cause
-    explaining = [each for each in tried if each.explains]
+    doubtful = all(explanation.rest > PROVEN and explanation.keys != (JITTERED.key,) for explanation in explaining)
+    if case.step is None and doubtful:  # an error that noise hides says little about its cause
+        tried, explaining = [replace(explanation, explains=False) for explanation in tried], []
     if not explaining:
         notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
-        return Diagnosis([each for each in tried if each.share < 0.5][:3], tried, notes)
-    least = min(each.size for each in explaining)
-    good = [each for each in explaining if each.size <= 3 * max(least, 1.0)]
-    fewest = min((each.numbers, len(each.keys)) for each in good)
-    good = [each for each in good if (each.numbers, len(each.keys)) == fewest]
-    named = [each for each in good if _normalised(each)] or good
+        return Diagnosis([explanation for explanation in tried if explanation.share < 0.5][:3], tried, notes)
+    least = min(explanation.size for explanation in explaining)
+    good = [explanation for explanation in explaining if explanation.size <= 3 * max(least, 1.0)]
+    fewest = min((explanation.numbers, len(explanation.keys)) for explanation in good)
+    good = [explanation for explanation in good if (explanation.numbers, len(explanation.keys)) == fewest]
+    named = [explanation for explanation in good if _normalised(explanation)] or good
     return Diagnosis(named, tried, _separate(case, named))
 
 
-def _normalised(found: Explanation) -> bool:
+def _normalised(explanation: Explanation) -> bool:
     """Return whether quaternions are normalised. Rates alone do not show it."""
-    return all(integrator.step.normalised for integrator in INTEGRATORS if integrator.key in found.keys)
+    return all(integrator.step.normalised for integrator in INTEGRATORS if integrator.key in explanation.keys)
 
 
 def _before_divergence(case: Compared) -> Compared:
-    """Return the rows before rates exceed three times those of the exact motion; errors are relative to the largest there."""
+    """Return the rows before rates exceed three times the exact rates; errors are relative to the largest rate there."""
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
     size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
     if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
@@ -124,7 +129,7 @@ def _before_divergence(case: Compared) -> Compared:
 
 def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     """Return the sentence on what would separate several mistakes that explain a file."""
-    motions = [each.made for each in named if each.made is not None]
+    motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
         apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
         if case.data[i] is None and apart > 2 * case.allowed[i]:
@@ -140,25 +145,27 @@ class _Asked(NamedTuple):
     tried: tuple[Explanation, ...]
 
 
-Found = Iterator[Explanation | None]
+Explanations = Iterator[Explanation | None]
 
 
-def _known(mistakes: Any) -> list[Any]:
+def _without_numbers(mistakes: Any) -> list[Any]:
     """Return mistakes without numbers, in the order of their keys."""
-    return sorted((mistake for mistake in mistakes if not mistake.numbers), key=lambda each: each.key)
+    return sorted((mistake for mistake in mistakes if not mistake.numbers), key=lambda mistake: mistake.key)
 
 
 def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
     """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
-    usable = [each for each in _known(READINGS) if fits(each, case) and (quaternion or not each.quaternions)]
+    usable = [reading for reading in _without_numbers(READINGS) if fits(reading, case)]
+    if not quaternion:
+        usable = [reading for reading in usable if not reading.quaternions]
     if case.from_row and case.scene.free:  # whatever the axes of the world are
-        usable = [each for each in usable if not each.of_world]
-    of = {name: [(), *((each,) for each in usable if each.of == name)] for name in (ATTITUDES, RATES)}
+        usable = [reading for reading in usable if not reading.of_world]
+    of = {name: [(), *((reading,) for reading in usable if reading.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
-    return pairs[1:] + [(each,) for each in usable if each.of == AXES]
+    return pairs[1:] + [(reading,) for reading in usable if reading.of == AXES]
 
 
-def _readings(case: Compared, asked: _Asked) -> Found:
+def _readings(case: Compared, asked: _Asked) -> Explanations:
     """Yield other readings of attitudes and rates."""
     near = case.take(slice(0, 10))
     for mistakes in _apply_readings(case, asked.quaternion):
@@ -171,12 +178,12 @@ def _readings(case: Compared, asked: _Asked) -> Found:
             yield attempt(case, trial)
 
 
-def _changes(case: Compared, asked: _Asked) -> Found:
+def _changes(case: Compared, asked: _Asked) -> Explanations:
     """Yield motions of scenes and equations with a mistake."""
-    known = [(each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds]
+    singles = [(mistake,) for mistake in _without_numbers((*SCENES, *EQUATIONS)) if mistake.kind in asked.kinds]
     several = chain.from_iterable(combinations(SCENE_PARTS, n) for n in range(2, len(SCENE_PARTS) + 1))
-    known.sort(key=lambda each: each[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
-    trials = [compose(*mistakes) for mistakes in (*known, *(several if "scenes" in asked.kinds else ()))]
+    singles.sort(key=lambda mistakes: mistakes[0] not in SCENE_PARTS)  # the usual ones first, if the work ends
+    trials = [compose(*mistakes) for mistakes in (*singles, *(several if "scenes" in asked.kinds else ()))]
     if case.free:  # fits of the start take most of the work: the nearest motions first
         trials = _nearest_first(case, trials)
     for trial in trials:
@@ -189,68 +196,68 @@ def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
     Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
     """
     ranked, rest, least, case = [], list[Trial](), case.effort.left / 2, case.screen or case
-    for number, each in enumerate(trials):
-        motion = each.build(case)
+    for number, trial in enumerate(trials):
+        motion = trial.build(case)
         if motion is None:
             continue
         if case.effort.left < least:
-            rest.append(each)
+            rest.append(trial)
             continue
         R, w = case.evaluate(motion, np.zeros((1, 6)))
         if np.isfinite(w).all():
-            ranked.append((case.size(case.errors(R[0], w[0])), number, each))
-    return [each for *_, each in sorted(ranked)] + rest
+            ranked.append((case.size(case.errors(R[0], w[0])), number, trial))
+    return [trial for *_, trial in sorted(ranked)] + rest
 
 
-def _numbers(case: Compared, asked: _Asked) -> Found:
+def _numbers(case: Compared, asked: _Asked) -> Explanations:
     """Yield motions of scenes and equations with a mistake whose numbers are fitted."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
-    for each in sorted((*SCENES, *EQUATIONS), key=lambda each: each.key):
-        if each.numbers and each.kind in asked.kinds:
-            remark = remark_on_damping(case.scene) if each is BY_KEY["damping"] else ""
-            found = attempt(case, compose(each, remark=remark))
-            yield None if found is None else _within_digits(case, found)
+    for mistake in sorted((*SCENES, *EQUATIONS), key=lambda mistake: mistake.key):
+        if mistake.numbers and mistake.kind in asked.kinds:
+            remark = remark_on_damping(case.scene) if mistake is BY_KEY["damping"] else ""
+            explanation = attempt(case, compose(mistake, remark=remark))
+            yield None if explanation is None else _within_digits(case, explanation)
     if "equations" in asked.kinds:
         remark = remark_on_damping(case.scene)
         yield attempt(case, compose(BY_KEY["no gyroscopic term"], BY_KEY["damping"], remark=remark))
 
 
-def _within_digits(case: Compared, found: Explanation) -> Explanation:
+def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
     """Return an explanation, with a remark if the number differs from the scene's by less than the digits of the scene."""
-    if found.keys != ("rate of the orbit",):
-        return found
+    if explanation.keys != ("rate of the orbit",):
+        return explanation
     rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
     written = Decimal(f"{rate:.17g}" if len(repr(rate)) > 18 else repr(rate))
     digits = len(written.normalize().as_tuple().digits)
-    if abs(found.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
-        return found
-    return replace(found, sentence=found.sentence + ", which is within the digits of the scene file")
+    if abs(explanation.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
+        return explanation
+    return replace(explanation, sentence=explanation.sentence + ", which is within the digits of the scene file")
 
 
-def _units(case: Compared, asked: _Asked) -> Found:
+def _units(case: Compared, asked: _Asked) -> Explanations:
     """Yield times in other units than seconds."""
     for time in TIMES:
         if not time.unit or case.turned * time.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
             continue
         if case.step is None:
-            found = attempt(case, compose(time))
-            yield found if _moves(case, found) else None
+            explanation = attempt(case, compose(time))
+            yield explanation if _moves(case, explanation) else None
 
 
-def _moves(case: Compared, found: Explanation | None) -> bool:
+def _moves(case: Compared, explanation: Explanation | None) -> bool:
     """Return whether a motion differs from standing still: what only shrinks the motion explains nothing.
 
     The error of a program is proportional to what it moves, however little its tolerance tells.
     """
-    if found is None or found.made is None:
+    if explanation is None or explanation.made is None:
         return False
-    some = case.take(slice(0, len(found.made[0])))
+    some = case.take(slice(0, len(explanation.made[0])))
     still = _still(some)
-    moved, whole = some.apart(found.made, still), some.apart(some.exact, still)
+    moved, whole = some.apart(explanation.made, still), some.apart(some.exact, still)
     if case.step is None:
         return bool((moved > np.maximum(SHOWN * some.allowed, SHRUNK * whole)).any())
-    return bool(((moved > SHRUNK / 2 * whole) & (np.array(found.left) < HALF * moved)).any())
+    return bool(((moved > SHRUNK / 2 * whole) & (np.array(explanation.left) < HALF * moved)).any())
 
 
 def _still(case: Compared) -> tuple[Array, Array]:
@@ -259,30 +266,30 @@ def _still(case: Compared) -> tuple[Array, Array]:
     return np.broadcast_to(case.scene.R_WB0, (n, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (n, 3))
 
 
-def _times(case: Compared, asked: _Asked) -> Found:
+def _times(case: Compared, asked: _Asked) -> Explanations:
     """Yield the right states at other times: shifted, in proportion, with rows missing, jittered, or rates apart."""
     if case.step is not None:
         for time in TIMES:
             if time.of_step or (time.unit and case.turned * time.unit < 2 * LONGEST):
-                found = attempt(case, compose(time))
-                yield found if not time.unit or _moves(case, found) else None
+                explanation = attempt(case, compose(time))
+                yield explanation if not time.unit or _moves(case, explanation) else None
         return
     later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
-    for each in TIMES:
-        if not each.of_step and not each.unit:
-            yield attempt(case.take(later), compose(each))
+    for time in TIMES:
+        if not time.of_step and not time.unit:
+            yield attempt(case.take(later), compose(time))
     if "rows" in asked.kinds:
         gap = float(np.median(np.diff(case.t)))
         yield from _own_times(case, gap, float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap))
 
 
-def _own_times(case: Compared, gap: float, end: float) -> Found:
+def _own_times(case: Compared, gap: float, end: float) -> Explanations:
     """Yield the right states at times that are found row by row: with rows missing in between, or jittered."""
     starts = [case]
     if case.free:  # a first row with noise, or jitter that a fit of the start takes for noise
         starts.append(case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0]))
-    found = [one for start in starts if (one := _by_own_times(start, gap, end)) is not None]
-    yield min(found, key=lambda each: (not each.explains, each.size), default=None)
+    explanations = [explanation for start in starts if (explanation := _by_own_times(start, gap, end)) is not None]
+    yield min(explanations, key=lambda explanation: (not explanation.explains, explanation.size), default=None)
 
 
 def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
@@ -317,7 +324,7 @@ def _nowhere(case: Compared) -> None:
     """Return no motion: the mistake belongs to one recording."""
 
 
-def _attitudes(case: Compared, asked: _Asked) -> Found:
+def _attitudes(case: Compared, asked: _Asked) -> Explanations:
     """Yield attitudes by usual rules from the exact rates, if the rates of the file are exact."""
     R, w = case.data
     if R is None or w is None:
@@ -334,7 +341,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Found:
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
     for rule in RULES:
-        wanted, seen, found = [case.stride, 1], set[int](), list[Explanation]()
+        wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
         while wanted and len(seen) < 8:
             parts = wanted.pop()
             if parts in seen or not 1 <= parts <= PARTS or parts * len(case.t) > 4 * STEPS_AT_MOST:
@@ -350,15 +357,15 @@ def _attitudes(case: Compared, asked: _Asked) -> Found:
             if case.free:  # the first attitude has noise too
                 turned = align(turned, R, rule.world)
             step = float(np.median(np.diff(case.t))) / parts
-            found.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
-            if found[-1].explains:
+            explanations.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
+            if explanations[-1].explains:
                 break
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
-        yield min(found, key=lambda each: each.share)
+        yield min(explanations, key=lambda explanation: explanation.share)
 
 
-def _habits(case: Compared, asked: _Asked) -> Found:
+def _habits(case: Compared, asked: _Asked) -> Explanations:
     """Yield motions whose state is changed after each step, or that stand still."""
     for standstill in STANDSTILLS:
         yield _standstill(case, standstill)
@@ -372,19 +379,19 @@ def _habits(case: Compared, asked: _Asked) -> Found:
         if not numbers:
             continue
         known = dict(zip((number.name for number in habit.numbers), numbers, strict=True))
-        found = list[Explanation]()
+        explanations = list[Explanation]()
         for parts in (1, 2, 5, 10) if case.step is None else (1,):
             step = case.step or float(np.median(np.diff(case.t))) / parts
             first = case.take(slice(0, int(np.flatnonzero(case.error.max(axis=0) > case.allowed.min())[:1].sum()) + 30))
             for some in (first, case) if len(first.t) < len(case.t) and len(first.t) > 3 else (case,):
-                one = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
-                if one is None or one.share > 0.5 or some is case:
+                explanation = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
+                if explanation is None or explanation.share > 0.5 or some is case:
                     break
-            if one is not None:
-                found.append(replace(one, trial=by_habit(habit, step), numbers=len(numbers)))
-                if one.explains:
+            if explanation is not None:
+                explanations.append(replace(explanation, trial=by_habit(habit, step), numbers=len(numbers)))
+                if explanation.explains:
                     break
-        yield from found
+        yield from explanations
 
 
 def _at_numbers(trial: Trial, numbers: tuple[float, ...]) -> Trial:
@@ -444,12 +451,12 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _standstill(other, mistake))
     if R is None or mistake.from_start:  # rates alone do not show when between two rows
         known = {number.name: stop for number in mistake.numbers}
-        found = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
-        return None if found is None else replace(found, trial=trial)
+        explanation = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
+        return None if explanation is None else replace(explanation, trial=trial)
     return attempt(case, trial, [stop if k == 0 else float(case.t[k - 1] + case.t[k]) / 2])
 
 
-def _rows(case: Compared, asked: _Asked) -> Found:
+def _rows(case: Compared, asked: _Asked) -> Explanations:
     """Yield right motions of which some rows are written wrongly: every n-th, or where the quaternion changes its sign."""
     error = (case.error / case.allowed[:, None]).max(axis=0)
     off = _off_rows(error)
@@ -478,7 +485,7 @@ def _rows(case: Compared, asked: _Asked) -> Found:
 
 
 def _off_rows(error: Array) -> Any:
-    """Return which rows are off, if all others are much nearer: those of one residue, or up to a tenth of the rows."""
+    """Return which rows are off, if all others are much nearer: rows of one residue, or up to a tenth of all rows."""
     n = len(error)
     for period in range(2, 7):
         for first in range(period):
@@ -491,7 +498,7 @@ def _off_rows(error: Array) -> Any:
     return off if 0 < off.sum() <= 0.1 * n else None
 
 
-def _turned_axes(case: Compared, asked: _Asked) -> Found:
+def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
@@ -514,19 +521,19 @@ def _turned_axes(case: Compared, asked: _Asked) -> Found:
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
-    found = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
-    shortest = [_shortest_turn(each) for each in found if each is not None]
-    yield min(shortest, key=lambda each: (round(each.share, 3), np.linalg.norm([*each.values.values()])))
+    explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
+    shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
+    yield min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
 
 
-def _shortest_turn(found: Explanation) -> Explanation:
+def _shortest_turn(explanation: Explanation) -> Explanation:
     """Return an explanation by a turn of at most half a revolution."""
-    turn = Rotation.from_rotvec([*found.values.values()]).as_rotvec().tolist()
-    values, trial = dict(zip(found.values, turn, strict=True)), found.trial
-    return replace(found, values=values, sentence=found.sentence if trial is None else trial.sentence(values))
+    turn = Rotation.from_rotvec([*explanation.values.values()]).as_rotvec().tolist()
+    values, trial = dict(zip(explanation.values, turn, strict=True)), explanation.trial
+    return replace(explanation, values=values, sentence=explanation.sentence if trial is None else trial.sentence(values))
 
 
-def _bodies(case: Compared, asked: _Asked) -> Found:
+def _bodies(case: Compared, asked: _Asked) -> Explanations:
     """Yield other first rows and other bodies."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
@@ -537,8 +544,8 @@ def _bodies(case: Compared, asked: _Asked) -> Found:
             initial, _extra, fitted = rest.fit(exact(rest), np.empty(0), np.empty(0))
             names = [f"start_{kind}_{i}" for kind in ("turn", "rate") for i in (1, 2, 3)]
             values = {names[i]: float(initial[i]) for i in have}
-            found = explain(replace(rest, free=()), Trial((BY_KEY["first row"],), _nowhere), fitted, values)
-            yield replace(found, numbers=len(have), explains=found.explains and found.size < 100)
+            explanation = explain(replace(rest, free=()), Trial((BY_KEY["first row"],), _nowhere), fitted, values)
+            yield replace(explanation, numbers=len(have), explains=explanation.explains and explanation.size < 100)
     moments = fit_moments(case)
     sentence = BY_KEY["other moments"].sentence.format(text=moments.sentence)
     yield replace(moments, sentence=sentence)
@@ -563,20 +570,22 @@ def fit_moments(case: Compared) -> Explanation:
     unit = body.moments[0] if ratios else 1.0
     moments, own = np.diag(body.R_BP.T @ inertia(p) @ body.R_BP) / unit, " : ".join(f"{x:.4g}" for x in body.moments / unit)
     off = [0.0] * ratios + (2 * case.deviations(_with_inertia(case, inertia), np.append(initial, p), 1e-5)[6:]).tolist()
-    known = " : ".join(f"{x:.6g}" + f" ± {x * d:.1g}" * (d > 0) for x, d in zip(moments, off, strict=True))
-    text = f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {known} (of the body: {own})"
-    found = explain(case, Trial((BY_KEY["other moments"],), _nowhere), made, {"text": 0.0}, numbers=len(p))
-    return _possible(replace(found, sentence=text, values=_components(inertia(p))))
+    fitted = " : ".join(f"{x:.6g}" + f" ± {x * d:.1g}" * (d > 0) for x, d in zip(moments, off, strict=True))
+    text = (
+        f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {fitted} (of the body: {own})"
+    )
+    explanation = explain(case, Trial((BY_KEY["other moments"],), _nowhere), made, {"text": 0.0}, numbers=len(p))
+    return _possible(replace(explanation, sentence=text, values=_components(inertia(p))))
 
 
 def _components(inertia: Array) -> dict[str, float]:
     return dict(zip(_INERTIA, inertia[np.triu_indices(3)].tolist(), strict=True))
 
 
-def _possible(found: Explanation) -> Explanation:
+def _possible(explanation: Explanation) -> Explanation:
     """Return an explanation by another inertia, which explains nothing if no body has it."""
-    moments = np.linalg.eigvalsh(np.array([*found.values.values()])[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
-    return replace(found, explains=found.explains and bool(2 * moments.max() < (1 + 1e-6) * moments.sum()))
+    moments = np.linalg.eigvalsh(np.array([*explanation.values.values()])[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+    return replace(explanation, explains=explanation.explains and bool(2 * moments.max() < (1 + 1e-6) * moments.sum()))
 
 
 def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution:
@@ -603,45 +612,50 @@ def _other_body(case: Compared) -> Explanation:
     mistake = BY_KEY["another body"]
     numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
     trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
-    found = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))
-    assert found is not None
+    explanation = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))
+    assert explanation is not None
     (a, b, c), (d, e, f) = (
-        (made := inertia(np.array([*found.values.values()])))[[0, 1, 2], [0, 1, 2]],
+        (made := inertia(np.array([*explanation.values.values()])))[[0, 1, 2], [0, 1, 2]],
         made[[0, 0, 1], [1, 2, 2]],
     )
     text = f"the inertia ({a:.6g}, {b:.6g}, {c:.6g}; {d:.6g}, {e:.6g}, {f:.6g}) kg m^2" + " or a multiple of it" * free
-    return _possible(replace(found, sentence=mistake.sentence.format(text=text), values=_components(made), trial=None))
+    return _possible(replace(explanation, sentence=mistake.sentence.format(text=text), values=_components(made), trial=None))
 
 
-def _steps(case: Compared, asked: _Asked) -> Found:
+def _steps(case: Compared, asked: _Asked) -> Explanations:
     """Yield integrators, of the scene whose number was fitted best if it leaves little, or of the scene."""
-    sized = [each for each in asked.tried if each.keys[1:] == () and "factor" in each.values and each.rest < LITTLE]
-    for each in sorted(sized, key=lambda each: (each.size, each.keys))[:1]:
-        mistake = BY_KEY[each.keys[0]]
-        if not isinstance(mistake, SceneMistake) or each.explains:
+    sized = [
+        explanation
+        for explanation in asked.tried
+        if explanation.keys[1:] == () and "factor" in explanation.values and explanation.rest < LITTLE
+    ]
+    for fitted in sorted(sized, key=lambda explanation: (explanation.size, explanation.keys))[:1]:
+        mistake = BY_KEY[fitted.keys[0]]
+        if not isinstance(mistake, SceneMistake) or fitted.explains:
             continue
-        factor = _round_factor(case, each)
+        factor = _round_factor(case, fitted)
         other = mistake.change(case.scene, factor)
-        found = [*find_steps(replace(case, scene=other))] if other is not None else []
-        for one in found:
-            if one.trial is not None and one.made is not None:
-                both = Trial((mistake, *one.trial.mistakes), _in_scene(mistake, factor, one.trial))
-                yield explain(case.take(slice(0, len(one.made[0]))), both, one.made, {"factor": factor} | one.values)
-        if any(one.explains for one in found):
+        explanations = [*find_steps(replace(case, scene=other))] if other is not None else []
+        for explanation in explanations:
+            if explanation.trial is not None and explanation.made is not None:
+                both = Trial((mistake, *explanation.trial.mistakes), _in_scene(mistake, factor, explanation.trial))
+                rows = case.take(slice(0, len(explanation.made[0])))
+                yield explain(rows, both, explanation.made, {"factor": factor} | explanation.values)
+        if any(explanation.explains for explanation in explanations):
             return
-    if not any(each.explains for each in asked.tried):
+    if not any(explanation.explains for explanation in asked.tried):
         yield from find_steps(case)
 
 
-def _round_factor(case: Compared, found: Explanation) -> float:
+def _round_factor(case: Compared, explanation: Explanation) -> float:
     """Return the factor with the fewest digits that leaves at most twice as much as the one that was fitted."""
-    factor, trial = found.values["factor"], found.trial
+    factor, trial = explanation.values["factor"], explanation.trial
     motion = None if trial is None else trial.build(case)
     for digits in (1, 2, 3, 4) if motion is not None else ():
         rounded = float(f"{factor:.{digits}g}")
         if rounded != 1 and motion is not None:
             R, w = case.evaluate(motion, np.append(np.zeros(6), rounded)[None])
-            if case.size(case.errors(R[0], w[0])) <= 2 * found.size:
+            if case.size(case.errors(R[0], w[0])) <= 2 * explanation.size:
                 return rounded
     return factor
 
@@ -656,11 +670,11 @@ def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[C
     return build
 
 
-def _several(case: Compared, asked: _Asked) -> Found:
+def _several(case: Compared, asked: _Asked) -> Explanations:
     """Yield two to four mistakes of a program at once: of its scene or equations, attitudes, rates and times."""
-    if case.step is None or any(each.explains for each in asked.tried):
+    if case.step is None or any(explanation.explains for explanation in asked.tried):
         return
-    moved = [(), *((each,) for each in _known((*SCENES, *EQUATIONS)) if each.kind in asked.kinds)]
+    moved = [(), *((mistake,) for mistake in _without_numbers((*SCENES, *EQUATIONS)) if mistake.kind in asked.kinds)]
     times = [(), *((time,) for time in TIMES if not time.numbers and fits(time, case))] if "times" in asked.kinds else [()]
     readings = [(), *_apply_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
     ranked = []
@@ -676,12 +690,17 @@ def _several(case: Compared, asked: _Asked) -> Found:
         R, w = R[0], w[0]
         for third in readings:
             a, b = R, w
-            for each in third:
-                a, b = each.write(a, b)
+            for reading in third:
+                a, b = reading.write(a, b)
             if len(mistakes := (*first, *second, *third)) > 1:
                 ranked.append((len(mistakes), case.size(case.errors(a, b)), mistakes))
     allowed = float((case.allowed / case.noise).max())
-    for _, _, mistakes in sorted(ranked, key=lambda each: (max(each[1], allowed) * 10 ** each[0], each[1]))[:3]:
+
+    def rank(candidate: tuple[int, float, Any]) -> tuple[float, float]:
+        number, left, _ = candidate
+        return max(left, allowed) * 10**number, left  # one mistake more has to leave less than a tenth
+
+    for _, _, mistakes in sorted(ranked, key=rank)[:3]:
         yield attempt(case, compose(*mistakes))
 
 
@@ -693,7 +712,7 @@ class Search:
     at any angle; `least` is the number of rows that it needs.
     """
 
-    find: Callable[[Compared, _Asked], Found]
+    find: Callable[[Compared, _Asked], Explanations]
     kinds: frozenset[str]
     share: float
     ends: bool = False

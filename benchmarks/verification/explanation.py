@@ -62,7 +62,7 @@ class Explanation:
 
     `left` and `plain` are the largest errors with them and without, over the rows that they were tried on: of attitudes, rad,
     and of rates, relative to the largest. `share` is the share of the error that is left, `size` the root of the mean square in
-    units of the noise, and `explains` is True if what is left is allowed. `numbers` are those that were fitted, and `made` is
+    units of the noise, and `explains` is True if what is left is allowed. `numbers` counts the fitted ones, and `made` is
     the motion (n, 3, 3), (n, 3). `rest` is the share of the root of the mean square. `trial` applies the mistakes again.
     `of_program` is True if a program answered, and not a file.
     """
@@ -119,8 +119,8 @@ class Explanation:
         if self.trial is None or self.trial.anew is not None:
             return None
         fitted = {number.name for number in self.trial.numbers}
-        known = {name: value for name, value in self.values.items() if name not in fitted}
-        return attempt(case, self.trial, [self.values[number.name] for number in self.trial.numbers], known=known)
+        others = {name: value for name, value in self.values.items() if name not in fitted}
+        return attempt(case, self.trial, [self.values[number.name] for number in self.trial.numbers], known=others)
 
 
 def explain(
@@ -180,10 +180,10 @@ def attempt(
     sentence, which `build` has. None if the mistakes cannot be applied.
     """
     if case.screen is not None:
-        found = _attempt(case.screen, trial, start, small, most, known)
-        if found is None or (not found.explains and found.rest > HALF):
-            return found
-        start = [found.values[number.name] for number in trial.numbers]
+        explanation = _attempt(case.screen, trial, start, small, most, known)
+        if explanation is None or (not explanation.explains and explanation.rest > HALF):
+            return explanation
+        start = [explanation.values[number.name] for number in trial.numbers]
     return _attempt(case, trial, start, small, most, known)
 
 

@@ -105,9 +105,9 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
             explained, linear = False, ranking(case)
             if not np.isfinite(linear.wanted).all():  # a row with a rate that no motion of the scene has
                 continue
-            for each in _run_best(case, linear):
-                yield each
-                explained |= each.explains
+            for explanation in _run_best(case, linear):
+                yield explanation
+                explained |= explanation.explains
             if explained:
                 return
 
@@ -115,7 +115,9 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
 def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
     """Yield motions by the methods that leave the smallest shares."""
     step_of_rows = float(np.diff(case.t).mean())
-    ranked = sorted(((*linear.best(each.step), each.key, each) for each in INTEGRATORS), key=lambda each: each[:3])
+    ranked = sorted(
+        ((*linear.best(method.step), method.key, method) for method in INTEGRATORS), key=lambda candidate: candidate[:3]
+    )
     proven = False
     for left, parts, _, integrator in ranked[:5]:
         if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
@@ -128,13 +130,13 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
                 step = step_of_rows / count
-                found = attempt(some, by_step(integrator, count), known={"step": step})
-                if found is None or found.share > 0.5 or len(some.t) == len(case.t):
+                explanation = attempt(some, by_step(integrator, count), known={"step": step})
+                if explanation is None or explanation.share > 0.5 or len(some.t) == len(case.t):
                     break
-            if found is None:
+            if explanation is None:
                 continue
-            yield found
-            if found.explains:
+            yield explanation
+            if explanation.explains:
                 proven = True
                 break
 
@@ -167,8 +169,8 @@ class Linearised:
         case.effort.spend(STEP_EFFORT * parts * weigh(case.scene))
         if method.recurrent:
             R, w = march(case.take(slice(0, n)), method, parts)(self.R[:1], self.w[:1], np.zeros((1, 0)), n)
-            self.made[id(method), parts] = found = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
-            return found
+            self.made[id(method), parts] = errors = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
+            return errors
         t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
         y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
         past: list[Array] = []
@@ -188,9 +190,9 @@ class Linearised:
             a, b = self.equations.states(y[:, None], case.t[1:n])
         defect = differ(self.R[1:n], self.w[1:n], a[0], b[0], case.scale)
         carried = np.cumsum((self.inverse[1:n] @ defect[..., None])[..., 0], axis=0)
-        found = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
-        self.made[id(method), parts] = found
-        return found
+        errors = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
+        self.made[id(method), parts] = errors
+        return errors
 
     def beside_start(self, differences: Array) -> Array:
         """Return weighted differences without the part that a fitted start explains."""
@@ -205,11 +207,11 @@ class Linearised:
 
     def best(self, method: Step) -> tuple[float, int]:
         """Return the smallest share that a method leaves, and its number of steps between two rows."""
-        found, parts = dict[int, float](), self.case.stride
+        shares, parts = dict[int, float](), self.case.stride
         sizes = [np.linalg.norm(self.beside_start(self.errors(method, n))) for n in (parts, 2 * parts)]
         order = float(np.clip(np.log2(sizes[0] / (sizes[1] or 1.0) or 1.0), 1, method.order))  # a torque can lower it
-        while parts not in found and len(found) < 8 and not (found and self.case.effort.over):
-            found[parts], factor = self.share(method, parts)
+        while parts not in shares and len(shares) < 8 and not (shares and self.case.effort.over):
+            shares[parts], factor = self.share(method, parts)
             if factor <= 0:
                 break
             most = max(1, min(PARTS, 4 * STEPS_AT_MOST // self.used))
@@ -217,7 +219,7 @@ class Linearised:
             if wanted > 2 * most:
                 break  # its errors are too large with the shortest step
             parts = int(np.clip(np.rint(wanted), 1, most))
-        return min((left, n) for n, left in found.items())
+        return min((left, n) for n, left in shares.items())
 
     def others(self, method: Step, parts: int) -> list[int]:
         """Return the numbers of steps next to the best one that leave almost as little."""

@@ -111,9 +111,9 @@ CHECKS: Mapping[str, str] = MappingProxyType(
 
 def join_verdicts(verdicts: Iterable[Verdict]) -> Verdict:
     """Return the verdict on a whole: wrong if a part is wrong, undecided if a part is, right if a part is right."""
-    found = set(verdicts)
+    present = set(verdicts)
     for verdict in (Verdict.WRONG, Verdict.UNDECIDED, Verdict.RIGHT):
-        if verdict in found:
+        if verdict in present:
             return verdict
     return Verdict.NOT_TESTED
 

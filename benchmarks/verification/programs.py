@@ -22,7 +22,7 @@ from conservative.attitude import Array, to_quaternion
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.presentation import number
+from conservative.number_text import number
 from conservative.programs import Program
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.engine_method import EngineMethod
@@ -48,7 +48,7 @@ ROWS = 40
 NEAR = 3.0
 """Errors up to so many tolerances are right if they fall with the step as the declared order says."""
 FEW = 3
-"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is that of the method."""
+"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is an error of the method."""
 HANGS = 2
 """Motions of a program that does not answer, after which the others are not run."""
 SLOPE = 0.5
@@ -129,8 +129,8 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) 
     grid = Grid(motion.step / parts, every * motion.samples, every // thin)
     scene, ended = motion.scene, ""
     try:
-        found = solve(scene, grid)
-        t, R, w, failure = found.t, found.R_WB, found.w_WB_B, found.failure
+        trajectory = solve(scene, grid)
+        t, R, w, failure = trajectory.t, trajectory.R_WB, trajectory.w_WB_B, trajectory.failure
     except Unsupported:
         raise
     except IntegrationFailed as ended_early:
@@ -158,7 +158,7 @@ class Answers:
     @property
     def failing(self) -> list[Ran]:
         """The motions with an error above the tolerance."""
-        return [each for each in self.ran if not each.ratio <= 1]
+        return [run for run in self.ran if not run.ratio <= 1]
 
 
 def run_motions(
@@ -178,7 +178,7 @@ def run_motions(
         tell(every.name)
         motion = in_principal_axes(every) if principal else every
         allowed = np.array(tolerance(motion, order, single))
-        if sum(each.hangs for each in ran) == HANGS:
+        if sum(run.hangs for run in ran) == HANGS:
             reasons[motion.name] = f"it did not answer in {HANGS} motions before"
             continue
         if reason := unsupported(motion.scene):
@@ -206,11 +206,9 @@ def measure_order(answers: Answers) -> float:
     Of each motion the shortest two steps count whose errors are above round-off.
     """
     slopes, floor = [], RESOLVED["f32" if answers.single else "f64"]
-    free = [
-        each for each in answers.ran if not each.motion.features and np.diff(np.sort(each.motion.scene.body.moments)).min() > 0
-    ]
-    for each in free[:GENERIC]:
-        errors = [float(run_motion(answers.solve, each.motion, each.allowed, n).error[0]) for n in LADDER]
+    free = [run for run in answers.ran if not run.motion.features and np.diff(np.sort(run.motion.scene.body.moments)).min() > 0]
+    for run in free[:GENERIC]:
+        errors = [float(run_motion(answers.solve, run.motion, run.allowed, n).error[0]) for n in LADDER]
         good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < 0.3]
         if len(good) > 1:
             (a, first), (b, last) = good[-2:]
@@ -234,30 +232,30 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
     most, less the `right` motions that it would make wrong. Motions that it does not explain are searched next, up to `ROUNDS`
     of them.
     """
-    rest = {each.motion.name: each for each in sorted(failing, key=_rank) if not each.ended}
+    rest = {run.motion.name: run for run in sorted(failing, key=_rank) if not run.ended}
     named: dict[tuple[tuple[str, ...], ...], Named] = {}
     searched = list(rest.values())
     for _ in range(ROUNDS):
-        searched = [each for each in searched if each.motion.name in rest]
+        searched = [run for run in searched if run.motion.name in rest]
         if not searched or (named and len(rest) < LEAST * len(failing)):
             break
-        each = searched.pop(0)
-        found = [one for one in diagnose(each.case, kinds=PROGRAM_KINDS).tried if one.explains]
-        found = sorted(found, key=lambda one: (one.numbers, len(one.keys), one.share))[:CANDIDATES]  # the simplest first
-        applied = [_apply(one, list(rest.values()), right) for one in found]
-        if not applied or max(one.score for one in applied) <= 0:
+        run = searched.pop(0)
+        tried = diagnose(run.case, kinds=PROGRAM_KINDS).tried
+        simplest = sorted((e for e in tried if e.explains), key=lambda e: (e.numbers, len(e.keys), e.share))[:CANDIDATES]
+        applied = [_apply(explanation, list(rest.values()), right) for explanation in simplest]
+        if not applied or max(candidate.score for candidate in applied) <= 0:
             continue
-        best = max(applied, key=lambda one: one.rank)
-        good = [one for one in applied if (one.motions, one.rank) == (best.motions, best.rank)]
-        least = min(one.share for one in good)
-        equal = [one for one in good if one.share <= ALIKE * max(least, ROUNDED)]
-        names, before = best.motions, named.get(keys := tuple(one.explanation.keys for one in equal))
+        best = max(applied, key=lambda candidate: candidate.rank)
+        good = [candidate for candidate in applied if (candidate.motions, candidate.rank) == (best.motions, best.rank)]
+        least = min(candidate.share for candidate in good)
+        equal = [candidate for candidate in good if candidate.share <= ALIKE * max(least, ROUNDED)]
+        names, before = best.motions, named.get(keys := tuple(candidate.explanation.keys for candidate in equal))
         # Numbers of the first search stand: it had the motions that show them best.
-        explanations = before.explanations if before else tuple(one.explanation for one in equal)
+        explanations = before.explanations if before else tuple(candidate.explanation for candidate in equal)
         named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
         for name in names:
             del rest[name]
-    return sorted(named.values(), key=lambda each: -len(each.motions))
+    return sorted(named.values(), key=lambda group: -len(group.motions))
 
 
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
@@ -283,22 +281,22 @@ class Applied:
         return self.score, -self.explanation.numbers, -len(self.explanation.keys)
 
 
-def _apply(one: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> Applied:
+def _apply(explanation: Explanation, failing: Sequence[Ran], right: Sequence[Ran]) -> Applied:
     """Return a mistake that was found in one motion, applied to all."""
-    names, shares, best, refits = list[str](), list[float](), one, 0
-    for each in sorted(failing, key=lambda each: each.ratio):
-        again = best.again(each.case)
+    names, shares, best, refits = list[str](), list[float](), explanation, 0
+    for run in sorted(failing, key=lambda run: run.ratio):
+        again = best.again(run.case)
         if again is not None and not again.explains and best.numbers and again.share < HALF and refits < REFITS:
-            refined, refits = best.refit(each.case), refits + 1
-            applied = None if refined is None else refined.again(each.case)
+            refined, refits = best.refit(run.case), refits + 1
+            applied = None if refined is None else refined.again(run.case)
             if refined is not None and applied is not None and applied.explains:
                 best, again = refined, applied
         if again is not None and again.explains:
-            names.append(each.motion.name)
+            names.append(run.motion.name)
             shares.append(again.share)
     refuted = sum(
-        (again := best.again(each.case)) is not None and bool((np.array(again.left) > OWN_ERROR * each.allowed).any())
-        for each in right
+        (again := best.again(run.case)) is not None and bool((np.array(again.left) > OWN_ERROR * run.allowed).any())
+        for run in right
     )
     return Applied(best, tuple(names), len(names) - refuted, float(np.mean(shares)) if shares else math.inf)
 
@@ -313,35 +311,35 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     """Return a finding for each motion, the mistakes, and the measured order, nan if it was not measured."""
     few = len(answers.failing) < FEW
     near = {
-        each.motion.name: slope
-        for each in answers.failing
-        if (few or each.ratio <= NEAR) and not each.ended and (slope := _falls(answers, each))
+        run.motion.name: slope
+        for run in answers.failing
+        if (few or run.ratio <= NEAR) and not run.ended and (slope := _falls(answers, run))
     }
-    failing = [each for each in answers.failing if each.motion.name not in near]
-    named = explain_motions(failing, [each for each in answers.ran if each not in failing])
-    named = [each for each in named if len(each.motions) >= min(FEW, len(failing))]  # what one motion shows is chance
-    explained = {name: each for each in named for name in each.motions}
+    failing = [run for run in answers.failing if run.motion.name not in near]
+    named = explain_motions(failing, [run for run in answers.ran if run not in failing])
+    named = [group for group in named if len(group.motions) >= min(FEW, len(failing))]  # what one motion shows is chance
+    explained = {name: group for group in named for name in group.motions}
     # What converges as it declares, and is no known mistake, has a large error constant.
-    rest = [each for each in failing if each.motion.name not in explained and not each.ended]
-    near |= {each.motion.name: slope for each in rest if (slope := _falls(answers, each))}
-    failing = [each for each in failing if each.motion.name not in near]
+    rest = [run for run in failing if run.motion.name not in explained and not run.ended]
+    near |= {run.motion.name: slope for run in rest if (slope := _falls(answers, run))}
+    failing = [run for run in failing if run.motion.name not in near]
     order, lower = math.nan, dict[str, str]()
     if failing and len(explained) < len(failing) / 2:
         order = measure_order(answers)
         lower = _of_lower_order(answers, failing, order)
     findings = []
-    for each in answers.ran:
-        name = each.motion.name
-        k = int(np.argmax(each.error / each.allowed))
-        value = float(each.error[k]), float(each.allowed[k]), ("rad", "of the largest rate")[k], "order"
-        if each not in failing:
-            detail = f"{_above(each.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
+    for run in answers.ran:
+        name = run.motion.name
+        k = int(np.argmax(run.error / run.allowed))
+        value = float(run.error[k]), float(run.allowed[k]), ("rad", "of the largest rate")[k], "order"
+        if run not in failing:
+            detail = f"{_above(run.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
             findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=detail))
         elif name in lower:
             findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=lower[name]))
         else:
             causes = tuple(explanation.cause for explanation in explained[name].explanations) if name in explained else ()
-            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *value, causes=causes, detail=each.ended))
+            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *value, causes=causes, detail=run.ended))
     findings += [
         Finding(subject, "motions", name, Verdict.NOT_TESTED, detail=reason) for name, reason in answers.unsupported.items()
     ]
@@ -354,14 +352,16 @@ def _above(ratio: float) -> str:
 
 def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> dict[str, str]:
     """Return the failing motions that are right for a lower order than the declared one, each with that sentence."""
-    lower = max((each for each in ORDERS if each < (answers.order or 2) and abs(order - each) < SLOPE), default=None)
+    lower = max(
+        (candidate for candidate in ORDERS if candidate < (answers.order or 2) and abs(order - candidate) < SLOPE), default=None
+    )
     if lower is None:
         return {}
-    found = {}
-    for each in failing:
-        if (each.error <= tolerance(each.motion, lower, answers.single)).all():
-            found[each.motion.name] = f"within the tolerance of order {lower}"
-    return found
+    reasons = {}
+    for run in failing:
+        if (run.error <= tolerance(run.motion, lower, answers.single)).all():
+            reasons[run.motion.name] = f"within the tolerance of order {lower}"
+    return reasons
 
 
 def order_finding(subject: str, answers: Answers, order: float) -> Finding:
@@ -376,25 +376,25 @@ def order_finding(subject: str, answers: Answers, order: float) -> Finding:
         detail = f"this program has order {order:.2f}, {declared} was declared"
         return Finding(subject, "order", "", Verdict.WRONG, order, float(declared), "", "declared", detail=detail)
     if order > declared + SLOPE:
-        detail += f"; {declared} was declared, so that tolerances are those of order {declared}"
+        detail += f"; {declared} was declared, and its tolerances apply"
     return Finding(subject, "order", "", Verdict.RIGHT, order, float(declared), "", "declared", detail=detail)
 
 
 def repeatability(subject: str, method: Method, answers: Answers) -> Iterator[Finding]:
     """Yield whether a second run of a model has the same bits, for the first free motion and the first other one."""
     done = set[bool]()
-    for each in answers.ran:
-        if (free := not each.motion.features) in done or each.ended:
+    for ran in answers.ran:
+        if (free := not ran.motion.features) in done or ran.ended:
             continue
         done.add(free)
-        run = method.prepare(each.motion.scene, Grid(each.step, 100, 10))
+        run = method.prepare(ran.motion.scene, Grid(ran.step, 100, 10))
         first = run()
         R, w = first.R_WB.copy(), first.w_WB_B.copy()
         again = run()
         same = np.array_equal(R, again.R_WB) and np.array_equal(w, again.w_WB_B)
         detail = "" if same else "a second run has other samples: each run starts from the initial state"
         verdict = Verdict.RIGHT if same else Verdict.WRONG
-        yield Finding(subject, "repeatability", each.motion.name, verdict, by="bits", detail=detail)
+        yield Finding(subject, "repeatability", ran.motion.name, verdict, by="bits", detail=detail)
 
 
 def verify_method(
@@ -438,22 +438,24 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
     for check in dict.fromkeys(finding.check for finding in findings):
         some = [finding for finding in findings if finding.check == check and finding.verdict is not Verdict.NOT_TESTED]
         if check == "order":
-            parts += [each.detail for each in some]
+            parts += [finding.detail for finding in some]
         elif some and check in ("motions", "pairs", "repeatability"):
-            right = sum(each.verdict is Verdict.RIGHT for each in some)
-            words = {"repeatability": "repeated runs"}.get(check, check)
-            parts.append(f"{right} of {len(some)} {words}{'' if right == len(some) else ' are right'}")
+            right = sum(finding.verdict is Verdict.RIGHT for finding in some)
+            nouns = {"repeatability": "repeated runs"}.get(check, check)
+            parts.append(f"{right} of {len(some)} {nouns}{'' if right == len(some) else ' are right'}")
             if ended := [
-                each.detail for each in some if each.check == "motions" and each.verdict is Verdict.WRONG and each.detail
+                finding.detail
+                for finding in some
+                if finding.check == "motions" and finding.verdict is Verdict.WRONG and finding.detail
             ]:
                 parts.append(f"in {len(ended)} {ended[0]}")
         else:
-            parts += [each.detail for each in some if each.verdict is Verdict.WRONG]
+            parts += [finding.detail for finding in some if finding.verdict is Verdict.WRONG]
     failing = sum(finding.check == "motions" and finding.verdict is Verdict.WRONG for finding in findings)
     reasons = [
-        f"{' or '.join(uncapitalised(one.cause.sentence) for one in each.explanations)} "
-        f"(explains {len(each.motions)} of {failing} failing motions)"
-        for each in named
+        f"{' or '.join(uncapitalised(explanation.cause.sentence) for explanation in group.explanations)} "
+        f"(explains {len(group.motions)} of {failing} failing motions)"
+        for group in named
     ]
     return "; ".join([*reasons, ", ".join(parts)])
 
@@ -486,12 +488,12 @@ def verify_program(
             if "times" in checks:
                 findings += protocol.times(subject, method)
             rest = [check for check in checks if check not in ("protocol", "times")]
-            found = verify_method(method, "program", rest, pairs, tell, subject)
+            verification = verify_method(method, "program", rest, pairs, tell, subject)
     except (UnusableProgram, IntegrationFailed) as failure:
         findings.append(protocol.unusable(subject, failure))
         return Verification(subject, "program", findings, findings[-1].detail)
-    every = [*findings, *found.findings]
-    return replace(found, findings=every, reason="; ".join(filter(None, [found.reason, *(_wrong(findings))])))
+    every = [*findings, *verification.findings]
+    return replace(verification, findings=every, reason="; ".join(filter(None, [verification.reason, *(_wrong(findings))])))
 
 
 def _wrong(findings: Sequence[Finding]) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from conservative.attitude import rotation_about
 from conservative.body import RigidBody
 from conservative.grid import Grid
-from conservative.presentation import number
+from conservative.number_text import number
 from conservative.references.engine import principal_axes
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import worker_of

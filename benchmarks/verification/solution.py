@@ -60,7 +60,7 @@ class Equations:
         """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
         body = self.scene.body
         J, inverse = body.inertia, body.inverse
-        motor = None if body.motor is None else np.array([body.motor.at(each, None, window) for each in t.tolist()]).T
+        motor = None if body.motor is None else np.array([body.motor.at(time, None, window) for time in t.tolist()]).T
         turning = None if motor is None else self.reaction * (inverse @ motor)
         rotor = np.zeros(3) if body.rotor_momentum is None or motor is not None else body.rotor_momentum
         spinning, side = J if self.spinning is None else self.spinning, -1.0 if self.left else 1.0
@@ -110,9 +110,9 @@ class Equations:
         M: Array | None = None
         D: Array | None = None
         if torque is not None and not torque.of_attitude:
-            M = np.array([torque.at(each, None, window) for each in t.tolist()])
+            M = np.array([torque.at(time, None, window) for time in t.tolist()])
         if damping is not None and not (of_time and of_time.of_attitude):
-            D = np.array([damping.at(each, None, window) for each in t.tolist()])
+            D = np.array([damping.at(time, None, window) for time in t.tolist()])
         field = None if scene.potential is None else _field(scene.potential, t)
         turned = scene.potential is not None or (torque is not None and (torque.frame != "body" or torque.of_attitude))
         turned = turned or bool(of_time and of_time.of_attitude)
@@ -143,7 +143,7 @@ class Equations:
         body = self.scene.body
         if body.motor is None:
             return 0 * t
-        return self.reaction * (body.inverse @ np.array([body.motor.at(each) for each in t.tolist()]).T)
+        return self.reaction * (body.inverse @ np.array([body.motor.at(time) for time in t.tolist()]).T)
 
     def solve(self, start: float, R: Array, w: Array, t: Array) -> tuple[Array, Array]:
         """Return attitudes (B, n, 3, 3), rates (B, n, 3) at times (n,), s, of states (B, 3, 3), (B, 3) at `start`."""
@@ -158,7 +158,7 @@ class Equations:
         """
         y, smooth = self.pack(start, R, w), self.scene.smoothness(end)
         made = Flow(self, [start], [], y)
-        breaks = [each for each in smooth.breaks.tolist() if start < each < end]
+        breaks = [time for time in smooth.breaks.tolist() if start < time < end]
         size = max(float(np.abs(y[4:]).max()), 1e-3 / max(end - start, 1e-300))
         a, before = start, -math.inf
         with np.errstate(all="ignore"):
@@ -223,8 +223,8 @@ class Flow:
     def shifted(self, t: Array) -> tuple[Array, Array]:
         """Return the motion of each state, or of the only one, at its own times (B, n), s."""
         own = np.arange(len(t)) % self.first.shape[1]
-        each = [Flow(self.equations, self.ends, [x[:, [b]] for x in self.series], self.first[:, [b]]) for b in own.tolist()]
-        made = [one.at(np.clip(times, self.ends[0], None)) for one, times in zip(each, t, strict=True)]
+        flows = [Flow(self.equations, self.ends, [x[:, [b]] for x in self.series], self.first[:, [b]]) for b in own.tolist()]
+        made = [flow.at(np.clip(times, self.ends[0], None)) for flow, times in zip(flows, t, strict=True)]
         return np.concatenate([R for R, _ in made]), np.concatenate([w for _, w in made])
 
 
@@ -297,7 +297,7 @@ def closed(scene: Scene) -> bool:
 
 
 def truth(scene: Scene, start: float, t: Array) -> tuple[Array, Array]:
-    """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is that at `start`."""
+    """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is the state at `start`."""
     if not closed(scene):
         R, w = Equations(scene).solve(start, scene.R_WB0[None], scene.w_WB_B0[None], t)
         return R[0], w[0]

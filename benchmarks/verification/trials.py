@@ -65,9 +65,9 @@ def equations_of(
             if other is None and not numbers:
                 return None
             scene = other or scene  # without a change by numbers of no size
-    for each in mistakes:
-        if isinstance(each, EquationsMistake):
-            made = each.build(scene, *(values[number.name] for number in each.numbers))
+    for mistake in mistakes:
+        if isinstance(mistake, EquationsMistake):
+            made = mistake.build(scene, *(values[number.name] for number in mistake.numbers))
             if made is None:
                 return None
             changes |= {name: getattr(made, name) for name, value in _DEFAULTS.items() if getattr(made, name) is not value}
@@ -96,12 +96,12 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
     plain = exact(case) if not moved and time is None else None
     flows: list[Any] = []  # of a start that is not fitted: other times of the same motion
 
-    def read(each: Reading, p: Array, R: Array, w: Array, back: bool) -> tuple[Array, Array]:
-        if not each.numbers:
-            made = (each.read if back else each.write)(R, w)
+    def read(reading: Reading, p: Array, R: Array, w: Array, back: bool) -> tuple[Array, Array]:
+        if not reading.numbers:
+            made = (reading.read if back else reading.write)(R, w)
         else:  # one reading for each motion
-            at = [numbers.index(number) for number in each.numbers]
-            many = [(each.read if back else each.write)(R[i], w[i], *row[at]) for i, row in enumerate(p)]
+            at = [numbers.index(number) for number in reading.numbers]
+            many = [(reading.read if back else reading.write)(R[i], w[i], *row[at]) for i, row in enumerate(p)]
             made = tuple(np.stack(list(x)) for x in zip(*many, strict=True))  # type: ignore[assignment]
         return made  # type: ignore[return-value]
 
@@ -124,8 +124,8 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
         for reading in reversed(readings) if case.from_row else ():
             R, w = read(reading, p, R, w, True)
         R, w = solve(R, w, p, n)
-        for each in readings:
-            R, w = read(each, p, R, w, False)
+        for reading in readings:
+            R, w = read(reading, p, R, w, False)
         return R, w
 
     return motion
@@ -141,15 +141,15 @@ def _at_times(
     if case.free or not flows:
         flows[:] = [equations.flow(case.start, R, w, end)]
     of_attitudes, of_rates = (
-        np.broadcast_to(np.atleast_2d(each), (len(p), n)).copy()
-        for each in time.at(t, case.step, *(column[:, None] for column in p.T))
+        np.broadcast_to(np.atleast_2d(times), (len(p), n)).copy()
+        for times in time.at(t, case.step, *(column[:, None] for column in p.T))
     )
     out = []
-    for each in (of_attitudes, of_rates):
-        each[:] = np.clip(each, 0.0 * t, np.maximum(t * FASTEST, end - case.start))
+    for times in (of_attitudes, of_rates):
+        times[:] = np.clip(times, 0.0 * t, np.maximum(t * FASTEST, end - case.start))
         if time.after and case.from_row:
-            each[:, 0] = t[0]
-        out.append(flows[0].shifted(np.clip(each + case.start, case.start, end)))
+            times[:, 0] = t[0]
+        out.append(flows[0].shifted(np.clip(times + case.start, case.start, end)))
     return out[0][0], out[1][1]
 
 

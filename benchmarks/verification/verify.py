@@ -71,17 +71,17 @@ def kind_of(text: str) -> Kind:
             if os.access(path, os.X_OK) and not path.suffix.lower().startswith((".csv", ".json"))
             else Kind.RECORDING
         )
-    words = _words(text)
-    if len(words) > 1 and which(words[0]):
+    parts = _words(text)
+    if len(parts) > 1 and which(parts[0]):
         return Kind.PROGRAM
-    name = registry.read_name(text, "subject") if len(words) == 1 and not set("/\\") & set(text) else None
+    name = registry.read_name(text, "subject") if len(parts) == 1 and not set("/\\") & set(text) else None
     if name is not None and name.base in list_programs():
         return Kind.PROGRAM
     if name is not None and name.base in registry.list_engines():
         return Kind.ENGINE
     if name is not None and name.base in registry.list_methods():
         return Kind.METHOD
-    if len(words) == 1 and which(text):
+    if len(parts) == 1 and which(text):
         return Kind.PROGRAM
     allowed = "a file that exists, the name of an engine, a method or a program, or the command line of a program"
     raise BadInput("subject", repr(text), allowed)
@@ -159,24 +159,24 @@ def verify(
     MissingEngine
         An engine is not installed.
     """
-    given = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
-    if not given:
+    listed = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
+    if not listed:
         raise BadInput("subjects", "an empty list", "a path, a name, a method, or a list of them")
-    methods: list[Any] = [each for each in given if not isinstance(each, str | os.PathLike)]
-    for each in methods:
+    methods: list[Any] = [subject for subject in listed if not isinstance(subject, str | os.PathLike)]
+    for subject in methods:
         from conservative.method import Method  # here: recordings need no kernels
 
-        if not isinstance(each, Method):
-            raise BadInput("subjects", repr(each), "a path, a name, a method, or a list of them")
-    engines, only, pairs = ([each] if isinstance(each, str) else each for each in (engines, only, pairs))
+        if not isinstance(subject, Method):
+            raise BadInput("subjects", repr(subject), "a path, a name, a method, or a list of them")
+    engines, only, pairs = ([names] if isinstance(names, str) else names for names in (engines, only, pairs))
     choice("start", start, ("row", "scene"))
     if rates is not None:
         choice("rates", rates, ("body", "world"))
         reading["world"] = rates == "world"
-    found = expand([os.fspath(each) for each in given if isinstance(each, str | os.PathLike)])
+    expanded = expand([os.fspath(subject) for subject in listed if isinstance(subject, str | os.PathLike)])
     for name in only:
         choice("only", name, tuple(CHECKS))
-    kinds = {each.kind for each in found} | ({Kind.METHOD} if methods else set())
+    kinds = {subject.kind for subject in expanded} | ({Kind.METHOD} if methods else set())
     begin = None if start == "row" else start
     _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, start=begin, error=error, **reading)
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
@@ -185,21 +185,21 @@ def verify(
     if pairs and only and "pairs" not in only:
         raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
     results: list[Verification] = []
-    if files := [each.path for each in found if each.kind is Kind.MODEL and each.path]:
+    if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
         from .bodies import verify_files
 
         results += verify_files(files, engines, tell, search)
-    recordings = [each for each in found if each.kind is Kind.RECORDING]
+    recordings = [subject for subject in expanded if subject.kind is Kind.RECORDING]
     if tables := [recording.path for recording in recordings if recording.path]:
         together = len(tables) == 2 and not any(recording.in_folder for recording in recordings)
         results += _verify_recordings(tables, together, body, start, error, tell, reading)
-    for each in found:
-        if each.kind is Kind.PROGRAM:
-            results += _verify_program(each.text, only, pairs, tell)
-        elif each.kind in (Kind.ENGINE, Kind.METHOD):
+    for subject in expanded:
+        if subject.kind is Kind.PROGRAM:
+            results += _verify_program(subject.text, only, pairs, tell)
+        elif subject.kind in (Kind.ENGINE, Kind.METHOD):
             from ..studies.selection import methods as select  # here: recordings need no kernels
 
-            results += [_verify_method(method, each.kind, only, pairs, tell) for method in select([each.text])]
+            results += [_verify_method(method, subject.kind, only, pairs, tell) for method in select([subject.text])]
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
 
 

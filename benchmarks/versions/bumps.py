@@ -36,7 +36,7 @@ def find_bump(package: str, ref: str, folder: Path) -> tuple[str, str] | None:
 def find_version(text: str, package: str) -> str:
     """Return the version that a lock or requirements file names for a package, "" for none.
 
-    A range such as `>=3.2` is none: it does not say which version is installed.
+    A range such as `>=3.2` does not count: it does not say which version is installed.
     """
     name = "[-_.]+".join(map(re.escape, re.split(r"[-_.]+", package.partition("[")[0])))
     forms = (
@@ -45,5 +45,5 @@ def find_version(text: str, package: str) -> str:
         rf'"(?:node_modules/)?{name}":\s*{{\s*"version":\s*"([^"]+)"',  # package-lock.json
         rf'"{name}":\s*"v?(\d[\w.+-]*)"',  # package.json
     )
-    found = (re.search(form, text, re.MULTILINE | re.IGNORECASE) for form in forms)
-    return next((match[1] for match in found if match), "")
+    matches = (re.search(form, text, re.MULTILINE | re.IGNORECASE) for form in forms)
+    return next((match[1] for match in matches if match), "")

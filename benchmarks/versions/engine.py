@@ -35,7 +35,7 @@ from .times import Ratio, ratio_of
 from .version import Version
 
 MORE_STEPS = (0, 1, 2)
-"""Steps of the runs in addition to those at the scene's dt: a change caused by one or two more steps is noise."""
+"""Numbers of further steps in the runs of a setting: a change of the error that one or two more steps also cause is noise."""
 SAMPLES = 1000
 """Approximate number of samples of a run."""
 REPEATS = 3
@@ -43,7 +43,7 @@ REPEATS = 3
 ROUNDS = 3
 """Rounds of a repeat; the fastest call counts."""
 TIME_FACTOR = 1.25
-"""Smallest ratio of times that differ: of the whole interval."""
+"""Two times differ if the whole interval of their ratio is beyond this factor."""
 ERRORS = (Measure.ATTITUDE_MAX, Measure.RATES_MAX)
 """Errors to which orders are fitted."""
 NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
@@ -62,7 +62,7 @@ class Observation:
     attitude_order, rates_order
         Orders of convergence, over the steps that all versions have.
     error
-        Largest attitude error, rad. Its range, and the range of a drift, is of runs with one or two more steps.
+        Largest attitude error, rad. Its range, and the range of a drift, come from runs with one or two more steps.
     drifts
         Largest relative change of each invariant, by name; signed unless the invariant is a vector.
     """
@@ -87,11 +87,11 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
     setting, dt = method.setting(), cases[0].grid.dt
     observation = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
-    first = study.attempt(cases[0])
+    first = study.attempt(cases[0])  # at the scene's dt: only its failure is a failure of the setting
     if isinstance(first, Outcome):
         return replace(observation, outcome=first)
     done = [first, *map(study.attempt, cases[1:])]
-    runs = [each.trajectory for each in done if isinstance(each, Success)]
+    runs = [attempt.trajectory for attempt in done if isinstance(attempt, Success)]
     return replace(
         observation,
         points=tuple(_points(study, scene, method)),
@@ -117,7 +117,7 @@ def _points(study: Study, scene: Scene, method: Method) -> Iterator[LinePoint]:
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
     for point in measure_line(study, cases, truth, ERRORS):
-        yield replace(point, done=point.outcome)
+        yield replace(point, done=point.outcome)  # a `Success` holds its run
 
 
 def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
@@ -147,7 +147,7 @@ EngineComparison = Comparison[Observation, Mapping[str, StepTimes]]
 
 
 def ratio(was: StepTimes, now: StepTimes) -> Ratio:
-    """Return the ratio of the times (n,), s, of two versions in the same repeats, with its interval; NaN if one has none."""
+    """Return the ratio of the times (n,), s, of two versions in the same repeats, with its interval; NaN without times."""
     return ratio_of(list(zip(was, now, strict=True)) if was and now else [])
 
 
@@ -160,17 +160,17 @@ class EngineSide:
     study: Study
 
     def measure(self, scene: str) -> Iterator[tuple[str, Observation]]:
-        """Yield an observation for each setting on a scene, by the setting as tables show it."""
-        (value,) = (each for each in self.study.scenes if each.name == scene)
+        """Yield each setting as tables show it, and its observation on a scene."""
+        (definition,) = (candidate for candidate in self.study.scenes if candidate.name == scene)
         for method in self.methods:
-            yield method.setting(), observe(self.study, value, method, self.version.name)
+            yield method.setting(), observe(self.study, definition, method, self.version.name)
 
 
 def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str]) -> tuple[EngineSide, ...]:
     """Return the sides of a comparison of two or more versions of an engine, in their order.
 
-    Settings are as in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show. Default
-    scenes are those of a report that a setting supports.
+    Settings are as in the name of a method, `RK4` or `integrator=RK4`. By default they are the settings that tables show, on
+    the scenes of a report that one of them supports.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_na
     if not settings:
         family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
         settings = tuple(settings_text(method) for method in family.settings_in_tables())
-    methods = [tuple(registry.method(f"{engine}@{each.name}:{setting}") for setting in settings) for each in versions]
+    methods = [tuple(registry.method(f"{engine}@{version.name}:{setting}") for setting in settings) for version in versions]
     every = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
     taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in every))

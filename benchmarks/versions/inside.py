@@ -1,7 +1,7 @@
-"""The code that runs in the environment of a version: the worker loads this file, and its imports are those of that version.
+"""The code that runs in the environment of a version. The worker loads this file there, and it imports that version.
 
 It uses only parts of `conservative` that old versions have as well: names of methods and scenes, `Grid`, `prepare`, `check`.
-The worker calls its functions, or prepares a run whose task is in `given`.
+The worker calls its functions, or prepares the run of a task.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ Array = np.ndarray[Any, Any]
 _scene = lru_cache(maxsize=64)(registry.scene)
 
 
-def prepare(given: SimpleNamespace) -> Callable[[], Any]:
+def prepare(task: SimpleNamespace) -> Callable[[], Any]:
     """Return the run of a task, "solve", "probe" or "time"."""
-    return {"solve": solve, "probe": probe, "time": keep_running}[given.task](given)
+    return {"solve": solve, "probe": probe, "time": keep_running}[task.task](task)
 
 
 def list_methods(names: list[str], project: str = "") -> Answer:
     """List the settings of the methods `names` in the suite.
 
-    The default is what the project registers with the role `Role.OURS`. If it registers nothing, all methods of that role are
-    listed.
+    By default they are the methods with the role `Role.OURS` that the project registers, or all of that role if it registers
+    none.
     """
     families: dict[str, Any] = dict(registry.list_families())
     registered = set()
@@ -53,7 +53,7 @@ def list_methods(names: list[str], project: str = "") -> Answer:
         family = families.get(name)
         if family and hasattr(family, "settings_for"):
             methods += family.settings_for("suite")
-        elif family:  # of a version without `card` and `method_info`
+        elif family:  # a version before `settings_for`
             methods += getattr(family, "suite_settings", family.variants)()
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             methods.append(registry.method(name))
@@ -71,17 +71,17 @@ def describe_pair(scene: str, method: str) -> Answer:
     built, chosen = _scene(scene), registry.method(method)
     reason = chosen.unsupported(built) or ""
     try:
-        if not reason:  # an engine may refuse a scene only when it gets it
+        if not reason:  # some engines refuse a scene only when they build it
             chosen.prepare(built, Grid(built.dt, 1, 1))
     except Unsupported as error:
-        reason = str(error.__context__ or error)
+        reason = str(error.__context__ or error)  # the engine's own message, which its adapter has wrapped
     return {"unsupported": reason, "longest_step": float(chosen.longest_step(built))}
 
 
-def solve(given: SimpleNamespace) -> Callable[[], Answer]:
+def solve(task: SimpleNamespace) -> Callable[[], Answer]:
     """Integrate a `scene` by a `method` from `w_WB_B0` over a grid (`dt`, `n_steps`, `every`), and check the result."""
-    scene, method = replace(_scene(given.scene), w_WB_B0=given.w_WB_B0), registry.method(given.method)
-    grid = Grid(given.dt, given.n_steps, given.every)
+    scene, method = replace(_scene(task.scene), w_WB_B0=task.w_WB_B0), registry.method(task.method)
+    grid = Grid(task.dt, task.n_steps, task.every)
     run = method.prepare(scene, grid)
 
     def solve_once() -> Answer:
@@ -95,14 +95,14 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
     return solve_once
 
 
-def probe(given: SimpleNamespace) -> Callable[[], Answer]:
+def probe(task: SimpleNamespace) -> Callable[[], Answer]:
     """Integrate a body of principal `moments` about a fixed point, with a `weight` at `com`, and do not check the result."""
-    field = UniformGravity(given.weight, given.com) if given.weight else None
-    scene = Scene("probe", RigidBody(given.moments), given.R_WB0, given.w_WB_B0, 1.0, potential=field)
+    field = UniformGravity(task.weight, task.com) if task.weight else None
+    scene = Scene("probe", RigidBody(task.moments), task.R_WB0, task.w_WB_B0, 1.0, potential=field)
     try:
-        run = registry.method(given.method).prepare(scene, Grid(given.dt, given.n_steps, given.every))
+        run = registry.method(task.method).prepare(scene, Grid(task.dt, task.n_steps, task.every))
     except Unsupported as error:
-        raise NotImplementedError(str(error)) from None
+        raise NotImplementedError(str(error)) from None  # the worker answers that the scene is unsupported
 
     def solve_once() -> Answer:
         trajectory = run()
@@ -111,6 +111,6 @@ def probe(given: SimpleNamespace) -> Callable[[], Answer]:
     return solve_once
 
 
-def keep_running(given: SimpleNamespace) -> Callable[[], Any]:
+def keep_running(task: SimpleNamespace) -> Callable[[], Any]:
     """Return the run of a `scene` by a `method` over `n_steps` steps `dt`, final state only, for the worker to time."""
-    return registry.method(given.method).prepare(_scene(given.scene), Grid(given.dt, given.n_steps, given.n_steps))
+    return registry.method(task.method).prepare(_scene(task.scene), Grid(task.dt, task.n_steps, task.n_steps))

@@ -29,15 +29,15 @@ class Price:
 
 
 def read_prices(texts: Sequence[str], file: Path) -> dict[str, Price]:
-    """Return the prices by method: those of a file, which need a reason, and those of texts `NAME=6x` or `NAME=6x: reason`.
+    """Return the prices by method: from a file, where each needs a reason, and from texts `NAME=6x` or `NAME=6x: reason`.
 
     Raises `BadInput` for a text or a line that is not one.
     """
     prices, allowed = dict[str, Price](), f'a table [{TABLE}] of texts, such as my_method = "6x: the reason"'
     lines = read(file, allowed).texts(TABLE, allowed) if file.is_file() else {}
     for text in [*(f"{name}={text}" for name, text in lines.items()), *texts]:
-        found = re.fullmatch(r"(.+?)=\s*(\d+(?:\.\d+)?)x(?::\s*(.*\S))?\s*", text)
-        if not found or float(found[2]) <= 1 or (len(prices) < len(lines) and not found[3]):
+        match = re.fullmatch(r"(.+?)=\s*(\d+(?:\.\d+)?)x(?::\s*(.*\S))?\s*", text)
+        if not match or float(match[2]) <= 1 or (len(prices) < len(lines) and not match[3]):
             raise BadInput(TABLE, repr(text), "NAME=6x, or NAME=6x: reason; in conservative.toml with the reason")
-        prices[found[1].strip()] = Price(float(found[2]), found[3] or "")
+        prices[match[1].strip()] = Price(float(match[2]), match[3] or "")
     return prices

@@ -92,7 +92,7 @@ class ProjectSide:
     """A version and its process, with its own folder of compiled kernels.
 
     `names` are the compared methods, by default those that the project registers with the role `Role.OURS`. `few` are the rows
-    that are measured with fewer points: those of the earlier version, because values of other points cannot be compared.
+    that are measured with fewer points: the points of the earlier version, because values of other points cannot be compared.
     `explain` finds the mistakes of a setting; without it no row has a cause.
     """
 
@@ -139,8 +139,8 @@ class ProjectSide:
             if here.key == there.key:
                 row = self._measure(scene, setting, row)
                 if row.outcome.kind is not OutcomeKind.UNSUPPORTED:
-                    found = self._find_causes(setting)[not registry.scene(scene).free]
-                    row = replace(row, mistake=found.key, cause=found.sentence)
+                    explained = self._find_causes(setting)[not registry.scene(scene).free]
+                    row = replace(row, mistake=explained.key, cause=explained.sentence)
                 yield name, row
             else:  # there is no reference solution for its motion; the gate reports that the definitions differ
                 yield name, replace(row, definition=there.definition(scene, name), outcome=ANOTHER_SCENE)
@@ -223,12 +223,12 @@ class Remote(StandIn):
         body = {"moments": scene.body.moments, "R_WB0": scene.R_WB0, "w_WB_B0": scene.w_WB_B0, "weight": weight, "com": com}
         steps = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every}
         try:
-            found = self.side.run("probe", partial(self.read, scene), method=self.name, **body, **steps)()
+            trajectory = self.side.run("probe", partial(self.read, scene), method=self.name, **body, **steps)()
         except NotImplementedError as error:
             raise Unsupported("scene", str(error), "a scene that the method supports") from None
-        if found.failure is not None:
-            raise found.failure
-        return found
+        if trajectory.failure is not None:
+            raise trajectory.failure
+        return trajectory
 
     def read(self, scene: Scene, answer: Answer) -> Trajectory:
         """Return the trajectory of a scene from the states of the version."""
@@ -295,8 +295,8 @@ def compare_projects(
 
 def find_unknown(methods: Sequence[str], settings: Collection[str]) -> list[str]:
     """Return the methods of which no version has a setting."""
-    families = {registry.read_name(setting).base for setting in settings}
-    return [name for name in methods if registry.read_name(name, "methods").base not in families]
+    families = {registry.read_name(setting).family for setting in settings}
+    return [name for name in methods if registry.read_name(name, "methods").family not in families]
 
 
 def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingProxyType({})) -> Decision:

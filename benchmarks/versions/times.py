@@ -185,8 +185,8 @@ class Clock:
 def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int, rounds: int) -> tuple[float, float]:
     """Return the shortest time, s, of a call in each version; the version that begins changes from round to round."""
     shortest = [math.inf, math.inf]
-    for each in runs:
-        for run in each:
+    for layouts in runs:
+        for run in layouts:
             run.wall_time(calls)
     for k in range(turn, turn + rounds):
         for layout in range(LAYOUTS):

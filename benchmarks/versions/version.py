@@ -97,7 +97,7 @@ def _find_commit(name: str, project: Path) -> str:
 
 
 def _take_out(commit_hash: str, project: Path, folder: Path) -> Path:
-    """Put the files of a commit into a folder, and return that of the project, which need not be at the top."""
+    """Put the files of a commit into a folder, and return the folder of the project, which need not be at the top."""
     archive = ["git", "-C", git(project, "rev-parse", "--show-toplevel"), "archive", "--format=tar", commit_hash]
     try:
         done = subprocess.run(archive, capture_output=True, check=True, timeout=600)

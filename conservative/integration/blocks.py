@@ -93,8 +93,8 @@ def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
             failures[i] = failure
     if len(alone):
         supplied = None if block.supplied is None else block.supplied[alone]
-        given = grid.t, block.R_WB[alone], block.w_WB_B[alone], supplied
-        measured[alone] = measure_drifts(bodies[alone], reference[alone], grid, *given)
+        run = grid.t, block.R_WB[alone], block.w_WB_B[alone], supplied
+        measured[alone] = measure_drifts(bodies[alone], reference[alone], grid, *run)
     drifts = arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B)
     return BlockResult(block.R_WB, block.w_WB_B, drifts, failures, block.supplied)
 
@@ -188,7 +188,7 @@ def run_blocks(
     `progress`, unless it is None.
     """
     (executor, in_flight), total, size = workers, len(bodies), list_blocks(len(bodies), grid).step
-    done = found = total - sum(min(size, total - first) for first in left)
+    done = restored = total - sum(min(size, total - first) for first in left)
     begin, waiting = perf_counter(), iter(left)
     pending: dict[Future[BlockResult], int] = {}
     try:
@@ -198,12 +198,12 @@ def run_blocks(
             if not pending:
                 return
             ended, _ = wait(pending, LONGEST_WAIT, FIRST_COMPLETED)
-            for future in [each for each in pending if each in ended]:  # in the order of submission
+            for future in [future for future in pending if future in ended]:  # in the order of submission
                 first, result = pending.pop(future), future.result()
                 write(first, bodies[first : first + size], result)
                 done += len(result)
                 if progress is not None:
-                    progress(ProgressOfMany(perf_counter() - begin, done, total, found))
+                    progress(ProgressOfMany(perf_counter() - begin, done, total, restored))
     finally:
         for future in pending:
             future.cancel()

@@ -116,7 +116,7 @@ class ClusterExecutor(Executor):
         self._client = client
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Return the future of a call. Function and arguments can be those of a script, because they are sent as bytes."""
+        """Return the future of a call. Function and arguments can belong to a script, because they are sent as bytes."""
         task = self._client.submit(_call, VERSION, dump((fn, args, kwargs)), pure=False)
         future: Future[T] = Future()
 

@@ -18,8 +18,9 @@ from ..check import choice as require_choice
 from ..drifts import arrange_drifts, drifts_of, list_drifts
 from ..errors import IntegrationFailed, RemovedAttribute, require_extra
 from ..grid import Grid
+from ..number_text import rounded_up
 from ..outcome import OK, Choice, Counters, Outcome
-from ..presentation import columns, html_table, rounded_up
+from ..presentation import columns, html_table
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
@@ -113,7 +114,7 @@ class Ensemble:
         import pandas as pd
 
         if rows == "samples":
-            samples = [sample_rows(each) for each in self]
+            samples = [sample_rows(body) for body in self]
             frame = pd.DataFrame(np.concatenate(samples), columns=columns(self[0]))
             frame.insert(0, "body", np.repeat(np.arange(len(samples)), [len(sample) for sample in samples]))
         else:

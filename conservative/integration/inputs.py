@@ -50,9 +50,9 @@ def read_bodies(
     if "R_WB0" in given:
         with np.errstate(all="ignore"):
             good = (orthonormality(R) <= ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
-        _refuse_first("R_WB0", R, ~good, lambda each: rotation("R_WB0", each))
+        _refuse_first("R_WB0", R, ~good, lambda value: rotation("R_WB0", value))
     if "w_WB_B0" in given:
-        _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
+        _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda value: finite_array("w_WB_B0", value, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
     if J is not None and scene.features:
         _refuse_first("inertia", J, ~_are_in_range(J), require_size)
@@ -117,14 +117,14 @@ def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> 
         return {}
     if not isinstance(parameters, Mapping):
         raise BadInput("parameters", describe(parameters), "a mapping of names of the potential's numbers to arrays (n, ...)")
-    known = list_parameters(static_part(scene.potential))
+    shapes = list_parameters(static_part(scene.potential))
     values = {}
     for name, value in parameters.items():
-        if name not in known:
-            allowed = nearest(str(name), known) if known else f"none: the scene {scene.name!r} has no potential with numbers"
+        if name not in shapes:
+            allowed = nearest(str(name), shapes) if shapes else f"none: the scene {scene.name!r} has no potential with numbers"
             raise BadInput("parameters", describe(name), allowed)
         key = f"parameters[{name!r}]"
-        values[name] = _read(key, value, (known[name],), given)
+        values[name] = _read(key, value, (shapes[name],), given)
         given.setdefault(key, values[name])
     return _convert_parameters(scene, values) if values else {}
 

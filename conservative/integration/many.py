@@ -87,7 +87,7 @@ def integrate_many(
         in memory. The returned ensemble reads them from there, as `open_ensemble(path)` does later.
     resume
         True if the folder may contain some blocks of the same run. Missing and damaged blocks are then computed. The result is
-        the same, byte for byte, as that of an uninterrupted run. Functions of the scene have to be such that they can be
+        the same, byte for byte, as without an interruption. Functions of the scene have to be such that they can be
         compared (`conservative.identity`).
     client
         A `dask.distributed.Client`, on whose workers the blocks run instead of threads of this process.

@@ -47,11 +47,11 @@ def warn_of_steps(scene: Scene, method: Method, grid: Grid, rod: Scene | None = 
     if method.order is None:
         return
     if scene.loads:
-        end, found = grid.n_steps * grid.dt, scene.smoothness(grid.last)
-        if grid.dt > found.step and end < scene.t_end:  # it may be smooth as long as the run is
-            found = examine(scene.loads, end)
-        if grid.dt > found.step:
-            warnings.warn(LoadNotResolved(grid.dt, 0.0 if found.noise else found.step, found.interval), stacklevel=3)
+        end, smooth = grid.n_steps * grid.dt, scene.smoothness(grid.last)
+        if grid.dt > smooth.step and end < scene.t_end:  # it may be smooth as long as the run is
+            smooth = examine(scene.loads, end)
+        if grid.dt > smooth.step:
+            warnings.warn(LoadNotResolved(grid.dt, 0.0 if smooth.noise else smooth.step, smooth.interval), stacklevel=3)
         for load in scene.loads:
             if unresolved := find_unresolved(load, grid.dt, grid.n_steps):
                 warnings.warn(LoadNotResolved(grid.dt, *unresolved), stacklevel=3)

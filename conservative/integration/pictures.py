@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import unit_vector
-from ..presentation import LEAST_DRAWN, short_power, time_unit
+from ..number_text import short_power
+from ..presentation import LEAST_DRAWN, time_unit
 from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
@@ -44,7 +45,7 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
         axis = np.array([0.0, 0.0, 1.0])
     along, m = np.flatnonzero(axis == 1), len(ensemble.t)
     unit, length = time_unit(float(ensemble.t[-1]))
-    named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis)})"
+    named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{component:.3g}' for component in axis)})"
     ends, shown = sorted({0, m - 1}), np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
     discs = [
         draw_pointing(directions_W, f"Body axis {named} at t = {ensemble.t[sample] / length:.6g} {unit}")
@@ -85,8 +86,8 @@ def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
     last = max(math.floor(math.log10(most)) + 1, first + 1)
     edges = np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
     counts = {name: np.histogram(np.clip(values, edges[0], edges[-1]), edges)[0] for name, values in finite.items()}
-    bodies = {name: np.maximum([*each, 0], 0.5) for name, each in counts.items()}  # half a body is below the axis
-    data = pd.concat([pd.DataFrame({"of": name, "drift": edges, "bodies": each}) for name, each in bodies.items()])
+    bodies = {name: np.maximum([*values, 0], 0.5) for name, values in counts.items()}  # half a body is below the axis
+    data = pd.concat([pd.DataFrame({"of": name, "drift": edges, "bodies": values}) for name, values in bodies.items()])
     axis = _power_axis(edges[0], edges[-1], "~e")
     x = alt.X("drift:Q", title="largest drift, relative", scale=alt.Scale(type="log", nice=False), axis=axis)
     y = alt.Y("bodies:Q", scale=alt.Scale(type="log", domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
@@ -119,7 +120,7 @@ def draw_pointing(directions_W: Array, title: str) -> Any:
         colour = alt.Color("bodies:Q", scale=alt.Scale(scheme="yellowgreenblue"), legend=None)
         cells = alt.Chart(data).mark_square(size=(_SIDE / _CELLS + 0.6) ** 2, opacity=1)
         bodies = cells.encode(color=colour, tooltip="bodies:Q")
-    shown = f"mean ({', '.join(f'{each:.3f}' for each in mean)}), world axes"
+    shown = f"mean ({', '.join(f'{component:.3f}' for component in mean)}), world axes"
     scale = alt.Scale(domain=[-extent, extent], nice=False)
     x, y = alt.X("x:Q", axis=None, scale=scale), alt.Y("y:Q", axis=None, scale=scale)
     drawn = alt.layer(*(layer.encode(x=x, y=y) for layer in (bodies, *_rings(extent))))

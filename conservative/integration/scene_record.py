@@ -1,7 +1,7 @@
 """A scene as JSON: numbers and texts, and a digest for everything else, such as the functions of a `FunctionPotential`.
 
 A digest shows whether two scenes are the same, but a scene cannot be restored from it. Digests of another interpreter or of an
-earlier version of this package cannot be compared, nor can those of values that cannot be followed (`conservative.identity`).
+earlier version of this package cannot be compared, nor can digests of values that cannot be followed (`conservative.identity`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _BY = f"2 {sys.implementation.cache_tag}"
 def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
     """Return `scene` if the record describes it; if it is None, restore the scene from the record.
 
-    Warn if the record has functions that cannot be compared with those of the scene (`SceneNotCompared`). Raise `BadInput` if
+    Warn if the record has functions that cannot be compared with the scene's (`SceneNotCompared`). Raise `BadInput` if
     the record describes another scene; or if `scene` is None, and the record contains digests or cannot be restored.
     """
     if scene is None:
@@ -50,36 +50,36 @@ def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
         scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` removes the invariants of a single body
     if "flight" not in record["fields"]:  # as earlier versions wrote it
         scene = scene.rotation_only
-    given = record_scene(scene)
+    current = record_scene(scene)
     stored = json.loads(json.dumps(record))
-    if unknown := list(_adopt(stored, given)):
+    if unknown := list(_adopt(stored, current)):
         warnings.warn(SceneNotCompared(scene.name, unknown[0]), stacklevel=4)
-    if different := list_differences(stored, given):
+    if different := list_differences(stored, current):
         got = f"{scene.name!r}, with another {', '.join(different)}"
         raise BadInput("scene", got, f"the scene of the run, {record['fields']['name']!r}")
     return scene
 
 
-def _adopt(stored: Any, given: Any) -> Iterator[str]:
+def _adopt(stored: Any, current: Any) -> Iterator[str]:
     """Replace stored digests that cannot be compared by the given ones, and yield the reasons."""
-    if not (isinstance(stored, dict) and isinstance(given, dict)):
-        if isinstance(stored, list) and isinstance(given, list):
-            for pair in zip(stored, given, strict=False):
+    if not (isinstance(stored, dict) and isinstance(current, dict)):
+        if isinstance(stored, list) and isinstance(current, list):
+            for pair in zip(stored, current, strict=False):
                 yield from _adopt(*pair)
-    elif "digest" in stored and "digest" in given:
-        unknown = stored.get("unknown") or given.get("unknown")
-        if unknown or stored.get("by") != given["by"]:
+    elif "digest" in stored and "digest" in current:
+        unknown = stored.get("unknown") or current.get("unknown")
+        if unknown or stored.get("by") != current["by"]:
             yield unknown or "functions that another version of Python or of this package wrote"
             stored.clear()
-            stored.update(given)
+            stored.update(current)
     else:
-        for name in stored.keys() & given.keys():
-            yield from _adopt(stored[name], given[name])
+        for name in stored.keys() & current.keys():
+            yield from _adopt(stored[name], current[name])
 
 
-def list_differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+def list_differences(record: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     """Return the fields in which two records differ; without one, their bodies have the same motion on the same grid."""
-    a, b = (json.loads(json.dumps(each["fields"])) for each in (one, other))
+    a, b = (json.loads(json.dumps(entry["fields"])) for entry in (record, other))
     return [name for name in a | b if name not in _NOT_OF_MOTION and a.get(name) != b.get(name)]
 
 
@@ -90,15 +90,15 @@ def record_scene(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return {"array": value.tolist()}
     if isinstance(value, tuple):
-        return {"tuple": [record_scene(each) for each in value]}
+        return {"tuple": [record_scene(item) for item in value]}
     kind = type(value)
     if is_dataclass(value) and kind.__module__.partition(".")[0] == _PACKAGE and "<" not in kind.__qualname__:
         # Fields without a value are left out, so that records of versions without these fields are the same.
-        given = ((field, getattr(value, field.name)) for field in fields(value))
-        named = {field.name: record_scene(each) for field, each in given if each is not None or field.default is not None}
+        values = ((field, getattr(value, field.name)) for field in fields(value))
+        named = {field.name: record_scene(item) for field, item in values if item is not None or field.default is not None}
         return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
-    found = identify(value)
-    return {"digest": found.text[:16], "by": _BY} | ({"unknown": found.unknown} if found.unknown else {})
+    identity = identify(value)
+    return {"digest": identity.text[:16], "by": _BY} | ({"unknown": identity.unknown} if identity.unknown else {})
 
 
 def _restore(record: Any) -> Any:
@@ -107,7 +107,7 @@ def _restore(record: Any) -> Any:
     if "array" in record:
         return read_only(np.array(record["array"], dtype=float))
     if "tuple" in record:
-        return tuple(_restore(each) for each in record["tuple"])
+        return tuple(_restore(item) for item in record["tuple"])
     if "digest" in record:
         raise BadInput("scene", "None", "the scene of the run, by scene=, because its functions are not stored")
     module, _, name = record["type"].partition(":")

@@ -59,9 +59,9 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTim
             samples,
             lambda method, grid: find_worst(bodies, chosen, method, grid)[0],  # noqa: B023  # called in this round only
         )
-        attempts += tuple((each.grid.dt, each.estimate.total) for each in tried)
-        method, grid, found = best_of(tried)
-        dt, estimate, rough = grid.dt, found.total, find_rough(tried)
+        attempts += tuple((attempt.grid.dt, attempt.estimate.total) for attempt in tried)
+        method, grid, best = best_of(tried)
+        dt, estimate, rough = grid.dt, best.total, find_rough(tried)
         worst, number = find_worst(bodies, verified, method, grid)
         if worst.total <= error or estimate > error:
             break

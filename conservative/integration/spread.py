@@ -111,7 +111,7 @@ def spread(
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
         drawn = starts["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
-        if hasattr(scene.potential, "inertia"):  # tensors, because that of the field is one
+        if hasattr(scene.potential, "inertia"):  # tensors, because the field has a tensor
             varied["inertia"] = drawn if drawn.ndim == 3 else drawn[:, :, None] * np.eye(3)
         elif hasattr(static_part(scene.potential), "inertia"):
             got = "a spread in a turning field with the inertia of the scene's body"
@@ -216,9 +216,9 @@ def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
 
 def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -> Array:
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
-    argument, known = f"potential.{name}", list_parameters(scene)
-    if name not in known:
-        allowed = nearest(name, known) if known else "none: the scene has no potential with numbers to spread"
+    argument, shapes = f"potential.{name}", list_parameters(scene)
+    if name not in shapes:
+        allowed = nearest(name, shapes) if shapes else "none: the scene has no potential with numbers to spread"
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
     deviation, relative = _read(argument, value, {"": 1.0, "%": 0.01}, _NUMBER)

@@ -121,13 +121,13 @@ class Store:
 
     def _find_checksum(self, first: int) -> int:
         """Return the digest of the checksums at the ends of the chunks of a block."""
-        found = hashlib.sha256()
+        digest = hashlib.sha256()
         for name, array in sorted(self.arrays.items()):
             for file in self._chunks_of(array, first):
                 with file.open("rb") as stream:
                     stream.seek(-_CHECKSUM_BYTES, 2)
-                    found.update(name.encode() + stream.read())
-        return int.from_bytes(found.digest()[:8], "little")
+                    digest.update(name.encode() + stream.read())
+        return int.from_bytes(digest.digest()[:8], "little")
 
     def is_whole(self, first: int) -> bool:
         """Return whether all chunks of the block are there and have the right checksums."""
@@ -148,9 +148,9 @@ class Store:
         kinds, failures = np.full(len(result), _KINDS.index(OutcomeKind.OK), np.uint8), np.full(len(result), "", object)
         for i, failure in result.failures.items():
             # The arguments of its class, or the outcome of a class of the user's.
-            name, known = type(failure).__name__, _FAILURES.get(type(failure).__name__) is type(failure)
-            values = {key: value for key, value in vars(failure if known else failure.outcome).items() if key != "outcome"}
-            text = json.dumps({"type": name if known else "", **values}, default=lambda number: number.item())
+            name, importable = type(failure).__name__, _FAILURES.get(type(failure).__name__) is type(failure)
+            values = {key: value for key, value in vars(failure if importable else failure.outcome).items() if key != "outcome"}
+            text = json.dumps({"type": name if importable else "", **values}, default=lambda number: number.item())
             kinds[i], failures[i] = _KINDS.index(failure.outcome.kind), text
         columns = {"R_WB": result.R_WB, "w_WB_B": result.w_WB_B, "drifts": result.drifts, "outcome": kinds, "failure": failures}
         columns |= {} if result.supplied is None else {"supplied": result.supplied}
@@ -186,11 +186,11 @@ class Store:
             inputs[group][own] = _OnDisk(self.arrays[name])
         scene = find_scene(self.record["scene"], scene) if compare or scene is None else scene
         start, n = inputs["start"], self.record["bodies"]
-        known = list_parameters(static_part(scene.potential))
+        shapes = list_parameters(static_part(scene.potential))
         for name, values in inputs["parameters"].items():
-            if known.get(name) != values.shape[1:]:
+            if shapes.get(name) != values.shape[1:]:
                 got = f"{str(self.place)!r}, with the parameter {name!r} of shape {values.shape}"
-                raise BadInput("path", got, f"parameters of its scene, {known}")
+                raise BadInput("path", got, f"parameters of its scene, {shapes}")
         R_WB0 = start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
         w_WB_B0 = start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
         return Batch(scene, R_WB0, w_WB_B0, start.get("inertia"), inputs["parameters"])
@@ -214,7 +214,7 @@ def _restore_failure(text: str, outcome_kind: str) -> IntegrationFailed:
 def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
     """Yield the store of a run, which no other process can write to in the block.
 
-    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method.
+    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is the label of the method.
 
     Raise `BadInput` if the folder contains another run or, except on Windows, another process writes to it; for other errors
     see `find_ensemble`.
@@ -310,15 +310,15 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
 
 def _digest_metadata(folder: Path) -> str:
     """Return a digest of the attributes and other metadata of the group and its arrays, and of the times."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for file in sorted(folder.rglob("zarr.json")):
         content = json.loads(file.read_text(encoding="utf-8"))
         if file.parent == folder:
             content["attributes"].pop(_CHECKSUM, None)
-        found.update(f"{file.relative_to(folder).as_posix()}\n{json.dumps(content, sort_keys=True)}\n".encode())
+        digest.update(f"{file.relative_to(folder).as_posix()}\n{json.dumps(content, sort_keys=True)}\n".encode())
     for file in sorted((folder / "t" / "c").rglob("*")):
-        found.update(f"{file.name}\n".encode() + (file.read_bytes() if file.is_file() else b""))
-    return found.hexdigest()
+        digest.update(f"{file.name}\n".encode() + (file.read_bytes() if file.is_file() else b""))
+    return digest.hexdigest()
 
 
 def list_inputs(bodies: Batch) -> dict[str, Array]:

@@ -43,8 +43,8 @@ from .compiler import small as small
 
 @cache  # once
 def _warn(reason: str) -> None:
-    said = f"Compiled kernels cannot be stored ({reason}), so every process compiles them again. Set NUMBA_CACHE_DIR."
-    warnings.warn(said, RuntimeWarning, stacklevel=3)
+    message = f"Compiled kernels cannot be stored ({reason}), so every process compiles them again. Set NUMBA_CACHE_DIR."
+    warnings.warn(message, RuntimeWarning, stacklevel=3)
 
 
 def _can_cache() -> bool:
@@ -120,12 +120,12 @@ again is expensive where many threads want it."""
 
 def digest(package: Path) -> str:
     """Return a digest of all source files that kernels are compiled from."""
-    found = hashlib.sha256()
+    content_digest = hashlib.sha256()
     folders = (sorted((package / folder).rglob("*.py")) for folder in ("kernels", "potentials"))
     for file in (package / "arithmetic.py", *chain(*folders)):
         content = file.read_bytes()
-        found.update(f"{file.relative_to(package).as_posix()} {len(content)} ".encode() + content)
-    return found.hexdigest()
+        content_digest.update(f"{file.relative_to(package).as_posix()} {len(content)} ".encode() + content)
+    return content_digest.hexdigest()
 
 
 def _drop_stale_code(folder: Path, sources: Path) -> None:

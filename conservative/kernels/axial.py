@@ -107,7 +107,7 @@ class Polhode(NamedTuple):
 
         The gradient of g.w along the sphere is 2 (w - mean g). Its product with g is -2 times the defect.
         """
-        slope = times(tuple(2.0 * (each - self.mean) for each in self.w), x)
+        slope = times(tuple(2.0 * (value - self.mean) for value in self.w), x)
         n, e, flat = 0.5 - 0.5 * dot(x, x), -0.5 * dot(slope, x), FLAT * (self.mean * self.mean)
         over = 1.0 / (flat + dot(slope, slope))
         turn = scale(over * significant(e, self.mean), slope)

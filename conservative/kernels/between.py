@@ -42,12 +42,12 @@ def cross_gap(n, gap, t, J_inverse, rotor, field, table, q, L, room):
 @kernel
 def difference(q0, L0, q1, L1, size):
     """Return the largest difference of two states, momenta relative to `size`; nan if a value is nan."""
-    found = 0.0
+    total = 0.0
     for i in range(4):
-        found += abs(q1[i] - q0[i])
+        total += abs(q1[i] - q0[i])
     for i in range(3):
-        found += abs(L1[i] - L0[i]) / size
-    return found
+        total += abs(L1[i] - L0[i]) / size
+    return total
 
 
 @entry

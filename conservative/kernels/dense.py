@@ -1,6 +1,6 @@
 """Series steps as long as a tolerance allows, with samples between their ends: the series itself, projected (`taylor`).
 
-The coefficients belong to a guessed length, that of the step before. Their last terms determine the length (A. Jorba and M.
+The coefficients belong to a guessed length, the last step's. Their last terms determine the length (A. Jorba and M.
 Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005), and the values of
 the polynomials there are the end of the step. No step is rejected, and the first guess hardly matters. Samples are values of
 the same polynomials, several at once in the lanes of a register. Ends and samples are projected onto the invariants. Samples
@@ -55,7 +55,7 @@ def expand(field, constants, order, h, K, g, a, w, over, largest, over_order):
     """
     series, _, (_, *sized), terms = grow(field, constants, order, h, K, g, a, w)
     squares = (sum(series.split(fuse(w * over, w * over, fuse(a, a, g * g)))) for g, a, w in sized)
-    x, y = ((largest - fast_log2(square)) * each for square, each in zip(squares, over_order, strict=True))
+    x, y = ((largest - fast_log2(square)) * factor for square, factor in zip(squares, over_order, strict=True))
     least = choose(x < y, x, y)
     return fast_exp2(choose(least < LONGER, least, LONGER)), terms.locate()
 
@@ -100,7 +100,7 @@ def find_turn(spin, t, further):
 def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
     """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
 
-    The order is even. The grid's times are h, s, apart. `largest` is that of `find_share`, `lanes` are the numbers 0, 1, ... of
+    The order is even. The grid's times are h, s, apart. `largest` is from `find_share`, `lanes` are the numbers 0, 1, ... of
     the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
     """
     field, g, a = model.field, model.g, model.a
@@ -153,7 +153,7 @@ def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB,
 
 @cache_by_types
 def enter_like(like):
-    """Return `march` as Python calls it (`taylor.enter_like`). The last `REGISTER` numbers are those of the lanes."""
+    """Return `march` as Python calls it (`taylor.enter_like`). The last `REGISTER` numbers belong to the lanes."""
 
     @entry
     def enter(numbers, order, n_steps, sampled, pause, R_WB, w_WB_B):

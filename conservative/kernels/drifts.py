@@ -1,6 +1,6 @@
 """Largest drifts of the invariants of n bodies over their samples.
 
-The definitions are those of `conservative.invariants`; `conservative.drifts` fills the reference values.
+Definitions are in `conservative.invariants`; `conservative.drifts` fills the reference values.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, impulse, rotor, reference, d
         of the last three times their weights. They are nan if a sample is not finite, or not at its time.
     """
     for k in range(len(t)):
-        # The last sample is that of the last step, whose number need not be a multiple of `every`.
+        # The last sample belongs to the last step, whose number need not be a multiple of `every`.
         if t[k] != min(k * every, n_steps) * dt:
             drifts[:] = math.nan
             return

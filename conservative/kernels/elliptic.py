@@ -66,7 +66,7 @@ def sine_and_cosine(x):
 
 @kernel
 def find_means(mc):
-    """Return what `jacobi` needs to know of the complementary parameter mc in [0, 1]: means of 1 and sqrt(mc), and their limit.
+    """Return the data of `jacobi` for the complementary parameter mc in [0, 1]: means of 1 and sqrt(mc), and their limit.
 
     Of every level `means` has the arithmetic mean, one over it, and the geometric mean; `last` is the level, a float, at which
     both agree. Each lane stops at a level of its own, so that none changes with its neighbours.
@@ -93,9 +93,9 @@ def find_means(mc):
 
 
 @kernel
-def jacobi(u, found):
+def jacobi(u, means_and_levels):
     """Return sn, cn, dn of u from the result of `find_means` (Bulirsch 1965, sncndn), without computing 1 - m."""
-    means, levels, last, limit = found
+    means, levels, last, limit = means_and_levels
     sine, cosine = sine_and_cosine(limit * u)
     at_rest = sine == 0.0
     one = fill_like(1.0, u)

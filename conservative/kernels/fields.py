@@ -26,13 +26,13 @@ def finite_torque(field, q, a):
 
 @small
 def whole(rotor, L):
-    """Return the momentum L of a body with that of its rotor, which is None without one."""
+    """Return the momentum L of a body plus the momentum of its rotor, which is None without one."""
     return L if rotor is None else add(L, rotor)
 
 
 @small
 def own(rotor, L):
-    """Return the momentum L of a body without that of its rotor, which is None without one."""
+    """Return the momentum L of a body minus the momentum of its rotor, which is None without one."""
     return L if rotor is None else subtract(L, rotor)
 
 
@@ -51,8 +51,8 @@ def body_torque(field, q):
 @trace
 def torque(field, q, w):
     """Return the torque of field and loads in N m at rates w, rad/s."""
-    found = field.body_torque(q)
-    return add(found, field.load(q, w)) if hasattr(field, "load") else found
+    T = field.body_torque(q)
+    return add(T, field.load(q, w)) if hasattr(field, "load") else T
 
 
 @trace
@@ -63,7 +63,7 @@ def at_step(field, t, h):
 
 @trace
 def rotor_at(field, rotor, t):
-    """Return the momentum of the rotor at a time t, s: `rotor`, or that of the field's motor."""
+    """Return the momentum of the rotor at a time t, s: `rotor`, or the momentum of the field's motor."""
     return field.wheel(t) if hasattr(field, "wheel") and field.motor else rotor
 
 
@@ -90,7 +90,7 @@ def react(L, carry, half):
 
 @trace
 def body_momentum(field, whole_momentum, t):
-    """Return the momentum without that of a rotor with a motor at a time t, s; unchanged without one."""
+    """Return the momentum minus the momentum of a rotor with a motor at a time t, s; unchanged without one."""
     if not (hasattr(field, "wheel") and field.motor):
         return whole_momentum
     return subtract(whole_momentum, field.wheel(t))
@@ -98,7 +98,7 @@ def body_momentum(field, whole_momentum, t):
 
 @trace
 def with_motor(field, L, t):
-    """Return the momentum with that of a rotor with a motor at a time t, s; unchanged without one."""
+    """Return the momentum plus the momentum of a rotor with a motor at a time t, s; unchanged without one."""
     return add(L, field.wheel(t)) if hasattr(field, "wheel") and field.motor else L
 
 
@@ -158,7 +158,7 @@ def _finite_derivative(field, q0, q1):
 def finite_derivative(field, q0, q1):
     """Return V* (9,) in J between base vectors q0 and q1 (9,), and its derivative by q1 (9, 9)."""
     V_star, dV_star = np.empty(9), np.empty(81)
-    found = _finite_derivative(field, load_rows(q0, 0, 1, 9, 1), load_rows(q1, 0, 1, 9, 1))
-    save_rows(V_star, 0, 1, found[0])
-    save_rows(dV_star, 0, 1, found[1])
+    derivatives = _finite_derivative(field, load_rows(q0, 0, 1, 9, 1), load_rows(q1, 0, 1, 9, 1))
+    save_rows(V_star, 0, 1, derivatives[0])
+    save_rows(dV_star, 0, 1, derivatives[1])
     return V_star, dV_star.reshape(9, 9)

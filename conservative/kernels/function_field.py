@@ -52,11 +52,11 @@ def evaluate(field, what, *state):
     call = cgutils.get_or_insert_function(builder.module, kind, "PyObject_CallFunction")
     function = builder.inttoptr(field.address.registers[0], python.pyobj)
     arguments = ir.Constant(INTEGER, what), builder.ptrtoint(buffer, INTEGER)
-    found = builder.call(call, [function, context.insert_const_string(builder.module, "LL"), *arguments])
-    with cgutils.if_unlikely(builder, cgutils.is_null(builder, found)):
+    result = builder.call(call, [function, context.insert_const_string(builder.module, "LL"), *arguments])
+    with cgutils.if_unlikely(builder, cgutils.is_null(builder, result)):
         python.gil_release(lock)
         context.call_conv.return_exc(builder)
-    python.decref(found)
+    python.decref(result)
     python.gil_release(lock)
     return [Symbol(builder, [builder.load(place)]) for place in places[N_INPUTS:]]
 

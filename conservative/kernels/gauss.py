@@ -6,8 +6,8 @@ the world momentum): a closed system of six,
     L' = (L + r) x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
 
 with the momentum r of a rotor and the quadratic invariants energy L.w/2 + c.gamma, (L + r).gamma and
-gamma.gamma, which collocation at Gauss points keeps at any step. What is left of the attitude is one angle about the vertical,
-a quadrature. With the minimal rotation M that takes gamma to a unit vector a fixed in the body, and a constant rotation C that
+gamma.gamma, which collocation at Gauss points keeps at any step. The rest of the attitude is one angle about the vertical, a
+quadrature. With the minimal rotation M that takes gamma to a unit vector a fixed in the body, and a constant rotation C that
 takes a to e_z,
 
     R = Rz(phi) C M(gamma),    phi' = w.(gamma + a) / (1 + gamma.a),    R1 = Rz(phi1 - phi0) R0 M(gamma0)' M(gamma1).
@@ -15,10 +15,9 @@ takes a to e_z,
 Each step has its own a, the gamma at its middle: the divisor stays near 2, and nothing depends on the axes of the body or the
 direction of time. The kernel works in units that make L of size one.
 
-The equations are solved by sweeps, from a guess that continues the last step's polynomial, and to round-off: what is left
-unsolved is not symmetric in time, so that the error of the attitude would grow as the square of the time from the start. To
-leave 1e-9 of the momentum saves nearly half of the sweeps. The round-off that the invariants gather is taken off by the move
-of `taylor`.
+The equations are solved by sweeps, from a guess that continues the last step's polynomial, to round-off. A tolerance of 1e-9 of
+the momentum would save nearly half of the sweeps, but the remaining error is not symmetric in time, so that the error of the
+attitude would grow as the square of the time. `taylor.shortest_move` removes the rounding errors that the invariants gather.
 """
 
 from __future__ import annotations
@@ -38,14 +37,15 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .taylor import shortest_move
 
 FAILURE = "the step is too long for the iteration"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**18
 """Sweeps between two calls of handlers of signals."""
 MOST_SWEEPS = 120
 EARLY, SLOWEST = 4, 0.64
-"""A step fails where two sweeps after the first few shrink the square of the change by less than this factor."""
+"""A step fails if, after the first few sweeps, two sweeps shrink the square of the change by less than this factor."""
 ENOUGH, STAGNATION = 1e-32, 4e-30
-"""Squares of the change that the next sweep is expected to make where sweeps are fast, and of one where they stagnate."""
+"""Sweeps end if the square of the change of the next one is likely to be below `ENOUGH`, or if changes no longer shrink and
+their square is below `STAGNATION`, which is round-off."""
 ROUND_OFF = 2.0**-51
 """Largest defect of an invariant, relative to its scale, that counts as none."""
 LONGEST = 2.0**64
@@ -55,9 +55,9 @@ LONGEST = 2.0**64
 class Model(NamedTuple):
     """The closed system, principal axes, with momenta in units of `unit` kg m^2/s.
 
-    1/J and the moment c of the field in these units; `loose` is 1 for each component of L that changes, else 0; L and gamma at
-    the start, the attitude q there against axes whose third is along gamma, and `left`, which takes those axes to the world's.
-    `rotor` is the momentum of the rotor, which L does not contain, or None.
+    `J_inverse` is 1/J, and `moment` the moment c of the field. `loose` has 1 for each component of L that changes, otherwise 0.
+    L, gamma and q are the start, with the attitude q relative to axes whose third one is vertical; the quaternion `left` turns
+    these axes into world axes. `rotor` is the momentum of the rotor, which L does not contain, or None.
     """
 
     unit: float
@@ -72,7 +72,9 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Number of stages s; A, E by columns, b and its low part, padded with zeros to a multiple of four stages; step h, s."""
+    """Number of stages s; A, E by columns, b and its low part; step h, s. The matrices are from `gauss_legendre`: A for the
+    stages of a step, E for a guess of the next stages. They are padded with zeros to a multiple of four stages.
+    """
 
     s: int
     A: Any
@@ -116,7 +118,10 @@ def put_six(Z, width, i, L, g):
 
 @small
 def combine(M, s, width, i, F, at):
-    """F M' for the four stages from i on, of the rates from F[at] on. M is (stages, width), column j of the matrix in row j."""
+    """Return the sums over j of a_ij times the rates of stage j, for the four stages from i on.
+
+    Rates are stored from F[at] on. M (stages, width) has the column j of the matrix in row j.
+    """
     d0 = d1 = d2 = d3 = d4 = d5 = splat(0.0)
     for j in range(s):
         a, k = load(M, j * width + i, FOUR), at + j
@@ -144,9 +149,9 @@ def add_squares(a, b, total):
 
 @small
 def sweep(M, s, h, J_inverse, rotor, c, L0, g0, F, old, new, Z):
-    """Z = (L0, g0) + h F M' of the rates from F[old] on; write those at Z to F[new] and return the square of the change of Z.
+    """Compute Z = (L0, g0) + h M f with the rates f from F[old] on, and write the rates at Z from F[new] on.
 
-    Z holds six rows of stages, their number a multiple of four.
+    Z has six rows of stages, their number a multiple of four. Return the square of the change of Z.
     """
     width, step, square = Z.shape[0] // 6, splat(h), splat(0.0)
     for i in range(0, width, FOUR):
@@ -165,7 +170,7 @@ def sweep(M, s, h, J_inverse, rotor, c, L0, g0, F, old, new, Z):
 def solve_stages(A, s, h, J_inverse, rotor, c, L, g, F, old, Z):
     """Iterate Z = (L, g) + h A f(Z) from the rates at F[old].
 
-    Return where those at Z are, the number of sweeps, the square of the last change and whether it is of round-off.
+    Return where the rates at Z are in F, the number of sweeps, the square of the last change and whether it is round-off.
     """
     before = earlier = 0.0
     new = Z.shape[0] - old
@@ -176,7 +181,7 @@ def solve_stages(A, s, h, J_inverse, rotor, c, L, g, F, old, Z):
         fast = 4.0 * square < before
         if (fast and square * square <= ENOUGH * before) or (not fast and square < STAGNATION):
             return old, sweeps, square, True
-        # Eigenvalues of the iteration come in pairs that beat, so one sweep alone says little.
+        # Eigenvalues of the iteration come in pairs, so that changes rise and fall: two sweeps are compared with two.
         if sweeps > EARLY and not square < SLOWEST * earlier:
             return old, sweeps, square, False
         earlier, before = before, square
@@ -193,7 +198,7 @@ def hold_rates(J_inverse, rotor, c, L, g, F, width):
 
 @small
 def middle(s, Z):
-    """A vector along gamma at the middle of the step: that of the stage there, or the mean of the two next to it."""
+    """A vector along gamma at the middle of the step: gamma of the stage there, or the mean of the two stages next to it."""
     width = Z.shape[0] // 6
     i, j = 3 * width + (s - 1) // 2, 3 * width + s // 2
     return (0.5 * (Z[i] + Z[j]), 0.5 * (Z[width + i] + Z[width + j]), 0.5 * (Z[2 * width + i] + Z[2 * width + j]))
@@ -227,7 +232,10 @@ def minimal_rotation(g, a):
 
 @kernel
 def attitude(left, phi, q, gamma):
-    """Quaternion, not normalised, of Rz(phi) R turned by `left`, R of q but for round-off: that which takes gamma to e_z."""
+    """Quaternion, not normalised, of the rotations R, Rz(phi) and `left`, one after the other.
+
+    R is the rotation of q, with its round-off corrected so that it takes gamma to e_z.
+    """
     z = product(left, (math.cos(0.5 * phi), 0.0, 0.0, math.sin(0.5 * phi)))
     return product(z, product(q, minimal_rotation(gamma, vertical(q))))
 
@@ -298,7 +306,7 @@ move = trace(shortest_move)
 
 @small
 def remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, g, g_carry):
-    """Bring energy and momentum back to `kept` and the length of gamma to 1, where they are off by more than ROUND_OFF."""
+    """Bring energy and momentum back to `kept` and the length of gamma to 1, if they differ by more than `ROUND_OFF`."""
     now = values(J_inverse, rotor, c, L, g)
     e, m, longer = kept[0] - now[0], kept[1] - now[1], 0.5 - 0.5 * dot(g, g)
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
@@ -313,11 +321,12 @@ def remove_round_off(J_inverse, rotor, c, loose, kept, size, L, L_carry, g, g_ca
 
 @kernel
 def march(model, coefficients, workspace):
-    """Take the steps (`protocol`). A step fails where its sweeps do not converge; the size is the change of the last."""
+    """Take the steps (`protocol`). A step fails if its sweeps do not converge; the size is the change of the last sweep."""
     unit, J_inverse, c, loose, L, gamma, q, left, rotor = model
     s, A, E, b, b_low, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     width = b.shape[0]
+    # F has two halves. The rates of the last sweep begin at `at`, the other half at 6 * width - at.
     F, Z, at = np.zeros(12 * width), np.zeros(6 * width), 0
     none = (0.0, 0.0, 0.0)
     L_carry, g_carry, q_carry, phi, phi_carry = none, none, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0
@@ -339,7 +348,7 @@ def march(model, coefficients, workspace):
         phi, phi_carry = accumulate(phi, phi_carry, integrate_turn(h, b, a, length, J_inverse, Z))
         before = gamma
         dL, dg = weigh(b, b_low, F, at)
-        # The momentum about an axis of symmetry is constant. Divided by the moment of a rod, its round-off would be a rate.
+        # The momentum about an axis of symmetry is constant. Its round-off over the small moment of a rod would be a rate.
         dL = times(loose, dL)
         L, L_carry = add_carried(L, L_carry, scale(h, dL))
         gamma, g_carry = add_carried(gamma, g_carry, scale(h, dg))
@@ -347,7 +356,7 @@ def march(model, coefficients, workspace):
         q, q_carry = carry_attitude(q, q_carry, a, length, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1
-            # `accumulate` carries what the sum has too much.
+            # The carry of `accumulate` is by how much the sum is too large.
             store(row, left, phi - phi_carry, q, gamma, unit, L, q_out, L_out)
         until_pause -= sweeps
         if until_pause <= 0 < pause:

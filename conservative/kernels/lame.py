@@ -29,14 +29,14 @@ NOWHERE = 1e-40
 """Square of a distance from the upright position that counts as none, rad^2."""
 LARGEST_POLE, LONGEST_FALL = 1.7, 1.0
 NEARLY_UPRIGHT = 0.01
-"""Energy above that of the upright top, relative to the potential one, below which a top passes by that position."""
+"""Energy above the upright top's, relative to the potential one, below which a top passes by that position."""
 PAUSE = 2**18
 """Parts of steps between two calls of handlers of signals."""
 PARTS_AT_ONCE = 1024
 """Numbers of parts tried between two such calls."""
 PARTS, CONSTANTS, ROWS = 21, 23, 33
-"""Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across
-the axis, then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
+"""Numbers of a body: constants (first the fields of `Part`, then the number of parts of a step and the moment across the axis),
+then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
 constants, and all."""
 
 
@@ -70,7 +70,7 @@ def curve(J, kappa, gamma, L):
     ww = plus(plus(times(w[0], w[0]), times(w[1], w[1])), times(w[2], w[2]))
     E = plus(scale(0.5, ww), times(k, g[2]))
     z = plus(plus(times(w[0], g[0]), times(w[1], g[1])), times(w[2], g[2]))
-    # nu = k/2, x0 = -E/6 and upper = nu + x0: in these, g2 and g3 are those of `conservative.methods.lame`.
+    # nu = k/2, x0 = -E/6 and upper = nu + x0. In these, g2 and g3 are as in `conservative.methods.lame`.
     nu, x0 = scale(0.5, k), times(E, over(two(-1.0), two(6.0)))
     upper = plus(x0, nu)
     g2 = minus(scale(12.0, times(x0, x0)), scale(2.0, times(nu, minus(times(z, w[2]), scale(2.0, nu)))))
@@ -208,7 +208,7 @@ def unit_vertical(q):
 
 @small
 def invariants(k, spin, q, gamma, w0, w1):
-    """Vertical momentum and energy less those of the top that stands at rest with the same spin, and sin^2 of half the tilt.
+    """Vertical momentum and energy relative to a top that stands at rest with the same spin, and sin^2 of half the tilt.
 
     Near there they are sums of small numbers, known to all digits, which decide when a top that falls stands up again: an
     absolute error of 1e-16 of the energy would be all of it at 1e-8 rad. `spin` is as in `Part`.
@@ -248,7 +248,7 @@ def restore_invariants(c, q, gamma, w0, w1):
 class Part(NamedTuple):
     """Constants of a part of a step: of the motion (E to w2, and `rate`, which residuals are scaled by), then of the length.
 
-    E and z are less those of the upright top with the same spin; `spin` is w2, or -w2 if the axis points down there.
+    E and z are relative to the upright top with the same spin; `spin` is w2, or -w2 if the axis points down there.
     """
 
     E: Any

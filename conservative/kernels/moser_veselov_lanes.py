@@ -20,7 +20,7 @@ from .protocol import record_lanes
 GIVEN = 24
 """Numbers that a body is given by: `gather`."""
 SHIFT, LEFT, RATES, AXES, FINISHED = 0, 15, 19, 22, 31
-"""First rows: of `Shift`, the turn in front, amplitudes of the rate, the polhode's axes in those of the body, and 0 or 1."""
+"""First rows: of `Shift`, the turn in front, amplitudes of the rate, the polhode's axes in body axes, and 0 or 1."""
 ROWS, STATE_ROWS = 32, 5
 SLOWEST = 1e-60
 """Limit of |w| dt below which bodies that turn are left to be run alone: squares of squares would be no floats."""
@@ -85,7 +85,7 @@ def step_of_order(p, h, order, room):
 def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table, states):
     """Fill `table` (ROWS, columns) and `states` (STATE_ROWS, columns) for steps dt of an order, 0 for the exact one.
 
-    Bodies are given as `gather` takes them; dt is in units `time`. `limits` are those of |w| dt, of nu dt and of cn: bodies
+    Bodies are given as `gather` takes them; dt is in units `time`. `limits` are for |w| dt, nu dt and cn: bodies
     beyond them, or without a step, get 0 in the row FINISHED.
     """
     columns, flat, room = table.shape[1], table.reshape(-1), np.empty(GIVEN * WIDTH)
@@ -107,10 +107,10 @@ def prepare_lanes(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table,
         axes = (x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4])
         # There is a step below the limits whose squares stay in the range of floats.
         angle = math.sqrt(dot(w, w)) * h
-        known = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
+        possible = (angle == 0.0) | ((angle > SLOWEST) & (angle < limits[0]))
         # The last condition: r0 is finite. The difference of infinity or nan with itself is nan.
-        known = known & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
-        finished = choose(known, 1.0, 0.0 * h)
+        possible = possible & (abs(p.nu) * h < limits[1]) & (limits[2] < step.C) & (step.r0 - step.r0 == 0.0)
+        finished = choose(possible, 1.0, 0.0 * h)
         save_rows(flat, first + SHIFT * columns, columns, k)
         save_rows(states.reshape(-1), first, columns, at)
         save_rows(flat, first + LEFT * columns, columns, left)

@@ -1,6 +1,6 @@
 """The polhode of a free body, the curve of its momentum in the body, and the Moser-Veselov steps along it.
 
-The symbols are those of `moser_veselov`.
+Symbols are as in `moser_veselov`.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def polhode(J1, J2, J3, L1, L2, L3):
     """Return the polhode for J2 intermediate, L3 >= 0 and L^2 - 2 E J2 not below 0 for J3 > J1, not above for J3 < J1.
 
     All differences are of given moments, and every sum is of terms of one sign except D = L^2 - 2 E J2 in mc, which is what
-    tells both sides of the separatrix apart. Where L stays, as in a spherical body or one at rest, the phase is that of L. A
+    tells both sides of the separatrix apart. Where L stays, as in a spherical body or one at rest, it is the phase of L. A
     body with J3 = J2 alone is given with its axes exchanged.
     """
     l = math.sqrt(L1 * L1 + L2 * L2 + L3 * L3)  # noqa: E741
@@ -202,7 +202,7 @@ def half_step_series(p, A3, nu, tau):
 def calibration_series(p, tau):
     """Coefficients of css and of cdd in powers of (h / 2 tau)^2: Taylor series of the exact step that is symmetric about s = 0.
 
-    With the Cayley vector e of its second half, that of the whole is 2 (e1 - e2 e3, 0, e3 + e1 e2) / (1 - e1^2 + e2^2 - e3^2).
+    If its second half has the Cayley vector e, the whole has 2 (e1 - e2 e3, 0, e3 + e1 e2) / (1 - e1^2 + e2^2 - e3^2).
     """
     # On a symmetric body whose momentum lies across the axis both sides of K3 = c3 / (...) vanish; the limit is even in A3.
     A3 = max(p.A3, 1e-8 * p.l)

@@ -6,7 +6,7 @@ The state is the attitude as a quaternion q and the momentum L, principal axes: 
 
 with the momentum r of a rotor, which L does not contain.
 
-Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is
+Coefficients that are zero are left out. A, but not b, is multiplied by h beforehand. After the step |q| = 1 is
 restored, and then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
 Wanner, IV.4): by Newton's method along their gradients with respect to L and to a turn of the body, so that the state moves
 least. With loads these values change by work and impulse, which the step sums as it does q and L. An invariant that is met to
@@ -41,7 +41,7 @@ from .fields import (
 from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**14
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
@@ -144,7 +144,7 @@ def take_step(h, t, J_inverse, rotor, field, weights, columns, starts, nodes, q,
 
 @small
 def sum_supply(h, weights, columns, starts, slopes, supplied):
-    """Return the sums of work and impulse with those of the last step: its quadrature of power and torque."""
+    """Return the sums of work and impulse plus the last step's: its quadrature of power and torque."""
     stages = len(starts) - 2
     for i in range(starts[stages], starts[stages + 1]):
         rate = load_rows(slopes, FOUR * (2 * stages + columns[i]), 1, 4, 1)
@@ -235,9 +235,9 @@ def project(J_inverse, rotor, field, axis, turn, kept, scales, q, L):
         if max(abs(e) / scales[0], abs(m) / scales[1]) <= ROUND_OFF:
             return q, L, corrections, defect
         corrections += 1
-        dL, way = shortest_move(w, T, rotor, axis, scales[1], e, m, q, L)
+        dL, rotation = shortest_move(w, T, rotor, axis, scales[1], e, m, q, L)
         L = add(L, dL)
-        q = near_unit(product(q, (1.0, 0.5 * way[0], 0.5 * way[1], 0.5 * way[2])))
+        q = near_unit(product(q, (1.0, 0.5 * rotation[0], 0.5 * rotation[1], 0.5 * rotation[2])))
 
 
 @kernel

@@ -58,7 +58,7 @@ class Result(NamedTuple):
 
 
 def find_ends(model: type[NamedTuple], coefficients: type[NamedTuple]) -> tuple[int, int]:
-    """Return where a model and its coefficients end among the loose values: constants of the machine code of `enter`."""
+    """Return the ends of a model and its coefficients among the loose values: constants of the machine code of `enter`."""
     end = len(model._fields)
     return end, end + len(coefficients._fields)
 

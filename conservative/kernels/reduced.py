@@ -56,7 +56,7 @@ from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply
 from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes, record_supply
 
 FAILURE = "no continuous solution"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**17
 """Stages between two calls of handlers of signals; one that `continue_branch` solves counts as DEAR of them."""
 DEAR = 64
@@ -243,9 +243,9 @@ def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
 
 @kernel
 def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
-    """Return what `newton_solve` does, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
+    """Return the results of `newton_solve`, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
 
-    Each guess is on the tangent of the branch. Where the branch ends before h, the size is that of the residual at that end,
+    Each guess is on the tangent of the branch. Where the branch ends before h, the size is the residual's at that end,
     relative to the right side.
     """
     a, slope = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -256,7 +256,7 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
         guess = (
             add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, rotor, q, L)
         )
-        found, L1, carry1, iterations, size, trusted = newton_solve(
+        solution, L1, carry1, iterations, size, trusted = newton_solve(
             hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, tolerance
         )
         corrections += iterations
@@ -264,9 +264,9 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
             part *= 0.5
             continue
         if aim == 1.0:
-            return found, L1, carry1, corrections, size, True
+            return solution, L1, carry1, corrections, size, True
         # Parts that were halved before a bend of the branch grow again behind it.
-        a, reached, part = found, aim, 2.0 * part
+        a, reached, part = solution, aim, 2.0 * part
         rows = inverse_tangent(hs, J, field, rotor, q, a)
         # a'(h): forcing(h)/2 is the derivative of the right side by h, and (h/2) forcing(h/2) the right side itself.
         slope = scale(0.5, apply(rows, forcing(hs, field, rotor, q, L, a)))
@@ -335,9 +335,9 @@ def march(model, coefficients, workspace):
             now = at_step(field, t, h)
             mean, half = step_rotor(field, rotor, t, h)
             L, L_carry = react(L, L_carry, half)
-            a, L1, L1_carry, more, size, found = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
+            a, L1, L1_carry, more, size, solved = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
             corrections += more
-            if not found:
+            if not solved:
                 elsewhere = find_solution(h, J, J_inverse, now, mean, q, L)
                 return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
             L, L_carry = react(L1, L1_carry, half)
@@ -372,7 +372,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
     q, q_carry, L, L_carry, supplied = state
     corrections, size = 0, 0.0
     until_sample = every - (first_step - 1) % every
-    known, past = history
+    smooth, past = history
     for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
             h, t = lengths[stage], find_start(lengths, step, stage)
@@ -380,14 +380,14 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
             mean, half = step_rotor(field, rotor, t, h)
             # L stays as it is before the stage: if the solution is not trusted, `march` solves the stage from there.
             M, M_carry = react(L, L_carry, half)
-            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
+            a = guess_ahead(past) if smooth >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
             a, M, M_carry, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
-                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
+                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (smooth, past)
             if len(lengths) == 1:
                 change = subtract(a, past[0])
-                known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
+                smooth = smooth + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
             L, L_carry = react(M, M_carry, half)
             supplied = supply(now, h, q, a, supplied)
@@ -399,7 +399,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
             row += 1
             record(row, q, L, q_out, L_out)
             record_supply(row, supplied, L_out)
-    return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry, supplied), (known, past)
+    return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry, supplied), (smooth, past)
 
 
 @small
@@ -407,7 +407,7 @@ def find_start(lengths, step, stage):
     """Return the time, s, at which a stage of a step starts. Without loads its callers do not use it, and it is left out."""
     t = 0.0
     for i in range(len(lengths)):
-        # Products, whose rounding does not add up as that of a sum over all steps would.
+        # Products, whose rounding does not add up as in a sum over all steps.
         t += (step - 1) * lengths[i] if i >= stage else step * lengths[i]
     return t
 
@@ -485,13 +485,13 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, t
             own_field = None if field is None else UniformField(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
             own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
             own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
-            found, own_L1, own_carry1, _, _, exists = continue_branch(
+            own_a, own_L1, own_carry1, _, _, exists = continue_branch(
                 h, own[0], own[1], own[2], None, own[3], own[4], own[5], tolerance
             )
             if not exists:
                 finished[first + i] = False
-                found, own_L1, own_carry1 = rest, rest, rest
-            a, L1, carry1 = put(a, i, found), put(L1, i, own_L1), put(carry1, i, own_carry1)
+                own_a, own_L1, own_carry1 = rest, rest, rest
+            a, L1, carry1 = put(a, i, own_a), put(L1, i, own_L1), put(carry1, i, own_carry1)
     return a, L1, carry1
 
 
@@ -499,9 +499,9 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, t
 def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n_steps, every_step, q_out, L_out, finished):
     """Take the steps after `done` up to `last` of n_steps: of all bodies, WIDTH at a time.
 
-    lengths (stages,) are those of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses, moment (3, n)
-    that of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is worked in. Samples go to q_out (n, samples,
-    4) and L_out (n, samples, 3), and `finished` (n,) is made False where a body has no solution.
+    lengths (stages,) are the parts of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses; moment
+    (3, n) the moment of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is memory for the work. Samples
+    go to q_out (n, samples, 4) and L_out (n, samples, 3), and `finished` (n,) becomes False if a body has no solution.
     """
     n, stages = moments.shape[1], len(lengths)
     tolerance = tolerance ** (2.0 / 3.0)
@@ -516,16 +516,16 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
             x, y, z = load_rows(moment.reshape(-1), i, n, 3, WIDTH)
             field = UniformField(x, y, z)
         state = load_rows(all_states, i, n, 18, WIDTH)
-        q, L, q_carry, L_carry, known, newest = state[:4], state[4:7], state[7:11], state[11:14], state[14], state[15:]
+        q, L, q_carry, L_carry, smooth, newest = state[:4], state[4:7], state[7:11], state[11:14], state[14], state[15:]
         older = load_rows(all_states, i + 18 * n, n, 15, WIDTH)
         save_rows(ring, 0, WIDTH, older)
         save_rows(ring, 15 * WIDTH, WIDTH, older)
-        zero = fill_like(0.0, known)
+        zero = fill_like(0.0, smooth)
         place, row, until_sample = 0, done // every_step, every_step - done % every_step
         for step in range(done + 1, last + 1):
             for stage in range(stages):
                 h = lengths[stage]
-                enough = known >= 6.0
+                enough = smooth >= 6.0
                 past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
                 a = guess_ahead((newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]))
                 if not every(enough):
@@ -535,12 +535,12 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                     a, L1, L1_carry = solve_alone(
                         h, J, J_inverse, field, q, L, L_carry, tolerance, a, L1, L1_carry, trusted, finished, i
                     )
-                    known = choose(trusted, known, zero)
+                    smooth = choose(trusted, smooth, zero)
                 if stages == 1:
                     change = subtract(a, newest)
                     place = push(ring, place, newest)
                     newest = a
-                    known = choose(dot(change, change) <= SMOOTH * dot(a, a), known + 1.0, zero)
+                    smooth = choose(dot(change, change) <= SMOOTH * dot(a, a), smooth + 1.0, zero)
                 L, L_carry = L1, L1_carry
                 q, q_carry = turn_attitude(a, q, q_carry)
             until_sample -= 1
@@ -549,5 +549,5 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                 row += 1
                 record_lanes(i, row, samples, q, q_flat)
                 record_lanes(i, row, samples, L, L_flat)
-        save_rows(all_states, i, n, q + L + q_carry + L_carry + (known,) + newest)
+        save_rows(all_states, i, n, q + L + q_carry + L_carry + (smooth,) + newest)
         save_rows(all_states, i + 18 * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH))

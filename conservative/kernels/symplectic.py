@@ -11,7 +11,7 @@ h is a rational function of L and (s, C, D). It conserves energy and |L| for any
 D^2 = 1 - beta s^2. No sign and no axis has to be chosen, and neither the separatrix nor a symmetric body is a special case.
 
 The quaternion of the step has the form of DMV steps (`moser_veselov`): its vector is K (L0 + L1), K diagonal and affine in k.
-The constants are those of the step that is symmetric about L2 = 0, where L = (A1, 0, A3). They follow from the momentum at its
+The constants belong to the step that is symmetric about L2 = 0, where L = (A1, 0, A3). They follow from the momentum at its
 end, (A1 C, g2 A1 A3 s, A3 D), and the angle f about the momentum in half of it. Time and angle are integrals without elliptic
 functions over y = s / (1 + C), with u = 1 + alpha y^2:
 
@@ -52,7 +52,7 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import add_momentum, turn_attitude
 
 FAILURE = "no solution for c on the branch that begins at a step of length 0, or a free rotation of more than 1,000 rad"
-"""Why a step fails."""
+"""Reason that a step fails."""
 EXACT, AXES, ENDS, MIDDLE = range(4)
 PAUSE = 2**16
 """Stages between two calls of handlers of signals."""
@@ -67,8 +67,8 @@ NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.lege
 class Model(NamedTuple):
     """Moments, kg m^2, and their inverses, field or None, attitude and momentum, kg m^2/s, at the start.
 
-    Principal axes; the second moment is the intermediate one. `kind` is that of the rotations. `rotor` is the momentum of the
-    rotor, kg m^2/s, which L does not contain, or None. The steps are those of the whole momentum L + rotor.
+    Principal axes; the second moment is the intermediate one. `kind` belongs to the rotations. `rotor` is the momentum of the
+    rotor, kg m^2/s, which L does not contain, or None. The steps are steps of the whole momentum L + rotor.
     """
 
     J: Any
@@ -259,12 +259,12 @@ def rotate(kind, h, t, J, k, rotor, field, q, q_carry, L, L_carry):
         if rotor is not None:
             q, q_carry, L, L_carry = turn_with_rotor(0.5 * h, k, rotor, q, q_carry, L, L_carry)
         return q, q_carry, L, L_carry, 0, 0.0, True
-    c, l, kick, corrections, size, found = solve(h, t, J, k, field, kind == MIDDLE, q, L)  # noqa: E741
+    c, l, kick, corrections, size, solved = solve(h, t, J, k, field, kind == MIDDLE, q, L)  # noqa: E741
     turned = cross(c, l)
     gain = add(subtract(l, L), scale(2.0 / (1.0 + dot(c, c)), subtract(cross(c, turned), turned)))
     q, q_carry = turn_attitude(c, q, q_carry)
     L, L_carry = add_momentum(L, L_carry, add(gain, kick))
-    return q, q_carry, L, L_carry, corrections, size, found
+    return q, q_carry, L, L_carry, corrections, size, solved
 
 
 @kernel
@@ -286,14 +286,14 @@ def march(model, coefficients, workspace):
             for stage in range(stages):
                 part, t = rotations[stage], (step - 1) * h + nodes[stage]
                 if part != 0.0:
-                    q, q_carry, L, L_carry, more, size, found = rotate(
+                    q, q_carry, L, L_carry, more, size, solved = rotate(
                         kind, part, t - part, J, k, rotor, field, q, q_carry, L, L_carry
                     )
                     corrections += more
-                    if not found:
+                    if not solved:
                         return Result(step - 1, (step - 1) * stages, corrections, None, size, False)
                 if kicks[stage] != 0.0:
-                    if part != 0.0:  # otherwise attitude and time are those of the last kick
+                    if part != 0.0:  # otherwise attitude and time are as in the last kick
                         T = torque(field, t, q)
                     L, L_carry = add_momentum(L, L_carry, scale(kicks[stage], T))
             until_sample -= 1

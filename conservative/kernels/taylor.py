@@ -35,7 +35,7 @@ from .compiler.vector import accumulate, add, apply, choose, cross, dot, product
 from .protocol import Result, Workspace, loosen, record, record_lanes
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
-"""Why a step fails."""
+"""Reason that a step fails."""
 PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
@@ -99,7 +99,7 @@ class Free(NamedTuple):
 
 
 def whole(rotor, L):
-    """Return the momentum L of the body with that of its rotor, which is () without one."""
+    """Return the momentum L of the body plus the momentum of its rotor, which is () without one."""
     return add(L, rotor) if rotor else L
 
 
@@ -150,7 +150,7 @@ def grow(field, constants, order, h, K, g, a, w):
 
 
 def add_rotor(accelerate, first, second):
-    """Return `accelerate` with the torque r x w of a rotor of momentum r; the vectors are those of `begin`."""
+    """Return `accelerate` with the torque r x w of a rotor of momentum r; the vectors are from `begin`."""
 
     def accelerate_all(c, n):
         torque, own = accelerate(c, n), first * c[n, 5] - second * c[n, 4]
@@ -193,7 +193,7 @@ def shortest_move(loose, scales, w, L, T, e, m, g):
 def correct_in_field(field, constants, body, kept, scales, g, a, w):
     """Correct a state in a field (`find_correction`).
 
-    The inverse length of g is two terms of its series, and energy and momentum are those of the normalised g to first order, so
+    The inverse length of g is two terms of its series, and energy and momentum belong to the normalised g to first order, so
     that no product waits for another. The remaining defect is of the size of the square of the first one, plus the share that
     regularisation leaves.
     """
@@ -278,7 +278,7 @@ def advance(field, constants, order, h, K, g, a, w, angles):
     if not hasattr(field, "advance"):
         return take_step(field, constants, order, h, K, g, a, w), angles
     x, changes = field.advance(order, h, g)
-    return (x, a, w), tuple(accumulate(*each, change) for each, change in zip(angles, changes, strict=True))
+    return (x, a, w), tuple(accumulate(*angle, change) for angle, change in zip(angles, changes, strict=True))
 
 
 @trace
@@ -377,7 +377,7 @@ class Bodies(NamedTuple):
     """Bodies in lanes: the numbers of `Model`, and others for steps and samples.
 
     `h` is the step size in the units of the body. `axes` are the rows of the rotation from axes D to world axes, and `R_BP`
-    those of the rotation from principal to body axes. `units` converts rates of the body's units to rad/s; its third component
+    the rows of the rotation from principal to body axes. `units` converts rates of the body's units to rad/s; its third part
     contains the spin if the body is described in a non-spinning frame.
     """
 

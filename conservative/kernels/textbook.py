@@ -70,7 +70,7 @@ def runge_kutta_step(munthe_kaas, weights, nodes, h, t, J_inverse, field, q, L, 
             f, slope = h * weights[i, j], slopes[j]
             v = (f * slope[0], f * slope[1], f * slope[2])
             L1 = add(L1, (f * slope[3], f * slope[4], f * slope[5]))
-            # u is a sum of vectors, but rotations do not commute: those of Crouch and Grossman are multiplied in their order.
+            # u is a sum of vectors, but rotations do not commute: Crouch and Grossman's are multiplied in their order.
             if munthe_kaas:
                 u = add(u, v)
             else:

@@ -101,19 +101,19 @@ def walk(  # noqa: PLR0915  # one loop
     if depends_on_time(scene.potential) and not scene.loaded:  # the clock of steps belongs to loads
         model = model._replace(field=load_field(model.field, None, None, np.eye(3)))
     clocked, columns = hasattr(model.field, "clock"), 7 if hasattr(model.field, "load") else 3
-    end, found = float(t[-1]), Walk(t, np.empty((len(t), 4)), np.zeros((len(t), columns)), 1, [], [])
+    end, path = float(t[-1]), Walk(t, np.empty((len(t), 4)), np.zeros((len(t), columns)), 1, [], [])
     smooth = scene.smoothness(end)
     longest = min(LONGEST / rate * min(1.0, (tolerance / LOOSE) ** (POWER / 2)), smooth.step, end)
     edges = [-math.inf, *smooth.breaks.tolist(), math.inf]
     q, L, room = model.q, model.L, (np.empty((2, 4)), np.zeros((2, columns)))
-    found.q[0], found.L[0, :3], supplied = q, L, np.zeros(columns - 3)
+    path.q[0], path.L[0, :3], supplied = q, L, np.zeros(columns - 3)
 
     def take(now: float, h: float, n: int, window: tuple[float, float]) -> tuple[Any, Any, Any] | None:
         """Return the state after n steps of length h, s, and what loads supplied; None if they fail."""
         field = model.field._replace(clock=(now, *window)) if clocked else model.field
         with np.errstate(all="ignore"):
             done, _, corrections, *_ = kernel.enter(*model._replace(q=q, L=L, field=field), *find(h), n, n, 0, *room)
-        found.corrections += corrections
+        path.corrections += corrections
         last = *room[0][-1].tolist(), *room[1][-1].tolist()
         return None if done < n or not all(map(math.isfinite, last)) else (last[:4], last[4:7], room[1][-1, 3:].copy())
 
@@ -127,10 +127,10 @@ def walk(  # noqa: PLR0915  # one loop
                 left = stop_at - now
                 step = left if h >= left * (1 - SAME) else min(h, left / 2)
                 least = SHORTEST * max(stop_at, end / 100)
-                found.tries += 1
-                if found.erratic or found.tries > MOST_LONG + len(t):
-                    found.reason = f"a tolerance of {tolerance:.2g} takes more than {found.tries - 1} steps, at t = {now:.6g} s"
-                    return found
+                path.tries += 1
+                if path.erratic or path.tries > MOST_LONG + len(t):
+                    path.reason = f"a tolerance of {tolerance:.2g} takes more than {path.tries - 1} steps, at t = {now:.6g} s"
+                    return path
                 coarse, fine = take(now, step, 1, (first, last)), take(now, step / 2, 2, (first, last))
                 error = math.inf
                 if coarse is not None and fine is not None:
@@ -140,23 +140,23 @@ def walk(  # noqa: PLR0915  # one loop
                     h = max(least, step * max(SHRINK, SHARE * (tolerance / error) ** POWER))
                     continue
                 if fine is None:
-                    found.reason = kernel.FAILURE
-                    return found
+                    path.reason = kernel.FAILURE
+                    return path
                 q, L, supply = fine
                 supplied = supplied + supply
                 now = stop_at if step == left else now + step
-                found.h.append(max(step, h))
-                found.ends.append(now)
-                found.local += error
+                path.h.append(max(step, h))
+                path.ends.append(now)
+                path.local += error
                 grown = step * min(GROW, SHARE * (tolerance / max(error, 1e-300)) ** POWER)
                 # A step that ends at a sample says nothing of longer ones.
                 h = min(longest, max(h if step < h else least, grown))
-            if found.good < len(t) and stop >= t[found.good] * (1 - SAME):
-                found.q[found.good], found.L[found.good, :3], found.L[found.good, 3:] = q, L, supplied
-                found.good += 1
-        if found.good == len(t):
+            if path.good < len(t) and stop >= t[path.good] * (1 - SAME):
+                path.q[path.good], path.L[path.good, :3], path.L[path.good, 3:] = q, L, supplied
+                path.good += 1
+        if path.good == len(t):
             break
-    return found
+    return path
 
 
 def work_of_try(method: Method) -> float:
@@ -171,18 +171,18 @@ def run_adaptively(
     return lambda: trajectory_of(scene, label, start, walk(scene, model, find, tolerance, grid.t))
 
 
-def trajectory_of(scene: Scene, label: str, start: PrincipalStart, found: Walk) -> Trajectory:
+def trajectory_of(scene: Scene, label: str, start: PrincipalStart, path: Walk) -> Trajectory:
     """Return the trajectory of a walk."""
-    n, good = len(found.t), found.good
+    n, good = len(path.t), path.good
     R_WB, w_WB_B = np.empty((good, 3, 3)), np.empty((good, 3))
-    L = np.ascontiguousarray(found.L[:good])
+    L = np.ascontiguousarray(path.L[:good])
     turn = start.J_inverse, start.spin, start.R_BP
-    finite = kernels("samples").to_body_axes(found.t[:good], found.q[:good].copy(), L, *turn, R_WB, w_WB_B)
+    finite = kernels("samples").to_body_axes(path.t[:good], path.q[:good].copy(), L, *turn, R_WB, w_WB_B)
     failure: IntegrationFailed | None = None
     if finite < n:
-        time = float(found.t[max(finite - 1, 0)])
-        failure = NotConverged(len(found.h) + 1, time, 0.0, found.reason) if found.reason else Diverged(time)
-    counters = Counters(3 * found.tries, 36 * found.tries, found.corrections, 36 * found.tries)
+        time = float(path.t[max(finite - 1, 0)])
+        failure = NotConverged(len(path.h) + 1, time, 0.0, path.reason) if path.reason else Diverged(time)
+    counters = Counters(3 * path.tries, 36 * path.tries, path.corrections, 36 * path.tries)
     supplied = L[:finite, 3:].copy() if scene.loaded else None
-    samples = found.t[:finite].copy(), R_WB[:finite], w_WB_B[:finite]
-    return Trajectory(scene, *samples, label, counters, failure, None, supplied, control=found.control)
+    samples = path.t[:finite].copy(), R_WB[:finite], w_WB_B[:finite]
+    return Trajectory(scene, *samples, label, counters, failure, None, supplied, control=path.control)

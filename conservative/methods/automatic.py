@@ -65,7 +65,7 @@ def integrate_to_error(
     )
     method, grid, estimated = best_of(tried)
     _, trajectory = trials.estimate(method, grid, sensitivity=True)
-    attempts = tuple((each.grid.dt, each.estimate.total) for each in tried)
+    attempts = tuple((attempt.grid.dt, attempt.estimate.total) for attempt in tried)
     total, rough = estimated.total, find_rough(tried)
     if isinstance(method, Projected) and method.tolerance is not None and samples.at is not None:
         trajectory = method.solve_at(scene, grid, samples.at)
@@ -110,19 +110,17 @@ def _refine(first: tuple[Method, Grid], finer: Finer, error: float, estimate: Es
     def attempt(setting: tuple[Method, Grid]) -> Attempt:
         return Attempt(*setting, estimate(*setting))
 
-    return refine_until(
-        [attempt(first)], finer, attempt, lambda each: each.settles(error), lambda each: each.estimate.total, most
-    )
+    return refine_until([attempt(first)], finer, attempt, lambda run: run.settles(error), lambda run: run.estimate.total, most)
 
 
 def best_of(tried: Sequence[Attempt]) -> Attempt:
     """Return the attempt with the smallest estimate, the last one of equals; one that ended early only if all did."""
-    return min(reversed(tried), key=lambda each: (each.estimate.failed, each.estimate.total))
+    return min(reversed(tried), key=lambda attempt: (attempt.estimate.failed, attempt.estimate.total))
 
 
 def find_rough(tried: Sequence[Attempt]) -> float | None:
     """Return a time, s, near which the motion is not smooth, by the last attempt that shows one; None if none does."""
-    return next((each.estimate.rough for each in reversed(tried) if each.estimate.rough is not None), None)
+    return next((attempt.estimate.rough for attempt in reversed(tried) if attempt.estimate.rough is not None), None)
 
 
 def reach(
@@ -149,7 +147,7 @@ def reach(
         if scene.smoothness(t_end).noise:
             return tried
     tried += cut_tolerance(adaptive_method(error), sampling_grid(t_end, samples), error, estimate)
-    if all(each.estimate.failed for each in tried):
+    if all(attempt.estimate.failed for attempt in tried):
         method, dt = fallback(scene, t_end)
         grid = grid_of(dt, t_end, samples, parts)
         tried.append(Attempt(method, grid, estimate(method, grid)))
@@ -173,7 +171,7 @@ def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Estimat
         last = tried[-1]
         assert isinstance(last.method, Projected)
         assert last.method.tolerance is not None
-        if last.estimate.failed or sum(each.estimate.work for each in tried) > 2 * MOST_TRIES * work_of_try(last.method):
+        if last.estimate.failed or sum(attempt.estimate.work for attempt in tried) > 2 * MOST_TRIES * work_of_try(last.method):
             return None
         if last.method.tolerance <= LEAST_TOLERANCE or (len(tried) > 1 and math.isinf(last.estimate.error)):
             return None
@@ -219,7 +217,7 @@ def grid_of(dt: float, t_end: float, samples: SampleTimes, parts: int = 2) -> Gr
     if samples.spacing is None:
         require_memory("sample_every", math.ceil(t_end / dt), samples.every)
         return even_grid(t_end, dt, samples.every, parts)
-    each = parts * count_steps(samples.spacing, parts * dt)
-    n = each * count_steps(t_end, samples.spacing)
-    require_memory("sample_every", n, min(each * samples.every, n))
-    return Grid(samples.spacing / each, n, min(each * samples.every, n))
+    per_sample = parts * count_steps(samples.spacing, parts * dt)
+    n = per_sample * count_steps(t_end, samples.spacing)
+    require_memory("sample_every", n, min(per_sample * samples.every, n))
+    return Grid(samples.spacing / per_sample, n, min(per_sample * samples.every, n))

@@ -106,40 +106,40 @@ def stride_of(n_steps: int) -> int:
     return max(1, n_steps // MOST_KEPT)
 
 
-def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> Trajectory:
+def sample_between(run: Trajectory, method: Method, grid: Grid, t: Array) -> Trajectory:
     """Return the samples at increasing times t (n,), s, from the run of a method on a grid.
 
     The samples of a failed run end at its last valid step.
     """
-    if not len(found):
-        return found
-    row = np.searchsorted(found.t, t * (1 + ROUNDING), side="right") - 1
-    gaps = t - found.t[row]
+    if not len(run):
+        return run
+    row = np.searchsorted(run.t, t * (1 + ROUNDING), side="right") - 1
+    gaps = t - run.t[row]
     gaps[np.abs(gaps) <= ROUNDING * t] = 0.0
-    n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
+    n = len(t) if run.ok else int(np.count_nonzero((row < len(run) - 1) | (gaps == 0.0)))
     row, gaps = row[:n], gaps[:n]
-    supplied = None if found.supplied is None else found.supplied[row]
-    R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row], supplied)
-    failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
-    R_WB, w_WB_B, frame, flight = R_WB[:done], w_WB_B[:done], found.frame, found.scene.flight
+    supplied = None if run.supplied is None else run.supplied[row]
+    R_WB, w_WB_B, done = move(run.scene, run.t[row], gaps, run.R_WB[row], run.w_WB_B[row], supplied)
+    failure = run.failure if done == n else Diverged(float(run.t[row[done]]), "it turns too fast to be followed")
+    R_WB, w_WB_B, frame, flight = R_WB[:done], w_WB_B[:done], run.frame, run.scene.flight
     if frame and flight:
-        first = (each[row[:done]] for each in (found.R_WB, found.w_WB_B, *frame))
+        first = (samples[row[:done]] for samples in (run.R_WB, run.w_WB_B, *frame))
         frame = flight.follow(flight.fall_from(*flight.centre(*first), gaps[:done]), R_WB, w_WB_B)
     changes: dict[str, Any] = {"failure": failure, "frame": frame, "supplied": None if supplied is None else supplied[:done]}
-    samples = replace(found, t=t[:done].copy(), R_WB=R_WB, w_WB_B=w_WB_B, **changes)
-    return cut_at_failure(samples, method.conserves, method.bounds(found.scene, grid))
+    samples = replace(run, t=t[:done].copy(), R_WB=R_WB, w_WB_B=w_WB_B, **changes)
+    return cut_at_failure(samples, method.conserves, method.bounds(run.scene, grid))
 
 
-def attitudes_at(found: Trajectory, t: Array) -> Array:
+def attitudes_at(run: Trajectory, t: Array) -> Array:
     """Return the attitudes (n, 3, 3) of a run at increasing times t (n,), s, which can be a little later than its last sample.
 
     Each is the state of the sample before it, moved forward by integration; a spline through the samples is less accurate.
     From the time at which a state cannot be moved, they are nan.
     """
-    row = np.clip(np.searchsorted(found.t, t * (1 + ROUNDING), side="right") - 1, 0, None)
-    gaps = t - found.t[row]
+    row = np.clip(np.searchsorted(run.t, t * (1 + ROUNDING), side="right") - 1, 0, None)
+    gaps = t - run.t[row]
     gaps[np.abs(gaps) <= ROUNDING * t] = 0.0
-    R_WB, _, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
+    R_WB, _, done = move(run.scene, run.t[row], gaps, run.R_WB[row], run.w_WB_B[row])
     R_WB[done:] = np.nan
     return R_WB
 

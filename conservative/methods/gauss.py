@@ -33,13 +33,13 @@ class Gauss(Method):
     In the body momentum L and the vertical gamma = R' e_z (for free bodies, the direction of the world momentum) the motion is
     a closed system whose energy and momenta are quadratic. Gauss collocation conserves them (Hairer, Lubich & Wanner, Geometric
     Numerical Integration, IV.2.1). The attitude consists of gamma and an angle about the vertical, which is a quadrature; see
-    `kernels/gauss.py`. One stage is the implicit midpoint rule for L and gamma; the attitude is not that of the midpoint rule.
+    `kernels/gauss.py`. One stage is the implicit midpoint rule for L and gamma; the attitude is different.
 
     In the frame "body", steps have to resolve the rotation of a rod about its axis. "auto" leaves it out if the body is
     symmetric.
 
     The method is symmetric in time, so the attitude error of a regular motion grows linearly. The errors of `Taylor` and
-    `Projected` grow quadratically, except those of `Taylor` on free bodies and symmetric tops, whose integrals it restores.
+    `Projected` grow quadratically, except `Taylor`'s on free bodies and symmetric tops, whose integrals it restores.
     The stages are solved to round-off, because stages with larger residuals are not symmetric.
 
     Steps of several radians, for which the iteration does not converge, fail with `NotConverged`.

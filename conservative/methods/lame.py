@@ -135,7 +135,7 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
         J1, J3, kappa, L0 = J1 / units, J3 / units, kappa / units * time * time, L0 / units[:, None] * time
         kinetic = (L0[:, 0] ** 2 + L0[:, 1] ** 2) / J1 + L0[:, 2] ** 2 / J3
         slow = h * np.sqrt((kinetic + 2 * np.abs(kappa)) / np.minimum(J1, J3)) <= MOST_RADIANS  # as in `bound_rate`
-    places, J1, J3, kappa, q0, L0, R_BP = (each[slow] for each in (places, J1, J3, kappa, q0, L0, R_BP))
+    places, J1, J3, kappa, q0, L0, R_BP = (column[slow] for column in (places, J1, J3, kappa, q0, L0, R_BP))
     k, s = len(places), grid.n_samples
     if not k:
         return None
@@ -144,7 +144,7 @@ def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     kernel.prepare_lanes(J1, kappa, q0, L0, h, table)
     # Tops with equal numbers of parts per step are neighbours, so that few lanes wait.
     order = np.argsort(table[kernel.PARTS, :k], kind="stable")
-    places, J1, J3, q0, L0, R_BP = (each[order] for each in (places, J1, J3, q0, L0, R_BP))
+    places, J1, J3, q0, L0, R_BP = (column[order] for column in (places, J1, J3, q0, L0, R_BP))
     table[:, :k] = table[:, order]
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = q0, L0
@@ -179,11 +179,11 @@ def find_tops(method: Lame, bodies: Batch) -> tuple[Any, ...] | None:
         kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
         q, L = to_quaternion(bodies.R_WB0 @ R_BP), into_axes(bodies.w_WB_B0, R_BP) * (J1, J1, J3)
         return np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP
-    found = []
+    tops = []
     for i in range(n):
         scene = bodies.take(i)
         if method.unsupported(scene) is None:
             axes, J1, J3 = slow_axes(scene)
             start = start_along(scene, axes, np.array((J1, J1, J3)))
-            found.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
-    return tuple(np.array(column) for column in zip(*found, strict=True)) if found else None
+            tops.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
+    return tuple(np.array(column) for column in zip(*tops, strict=True)) if tops else None

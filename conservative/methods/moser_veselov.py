@@ -135,10 +135,10 @@ def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | 
     body = bodies.scene.body  # one row of moments and axes if all bodies share them
     moments, R_BP = (body.moments[None], body.R_BP[None]) if bodies.inertia is None else bodies.principal
     # Kernels are compiled for contiguous and writable arrays.
-    given = (np.require(each, np.float64, ("C", "W")) for each in (R_BP, bodies.R_WB0, bodies.w_WB_B0))
+    arrays = (np.require(array, np.float64, ("C", "W")) for array in (R_BP, bodies.R_WB0, bodies.w_WB_B0))
     moments = moments / find_units_of_moments(moments)[:, None]
     try:
-        kernel.prepare_lanes(moments, *given, time, grid.dt / time, method.order or 0, limits, table, start)
+        kernel.prepare_lanes(moments, *arrays, time, grid.dt / time, method.order or 0, limits, table, start)
     except (ArithmeticError, ValueError):  # without compilation only; compiled code returns nan for a body without a step
         return None
     finished = table[kernel.FINISHED, :n] == 1

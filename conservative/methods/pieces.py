@@ -1,7 +1,7 @@
 """Steps that end where a load is not smooth: at its break points a step is divided, and each part sees one side of a jump.
 
 A run consists of pieces between break points: whole steps, and parts of a step before, between and after points. Each is a run
-of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay those of the grid: a
+of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay on the grid: a
 piece says whether its steps are whole, and which samples it fills, because a part can be as long as a step and one step too.
 
 A part of a step is divided into more steps, the shorter the steps of the grid are. Otherwise runs with different steps would be
@@ -94,7 +94,7 @@ def _split(first: int, last: int, every: int) -> list[int]:
         return []
     begin = min(last, -(-first // every) * every) - first
     whole = (last - first - begin) // every * every
-    return [each for each in (begin, whole, last - first - begin - whole) if each > 0]
+    return [count for count in (begin, whole, last - first - begin - whole) if count > 0]
 
 
 def march_pieces(
@@ -107,7 +107,7 @@ def march_pieces(
     q: Array,
     L: Array,
 ) -> tuple[int, int, int, int | None, float, bool]:
-    """Take the steps of all pieces as `enter` of a kernel takes those of a run, and fill the samples q and L."""
+    """Take the steps of all pieces as `enter` of a kernel takes the steps of a run, and fill the samples q and L."""
     state, supplied, ends = (model.q, model.L), np.zeros(4), (np.empty((2, 4)), np.empty((2, 7)))
     stages, corrections, evaluations, size = 0, 0, None, 0.0
     q[0], L[0, :3], L[0, 3:] = model.q, model.L, 0.0
@@ -115,14 +115,14 @@ def march_pieces(
         start = model._replace(q=state[0], L=state[1], field=model.field._replace(clock=(t, *window)))
         # A kernel also writes its start, which is a sample only if several follow at equal distances.
         several = len(rows) > 1
-        to_q, to_L = (each[rows.start - 1 : rows.stop] for each in (q, L)) if several else ends
+        to_q, to_L = (samples[rows.start - 1 : rows.stop] for samples in (q, L)) if several else ends
         every = n // len(rows) if several else n
-        found = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L)
-        stages, corrections, size = stages + found[1], corrections + found[2], found[4]
-        evaluations = None if found[3] is None else (evaluations or 0) + found[3]
-        to_L[: 1 + found[0] // every, 3:] += supplied
-        if found[0] < n:
-            return done + found[0] * whole, stages, corrections, evaluations, size, found[5]
+        result = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L)
+        stages, corrections, size = stages + result[1], corrections + result[2], result[4]
+        evaluations = None if result[3] is None else (evaluations or 0) + result[3]
+        to_L[: 1 + result[0] // every, 3:] += supplied
+        if result[0] < n:
+            return done + result[0] * whole, stages, corrections, evaluations, size, result[5]
         supplied = to_L[-1, 3:].copy()
         state = tuple(to_q[-1].tolist()), tuple(to_L[-1, :3].tolist())
         if len(rows) == 1:

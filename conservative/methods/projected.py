@@ -108,13 +108,13 @@ class Projected(Method):
         assert self.tolerance is not None
         first = t[0] == 0
         times = t / units.time if first else np.append(0.0, t / units.time)
-        found = trajectory_of(other, label, start, walk(other, model, find, self.tolerance, times))
-        found = found if units is SI else units.restore(found, scene, Grid(grid.dt, len(times)))
-        kept = slice(0 if first else 1, len(found))
-        supplied = None if found.supplied is None else found.supplied[kept]
-        samples: dict[str, Any] = {"t": t[: len(found.t[kept])].copy(), "R_WB": found.R_WB[kept], "w_WB_B": found.w_WB_B[kept]}
-        found = replace(found, scene=scene, supplied=supplied, **samples)
-        return cut_at_failure(found, self.conserves, self.bounds(scene, grid))
+        run = trajectory_of(other, label, start, walk(other, model, find, self.tolerance, times))
+        run = run if units is SI else units.restore(run, scene, Grid(grid.dt, len(times)))
+        kept = slice(0 if first else 1, len(run))
+        supplied = None if run.supplied is None else run.supplied[kept]
+        samples: dict[str, Any] = {"t": t[: len(run.t[kept])].copy(), "R_WB": run.R_WB[kept], "w_WB_B": run.w_WB_B[kept]}
+        run = replace(run, scene=scene, supplied=supplied, **samples)
+        return cut_at_failure(run, self.conserves, self.bounds(scene, grid))
 
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:

@@ -6,7 +6,7 @@ next, with a shorter step, and the search ends when that candidate already has a
 2 is not refined to 1e-9 if a method of order 8 has already reached it, and most candidates are never run. (Best-first search:
 P. E. Hart, N. J. Nilsson and B. Raphael, 1968.)
 
-Fixed steps are given up as soon as those of one candidate show that the motion is not smooth, or when steps as short as a trial
+Fixed steps are given up as soon as one candidate's steps show that the motion is not smooth, or when steps as short as a trial
 allows show no order: an adaptive method follows. It is not tried on noise of time, which no step resolves.
 
 The chosen setting is then refined over the whole duration (`refine_until`), by its step or its tolerance. `recommend` does the
@@ -198,7 +198,8 @@ def find_cheapest(
         if running[i].sensitivity > error:  # no step of any method helps
             return running[i].method, running[i].attempts[-1][0]
         spent += 1.5 * running[i].work + TRIAL
-        cheapest = min((each for each in running if each.reached), key=lambda each: each.work, default=None)
+        done = [candidate for candidate in running if candidate.reached]
+        cheapest = min(done, key=lambda candidate: candidate.work, default=None)
         if cheapest and spent > cheapest.work * cheapest.runs:
             return cheapest.method, cheapest.dt
 
@@ -248,12 +249,12 @@ def predict_step(method: Method, error: float, rate: float) -> float:
 
 def most_promising(running: Sequence[Candidate]) -> int:
     """Return the index of the candidate with the least expected work; at the very first among settings of the first rank."""
-    if not any(each.attempts for each in running):
-        first = [each for each in running if each.method.family == running[0].method.family]
-        return running.index(min(first, key=lambda each: each.prior_work))
+    if not any(candidate.attempts for candidate in running):
+        first = [candidate for candidate in running if candidate.method.family == running[0].method.family]
+        return running.index(min(first, key=lambda candidate: candidate.prior_work))
     # The fastest rotation that the energy allows may be far above the actual one. Candidates that have reached the error
     # show by how much, and the priors of the others are scaled to be lower bounds.
-    ratios = (each.work / each.prior_work for each in running if each.reached and each.prior_work > 0)
+    ratios = (candidate.work / candidate.prior_work for candidate in running if candidate.reached and candidate.prior_work > 0)
     scale = min(ratios, default=1.0) / LENIENCY
     return min(range(len(running)), key=lambda i: running[i].expected_work(scale))
 
@@ -265,7 +266,9 @@ def candidates(scene: Scene, exact: bool = True) -> tuple[Method, ...]:
     the settings of the first family of each group.
     """
     families = [
-        each for each in registry.list_families().values() if each.role == Role.OURS and each.method_info.rank is not None
+        family
+        for family in registry.list_families().values()
+        if family.role == Role.OURS and family.method_info.rank is not None
     ]
     chosen: dict[str, tuple[Method, ...]] = {}
     for family in sorted(families, key=lambda family: family.method_info.rank or 0):
@@ -306,7 +309,7 @@ def refine_until(
     It ends when an attempt has reached the error, when finer settings no longer help (`stops_falling` of `error`, rad), when
     `finer` returns no setting, and at `most` attempts.
     """
-    while len(tried) < most and not reached(tried[-1]) and not stops_falling([error(each) for each in tried]):
+    while len(tried) < most and not reached(tried[-1]) and not stops_falling([error(entry) for entry in tried]):
         setting = finer(tried)
         if setting is None:
             break

@@ -89,10 +89,10 @@ class Substepped(Method):
             while True:
                 if parts not in runs:
                     runs[parts] = inner.prepare(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * parts))
-                found = runs[parts]()
-                if 2 * parts > self.most or not isinstance(found.failure, NotConverged):
+                trajectory = runs[parts]()
+                if 2 * parts > self.most or not isinstance(trajectory.failure, NotConverged):
                     label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
-                    return replace(found, t=grid.t[: len(found)], label=label)
+                    return replace(trajectory, t=grid.t[: len(trajectory)], label=label)
                 parts *= 2
 
         return run

@@ -149,7 +149,7 @@ class Rattle(Splitting):
 class LieVariational(Rattle):
     """The Lie-group variational integrator with the potential in the middle of the step; implicit, symplectic, order 2.
 
-    The discrete Lagrangian has the kinetic energy of Moser & Veselov (1991), as that of Lee, Leok & McClamroch (2007), whose
+    The discrete Lagrangian has the kinetic energy of Moser & Veselov (1991), as in Lee, Leok & McClamroch (2007), whose
     trapezoidal rule gives `Rattle`. Here the potential is evaluated at the attitude after half the rotation of the step, and
     its torque T acts on both ends. With a of the length tan(angle/4) along the axis of the step's rotation:
 
@@ -184,5 +184,5 @@ def find_coefficients(method: Splitting, dt: float, exact: bool) -> Any:
         kicks = (0 * kicks[0],) * len(kicks)
     nodes = itertools.accumulate(rotations)
     return kernels("symplectic").Coefficients(
-        *(np.array([float(x) * dt for x in each]) for each in (rotations, kicks, nodes)), dt
+        *(np.array([float(x) * dt for x in parts]) for parts in (rotations, kicks, nodes)), dt
     )

@@ -62,7 +62,7 @@ class Taylor(Method):
     them below 0.06 times the tolerance.
 
     `integrate_many` integrates several bodies at once, one per lane of a vector register, with equal steps. The results differ
-    from those of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
+    from runs of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
     after 1,000. Free bodies and symmetric tops are not reduced in lanes, so their truncation errors differ as well. With a
     tolerance, and in turning fields, bodies run one by one.
 
@@ -148,8 +148,8 @@ def turn_samples(run: KernelRun, orbit: Orbit) -> KernelRun:
     """Return a run whose attitudes are turned from the axes of an orbit to the world's."""
 
     def run_and_turn() -> Trajectory:
-        found = run()
-        return replace(found, R_WB=orbit.R_WO(found.t) @ found.R_WB)
+        trajectory = run()
+        return replace(trajectory, R_WB=orbit.R_WO(trajectory.t) @ trajectory.R_WB)
 
     turned = KernelRun(run_and_turn)
     turned.own_loop = run.own_loop

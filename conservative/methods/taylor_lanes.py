@@ -26,7 +26,7 @@ NEARLY_EQUAL = 4e-12
 def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
     """Return the run of bodies by series of an order; None if they have to run alone.
 
-    What `taylor_model` makes of one scene is made of all bodies at once, in units in which each is of order one.
+    This does for all bodies at once what `taylor_model` does for one scene. Each body has units in which it is of order one.
     """
     potential, n, s = bodies.scene.potential, len(bodies), grid.n_samples
     if bodies.scene.body.rotor_momentum is not None or not isinstance(potential, FieldPotential | None):
@@ -47,15 +47,17 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         field = field.in_units(energy_unit)
         if isinstance(field, UniformField):  # of symmetric bodies the moment is along the axis but for round-off
             field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
+    # The third of the axes D is along the field, or along the momentum of a free body. An axis that all bodies share has
+    # stride 0 and is converted once.
     R_WD = np.broadcast_to(directions(axis_W if axis_W.strides[0] else axis_W[:1]), (n, 3, 3))
     R_DP = R_WD.swapaxes(1, 2) @ bodies.R_WB0 @ R_BP
-    energy, one = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
+    energy, ones = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
     J_in_units = J / mass[:, None]
     start = kernel.Bodies(
         J=J_in_units,
         J_inverse=1 / J_in_units,
         field=field,
-        loose=np.column_stack([one, one, ~symmetric]),
+        loose=np.column_stack([ones, ones, ~symmetric]),
         scales=np.column_stack([energy, np.sqrt(2 * energy * (moments / mass[:, None]).max(axis=1))]),
         g=R_DP[:, 2],
         a=R_DP[:, 0],
@@ -63,30 +65,34 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         h=grid.dt / time,
         axes=R_WD,
         R_BP=R_BP,
-        units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
+        # The motion of a symmetric body has its first moment three times, so its third rate is J3 / J1 times the real one.
+        units=np.column_stack([ones, ones, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
     )
     motion = kernel.LaneState(start.g, start.a, L / J_in_units, np.zeros(n), np.zeros(n))
     width, like = kernels("compiler.lanes").REGISTER, (zeros_like(start), zeros_like(motion))
-    columns, motions = (stack_columns(list(flatten(each, n)), width) for each in (start, motion))
+    columns, motions = (stack_columns(list(flatten(value, n)), width) for value in (start, motion))
     m = columns.shape[1]
     spin = np.where(symmetric, spin_rate(moments[:, 0], moments[:, 2], w[:, 2] * moments[:, 2]), 0.0)
     angles = np.outer(grid.t, np.pad(spin, (0, m - n))) if symmetric.any() else np.zeros((1, m))
     turns = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    R_WB0, cost = from_quaternion(to_quaternion(bodies.R_WB0)), m * (20e-9 + 0.7e-9 * order**2)
+    # Time of a step of all bodies, s, roughly: it only decides how many steps are taken between two checks for an interrupt.
+    cost = m * (20e-9 + 0.7e-9 * order**2)
+    R_WB0 = from_quaternion(to_quaternion(bodies.R_WB0))
 
     def run() -> Block:
         ends, R_WB, w_WB_B = motions.copy(), np.empty((m, s, 3, 3)), np.empty((m, s, 3))
-        given, samples = (order, like, columns, ends, turns), (R_WB.reshape(-1), w_WB_B.reshape(-1))
+        inputs, samples = (order, like, columns, ends, turns), (R_WB.reshape(-1), w_WB_B.reshape(-1))
         take_pieces(
-            grid.n_steps, cost, lambda done, last: kernel.enter_many(*given, done, last, grid.n_steps, grid.every, *samples)
+            grid.n_steps, cost, lambda done, last: kernel.enter_many(*inputs, done, last, grid.n_steps, grid.every, *samples)
         )
         R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
+        failed, defects = ends[-2, :n], ends[-1, :n]  # the last rows of `LaneState`: the step that failed, or 0, and its defect
         failures: dict[int, IntegrationFailed] = {}
-        for i in np.flatnonzero(ends[-2, :n]).tolist():
-            done = int(ends[-2, i]) - 1
-            failures[i] = NotConverged(done + 1, done * grid.dt, float(ends[-1, i]), kernel.FAILURE)
+        for i in np.flatnonzero(failed).tolist():
+            done = int(failed[i]) - 1
+            failures[i] = NotConverged(done + 1, done * grid.dt, float(defects[i]), kernel.FAILURE)
             R_WB[i, grid.count_samples(done) :], w_WB_B[i, grid.count_samples(done) :] = np.nan, np.nan
-        return Block(R_WB[:n], w_WB_B[:n], ends[-2, :n] == 0, failures)
+        return Block(R_WB[:n], w_WB_B[:n], failed == 0, failures)
 
     return run
 
@@ -94,19 +100,20 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
 def find_frames(bodies: Batch) -> tuple[Array, Array, Array, Any]:
     """Return the axes in which bodies are integrated: (moments, J, R_BP, symmetric).
 
-    Moments (n, 3), kg m^2, are along these axes, and rotations R_BP (n, 3, 3) take them to the body's. A body that is symmetric
-    together with its field (n,) is described in the frame that does not spin, so that its motion has the moments J (n, 3), J1
-    three times. Bodies that may be symmetric are examined one by one, unless all are the same.
+    Moments (n, 3), kg m^2, are along these axes, and rotations R_BP (n, 3, 3) take them to body axes. `symmetric` (n,) is true
+    for a body that is symmetric together with its field. It is described in the frame that does not spin, so that its motion
+    has the moments J (n, 3): J1 three times. Bodies that may be symmetric are examined one by one, unless all are the same.
     """
-    moments, R_BP = (np.array(each) for each in bodies.principal)
+    moments, R_BP = (np.array(array) for array in bodies.principal)
     J, symmetric = moments.copy(), np.zeros(len(bodies), bool)
     gaps = np.abs(moments - np.roll(moments, 1, axis=1)).min(axis=1)
     near = np.flatnonzero(gaps <= NEARLY_EQUAL * moments.max(axis=1))
     alike = bodies.inertia is None and not bodies.parameters
-    for part in [near] if alike and len(near) else near[:, None]:
+    for part in [near] if alike and len(near) else near[:, None]:  # all of them, or one body at a time
         i = int(part[0])
         axis_B = bodies.take(i).symmetry_axis_B
         if axis_B is not None:
+            # The moment about the axis of symmetry last. The others differ by round-off at most.
             x, y, J3 = np.roll(moments[i], 2 - int(np.argmax(np.abs(axis_B @ R_BP[i]))))
             J1 = (x + y) / 2
             symmetric[part], J[part], moments[part], R_BP[part] = True, J1, (J1, J1, J3), axes_about(axis_B)
@@ -114,7 +121,7 @@ def find_frames(bodies: Batch) -> tuple[Array, Array, Array, Any]:
 
 
 def directions(axes: Array) -> Array:
-    """Return rotations (n, 3, 3) whose third columns point along vectors (n, 3): those of `axes_about`; along e_z for 0."""
+    """Return the rotations (n, 3, 3) of `axes_about` for vectors (n, 3): third columns along them, along e_z for a vector 0."""
     sizes = np.linalg.norm(axes, axis=1)[:, None]
     third = np.where(sizes > 0, axes, (0.0, 0.0, 1.0)) / np.where(sizes > 0, sizes, 1.0)
     first = np.cross(np.eye(3)[(np.argmax(np.abs(third), axis=1) + 2) % 3], third)
@@ -132,7 +139,7 @@ def flatten(value: Any, n: int) -> Iterator[Array]:
 
 
 def zeros_like(value: Any) -> Any:
-    """Return the tuple of tuples that arrays (n, ...) in a tuple of tuples are for one body, of zeros."""
+    """Return zeros in the arrangement of one body, for a tuple of tuples of arrays (n, ...)."""
     if isinstance(value, tuple):
         return type(value)(*map(zeros_like, value))
     return to_tuples(np.zeros(np.shape(value)[1:]))

@@ -37,12 +37,12 @@ def find_model(scene: Scene, reduced: bool) -> tuple[PrincipalStart, Any]:
         shift = 2 - int(np.argmax(J) if L @ (L / J) * np.median(J) < L @ L else np.argmin(J))
         start = start_along(scene, np.roll(scene.body.R_BP, shift, axis=1), np.roll(scene.body.moments, shift))
     R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
-    found = None
+    reduction = None
     if reduced and free and momentum > 0 and not rotor:
-        found = reduce_free(start, R_DP)
+        reduction = reduce_free(start, R_DP)
     elif reduced and isinstance(start.field, UniformField) and loose[2] == 0:
-        found = reduce_top(start, R_DP)
-    field, *rows = found or (kernel.Free(momentum) if free else start.field, triple(R_DP[2]), triple(R_DP[0]))
+        reduction = reduce_top(start, R_DP)
+    field, *rows = reduction or (kernel.Free(momentum) if free else start.field, triple(R_DP[2]), triple(R_DP[0]))
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
     return start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L, rotor)
 

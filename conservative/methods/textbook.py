@@ -28,7 +28,7 @@ _IN_WORLD, _AXIAL = frozenset(MOMENTA), frozenset({AXIAL_MOMENTUM})
 
 
 class Formula(NamedTuple):
-    """What defines a scheme: its title in tables, its order, and the tableau if it is a Runge-Kutta method.
+    """The definition of a scheme: its title in tables, its order, and the tableau if it is a Runge-Kutta method.
 
     `kernel` is the name of its number in `conservative.kernels.textbook`, and `conserves` is as in `Method`.
     """

@@ -137,9 +137,9 @@ class Trials:
 
     def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory | None]:
         """Return the estimate of a run, with its `sensitivity` if requested, and its trajectory, or None if no run was made."""
-        known = self.known.get((method, grid))
-        if known is not None and not (sensitivity and known.sensitivity is None):
-            return known, self.last[method, grid].fine if (method, grid) in self.last else None
+        cached = self.known.get((method, grid))
+        if cached is not None and not (sensitivity and cached.sensitivity is None):
+            return cached, self.last[method, grid].fine if (method, grid) in self.last else None
         if (method, grid) not in self.last:
             self.last.clear()
             self.observe(method, grid)
@@ -172,8 +172,8 @@ def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None
 
     Nothing is cached for a scene that cannot be followed (`Scene.key`).
     """
-    known = {} if (identity := scene.identity).unknown else recall(identity.text)
-    return Trials(scene, known, (lambda method, grid: None) if progress is None else throttle(progress))
+    estimates = {} if (identity := scene.identity).unknown else recall(identity.text)
+    return Trials(scene, estimates, (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)
@@ -332,7 +332,9 @@ def nearby_scene(scene: Scene, by: float = ROUNDED) -> Scene:
     body, w = scene.body, scene.w_WB_B0
     diagonal = np.array_equal(body.R_BP, np.eye(3))
     sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
-    equal = [_SIGNS[0][int(np.argmax(body.moments == moment))] for moment in body.moments]  # such as those of a rod stay equal
+    equal = [
+        _SIGNS[0][int(np.argmax(body.moments == moment))] for moment in body.moments
+    ]  # equal moments stay equal, such as a rod's
     signs = np.diag(equal) if diagonal else _AXES_TOO
     moved = body.R_BP @ (by * sizes * signs) @ body.R_BP.T
     return replace_unchecked(

@@ -76,20 +76,20 @@ class Units:
             flight=flight,
         )
 
-    def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
+    def restore(self, trajectory: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
         """Convert a trajectory from these units to SI units; `scene` and `grid` are in SI units."""
-        failure = found.failure
+        failure = trajectory.failure
         if failure and "time" in vars(failure):
             values = {name: value for name, value in vars(failure).items() if name != "outcome"}
             failure = type(failure)(**values | {"time": values["time"] * self.time})
-        w_WB_B = found.w_WB_B / self.time
-        supplied = None if found.supplied is None else found.supplied * self.supply
-        frame = found.frame and (found.frame[0], found.frame[1] / self.time)
-        control = found.control
+        w_WB_B = trajectory.w_WB_B / self.time
+        supplied = None if trajectory.supplied is None else trajectory.supplied * self.supply
+        frame = trajectory.frame and (trajectory.frame[0], trajectory.frame[1] / self.time)
+        control = trajectory.control
         if control is not None and control.rough is not None:
             control = control._replace(rough=control.rough * self.time)
         changes: dict[str, Any] = {"w_WB_B": w_WB_B, "failure": failure, "supplied": supplied, "frame": frame}
-        return replace(found, scene=scene, t=grid.t[: len(found)], control=control, **changes)
+        return replace(trajectory, scene=scene, t=grid.t[: len(trajectory)], control=control, **changes)
 
 
 SI = Units(1.0, 1.0)
@@ -117,7 +117,7 @@ def find_units_of_bodies(moments: Array, energy: Array, dt: float) -> list[Array
     moment, step = np.frexp(moments.max(axis=1))[1], int(np.frexp(dt)[1])
     rate = (np.frexp(energy)[1] - moment) // 2
     time = np.where(energy > 0, np.minimum(-rate, step - SHORTEST), step)
-    return [np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)]
+    return [np.ldexp(1.0, COARSE * np.trunc(exponent / COARSE).astype(int)) for exponent in (moment, time)]
 
 
 def convert_scene(scene: Scene, units: Units) -> Scene:

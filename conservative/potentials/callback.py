@@ -31,8 +31,8 @@ class Callback:
     def __call__(self, what: int, address: int) -> None:
         buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
-        known, outputs = getattr(self.last, "pair", (b"", buffer))
-        if inputs != known:  # residual and tangent of one iteration need the same
+        last_inputs, outputs = getattr(self.last, "pair", (b"", buffer))
+        if inputs != last_inputs:  # residual and tangent of one iteration need the same
             functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping, _wheel)
             with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
                 outputs = functions[what](self.potential, buffer[:9].reshape(3, 3).copy(), buffer[9:N_INPUTS].copy())
@@ -52,8 +52,8 @@ def _energy(potential: Any, R_BP: Array, state: Array) -> Array:
 
 def _torques(torque: Any, R_BP: Array, state: Array) -> Array:
     """Return the torque in body and in world axes, one of which is 0."""
-    found = _value(torque, R_BP, state)
-    return np.concatenate([found @ R_BP, np.zeros(3)] if torque.frame == "body" else [np.zeros(3), found])
+    value = _value(torque, R_BP, state)
+    return np.concatenate([value @ R_BP, np.zeros(3)] if torque.frame == "body" else [np.zeros(3), value])
 
 
 def _damping(damping: Any, R_BP: Array, state: Array) -> Array:
@@ -84,8 +84,8 @@ def _finite_torque(potential: Any, R_BP: Array, state: Array) -> Array:
         R_1 = R_0 @ R_BP @ cayley(2 * a) @ R_BP.T
         return moment(R_0, (R_0 + R_1) / 2, potential.discrete_gradient(V_0, R_0, R_1)) @ R_BP
 
-    found = torque(a)
-    return np.concatenate([found, _derivative(torque, a, found).T.ravel()])
+    T = torque(a)
+    return np.concatenate([T, _derivative(torque, a, T).T.ravel()])
 
 
 def _finite_derivative(potential: Any, R_BP: Array, state: Array) -> Array:
@@ -97,8 +97,8 @@ def _finite_derivative(potential: Any, R_BP: Array, state: Array) -> Array:
         R_1 = q_1.reshape(3, 3).T @ R_BP.T
         return (potential.discrete_gradient(V_0, R_0, R_1) @ R_BP).T.ravel()
 
-    found = V_star(state[9:])
-    return np.concatenate([found, _derivative(V_star, state[9:], found).ravel()])
+    V_star_1 = V_star(state[9:])
+    return np.concatenate([V_star_1, _derivative(V_star, state[9:], V_star_1).ravel()])
 
 
 def _attitude(R_BP: Array, state: Array) -> Array:

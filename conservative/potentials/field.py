@@ -63,7 +63,7 @@ class FieldPotential(ABC):
     def _fill(self, parameters: Mapping[str, Array], n: int) -> list[Array]:
         own = ((name, np.asarray(getattr(self, name), dtype=float)) for name in self.NUMBERS)
         values = (parameters.get(name, np.broadcast_to(value, (n, *value.shape))) for name, value in own)
-        return [np.asarray(each, dtype=float) for each in values]
+        return [np.asarray(value, dtype=float) for value in values]
 
     def _field(self, R_BP: Array | None = None) -> Any:
         return self.build_field(R_BP, *(getattr(self, name) for name in self.NUMBERS))

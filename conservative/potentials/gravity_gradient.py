@@ -35,11 +35,11 @@ class GradientField(NamedTuple):
 
     def finite_torque(self, q: Any, a: Any) -> Any:
         """Return T = e x (M G ubar) and its derivative. M changes the product by dm; u, evaluated at -a, changes by -du."""
-        e = in_body(q, self.e)
+        e = in_body(q, self.e)  # at the start of the step; the mean over the step is M' e, and M' is M at -a
         u, du = halfway(scale(-1.0, a), e)
         m, dm = halfway(a, apply(self.rows, u))
         changes = (halfway(a, apply(self.rows, scale(-1.0, column)))[0] for column in du)
-        return cross(e, m), tuple(cross(e, add(*each)) for each in zip(dm, changes, strict=True))
+        return cross(e, m), tuple(cross(e, add(*column)) for column in zip(dm, changes, strict=True))
 
     def finite_derivative(self, q0: Any, q1: Any) -> Any:
         """Return e and G ubar."""
@@ -51,7 +51,11 @@ class GradientField(NamedTuple):
         return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return the rows of two matrices that map (r, s, g) to J^-1 u in the arrangements r and s, with u = G g."""
+        """Return six rows, from which `series` forms u = G g in two arrangements, with component j divided by J_j.
+
+        The arrangements of a vector v are v_r = (v2, v3, v1) and v_s = (v3, v1, v2). The first three rows times g_r, g_s and g,
+        component by component, add up to u_r, and the last three to u_s.
+        """
         x, y, z = self.rows
         of_r = (y[1], z[2], x[0]), (y[2], z[0], x[1]), (y[0], z[1], x[2])
         of_s = (z[1], x[2], y[0]), (z[2], x[0], y[1]), (z[0], x[1], y[2])
@@ -66,12 +70,12 @@ class GradientField(NamedTuple):
         """Return the recurrence of J^-1 (g x u)."""
         rows = [series.vector(*row) for row in constants]
         by_r, by_s, by_g = zip(rows[:3], rows[3:], strict=True)
-        turned = series.history(), series.history()
+        turned = series.history(), series.history()  # J^-1 u_r and J^-1 u_s
 
         def accelerate(c: Any, n: Any) -> Any:
             for k, u in enumerate(turned):
                 u.push(fuse(by_s[k], c[n, 1], fuse(by_r[k], c[n, 0], by_g[k] * c.newest[0])))
-            (r, s), (g_r, g_s) = turned, c.turned(0)
+            (r, s), (g_r, g_s) = turned, c.turned(0)  # g x u = g_r u_s - g_s u_r
             return series.convolve(n, 0, n, ((s, g_r), (r, g_s)))[0]
 
         return accelerate
@@ -108,7 +112,7 @@ class GravityGradient(FieldPotential):
     rate
         sqrt(G M / r^3), rad/s, positive: the rate of a circular orbit at the distance r.
     inertia
-        That of the body: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
+        Inertia of the body: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
     direction_W
         Direction (3,) of the centre, world axes; any length above 0.
 
@@ -142,7 +146,8 @@ class GravityGradient(FieldPotential):
     def build_field(R_BP: Array | None, rate: Any, inertia: Any, direction_W: Any) -> GradientField:
         """Return the field in axes R_BP."""
         turned = inertia if R_BP is None else np.swapaxes(R_BP, -1, -2) @ inertia @ R_BP
-        # A matrix that is not symmetric has work in a closed path, and an element below round-off acts in some sums only.
+        # A matrix that is not symmetric would do work on a closed path. An element below round-off would count in some sums and
+        # vanish in others.
         symmetric = (turned + np.swapaxes(turned, -1, -2)) / 2
         least = 16 * np.finfo(float).eps * np.abs(symmetric).max(axis=(-1, -2), keepdims=True)
         symmetric = np.where(np.abs(symmetric) < least, 0.0, symmetric)

@@ -1,6 +1,6 @@
 """Torques, damping and motors of rotors, which may depend on time: momenta obey balances with their impulse, energy with work.
 
-The discrete work and impulse are those of the load term of the paper's (22) to (27) (DERIVATION.md, section 14).
+The discrete work and impulse belong to the load term of the paper's (22) to (27) (DERIVATION.md, section 14).
 
 Steps end where a load is not smooth, and a load is evaluated on one side of such a time: methods pass the `Window` between two
 of them, and a table is continued beyond it by its last segment.
@@ -75,7 +75,7 @@ class Loaded(NamedTuple):
         return self._replace(field=field, call=call, body=body, world=world, damping=damping, resistance=resistance)
 
     def at_step(self, t: Any, h: Any) -> Any:
-        """Return the field for a step of length h from t, both s. The torque is that of the midpoint."""
+        """Return the field for a step of length h from t, both s. The torque is the torque of the midpoint."""
         return self.at_time(t + 0.5 * h)._replace(over=2.0 / h)
 
     def wheel(self, t: Any) -> Any:
@@ -135,7 +135,7 @@ class OfTime(PickledByFields):
     breaks: Array
     name: ClassVar[str]
     shape: ClassVar[tuple[int, ...]]
-    one: ClassVar[str]
+    one_value: ClassVar[str]
     may_jump: ClassVar[bool] = True
     origin: ClassVar[tuple[OfTime, float] | None] = None
     """The load whose function this one calls, and the time in it, s, that is 1 here; None for a function of a user."""
@@ -155,13 +155,13 @@ class OfTime(PickledByFields):
             if (bad := (gaps < 0) | ((gaps == 0) & (np.append(1, gaps[:-1]) == 0))).any():
                 i = int(np.argmax(bad)) + 1
                 raise BadInput("times", f"{times[i]:.17g} after {times[i - 1]:.17g}, at index {i}", _TIMES)
-            allowed = f"an array ({len(times)}{columns}): {self.one} for each time"
+            allowed = f"an array ({len(times)}{columns}): {self.one_value} for each time"
             value = read_only(times), finite_array("values", value[1], ((len(times), *self.shape),), allowed)
             if (fault := next(filter(None, map(self.fault, value[1])), None)) is not None:
                 raise BadInput("values", fault, allowed)
             times = find_corners(*value)
         elif not callable(value):
-            allowed = f"{self.one}; a function of time, s, that returns it; or a table (times (n,), values (n{columns}))"
+            allowed = f"{self.one_value}; a function of time, s, that returns it; or a table (times (n,), values (n{columns}))"
             value = finite_array(name, cast(ArrayLike, value), (self.shape,), allowed)
             if fault := self.fault(value):
                 raise BadInput(name, fault, allowed)
@@ -213,16 +213,16 @@ class OfTime(PickledByFields):
                 return np.asarray(values[0] if i == 0 else values[-1])
             return np.asarray(values[i - 1] + (t - times[i - 1]) / (times[i] - times[i - 1]) * (values[i] - values[i - 1]))
         try:
-            found = self.value(inside, np.eye(3) if R_WB is None else R_WB) if self.of_attitude else self.value(inside)
+            result = self.value(inside, np.eye(3) if R_WB is None else R_WB) if self.of_attitude else self.value(inside)
         except Exception as error:
             if self._lost(R_WB):
                 return np.full(self.shape, math.nan)
-            raise TorqueFailed(t, f"a function that raises {error!r}", self.name, self.one) from error
-        value = real_array(found)
+            raise TorqueFailed(t, f"a function that raises {error!r}", self.name, self.one_value) from error
+        value = real_array(result)
         if value is None or value.shape != self.shape or not np.isfinite(value).all() or self.fault(value):
             if self._lost(R_WB):
                 return np.full(self.shape, math.nan)
-            raise TorqueFailed(t, f"a function that returns {describe(found)}", self.name, self.one)
+            raise TorqueFailed(t, f"a function that returns {describe(result)}", self.name, self.one_value)
         return value
 
     def _lost(self, R_WB: Array | None) -> bool:
@@ -240,7 +240,7 @@ class OfTime(PickledByFields):
         if isinstance(self.value, tuple):
             self.require_times(t_end)
             times = np.append(self.value[0][(self.value[0] > 0) & (self.value[0] < t_end)], (0.0, t_end))
-        sides = [math.nextafter(each, side) for each in self.breaks if each <= t_end for side in (-math.inf, math.inf)]
+        sides = [math.nextafter(time, side) for time in self.breaks if time <= t_end for side in (-math.inf, math.inf)]
         try:
             values = [self.at(t, R_WB) for t in sorted({*times.tolist(), *sides})]
             again = values[0] if self.constant else self.at(float(times.min()), R_WB)
@@ -253,7 +253,7 @@ class OfTime(PickledByFields):
 
     @property
     def end(self) -> float:
-        """Last time, s, at which it has a value: that of a table, otherwise infinite."""
+        """Last time, s, at which it has a value: the end of a table, otherwise infinite."""
         return float(self.value[0][-1]) if isinstance(self.value, tuple) else math.inf
 
     def require_times(self, t_end: float) -> None:
@@ -316,7 +316,7 @@ class Torque(OfTime):
     frame: str
     name: ClassVar[str] = "torque"
     shape: ClassVar[tuple[int, ...]] = (3,)
-    one: ClassVar[str] = "three finite numbers (3,), N m"
+    one_value: ClassVar[str] = "three finite numbers (3,), N m"
 
     def __init__(self, value: Given, frame: str = "body", breaks: ArrayLike = ()) -> None:
         choice("frame", frame, FRAMES)
@@ -334,7 +334,7 @@ class Factor(OfTime):
 
     name: ClassVar[str] = "factor"
     shape: ClassVar[tuple[int, ...]] = ()
-    one: ClassVar[str] = "a finite number of 0 or more"
+    one_value: ClassVar[str] = "a finite number of 0 or more"
 
     @classmethod
     def fault(cls, value: Array) -> str | None:
@@ -346,7 +346,7 @@ class Resistance(OfTime):
 
     name: ClassVar[str] = "matrix"
     shape: ClassVar[tuple[int, ...]] = (3, 3)
-    one: ClassVar[str] = "a matrix (3, 3), N m s, whose symmetric part (D + D')/2 has no negative eigenvalue"
+    one_value: ClassVar[str] = "a matrix (3, 3), N m s, whose symmetric part (D + D')/2 has no negative eigenvalue"
 
     @classmethod
     def fault(cls, value: Array) -> str | None:
@@ -360,7 +360,7 @@ class RotorMomentum(OfTime):
     name: ClassVar[str] = "rotor_momentum"
     may_jump: ClassVar[bool] = False
     shape: ClassVar[tuple[int, ...]] = (3,)
-    one: ClassVar[str] = "three finite numbers (3,), kg m^2/s"
+    one_value: ClassVar[str] = "three finite numbers (3,), kg m^2/s"
 
     def __init__(self, value: Given, breaks: ArrayLike = ()) -> None:
         super().__init__("rotor_momentum", value, breaks)

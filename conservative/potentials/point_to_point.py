@@ -5,7 +5,7 @@ V = F(s) with s = |R b - A|^2, b in body and A in world axes. s is quadratic in 
     V* = (F(s1) - F(s0)) / (s1 - s0) 2 (Rbar b - A) b'        Rbar the mean of both attitudes
 
 is an exact finite derivative once the divided difference is written without cancellation, in the sense of the paper's (21). The
-torque is that of uniform gravity, with A for the vertical and 2 F' b for the moment.
+torque is like uniform gravity's, with A for the vertical and 2 F' b for the moment.
 """
 
 from __future__ import annotations

@@ -39,22 +39,22 @@ class _OfAttitude(ABC):
         try:
             if len(t) != self.in_time:
                 raise TypeError(f"it is a function of {'attitude and time' if self.in_time else 'the attitude alone'}")
-            return self._read(self.function(R.copy(), *(each * EARLIER for each in t)))
+            return self._read(self.function(R.copy(), *(time * EARLIER for time in t)))
         except Exception as error:
             if not np.isfinite(R).all():
                 return np.full(self.shape, math.nan)[()]
             raise PotentialFailed(error) from error
 
     @abstractmethod
-    def _read(self, found: Any) -> Any:
+    def _read(self, value: Any) -> Any:
         """Check a value of the function, and return it as a float or an array of floats."""
 
     def __call__(self, R_WB: Array, *t: Array) -> Array:
         """Return the values, (...) or (..., 3, 3), in J at matrices (..., 3, 3), and times (...), s."""
         R = np.asarray(R_WB, dtype=float)
-        times = [np.broadcast_to(np.asarray(each, dtype=float), R.shape[:-2]).ravel().tolist() for each in t]
-        found = [self.at(*each) for each in zip(R.reshape(-1, 3, 3), *times, strict=True)]
-        return np.array(found).reshape((*R.shape[:-2], *self.shape))
+        times = [np.broadcast_to(np.asarray(time, dtype=float), R.shape[:-2]).ravel().tolist() for time in t]
+        values = [self.at(*arguments) for arguments in zip(R.reshape(-1, 3, 3), *times, strict=True)]
+        return np.array(values).reshape((*R.shape[:-2], *self.shape))
 
 
 class Energy(_OfAttitude):
@@ -62,12 +62,12 @@ class Energy(_OfAttitude):
 
     shape = ()
 
-    def _read(self, found: Any) -> float:
-        if type(found) is float:
-            return found
-        if isinstance(found, bool | str | bytes) or np.ndim(found):
-            raise TypeError(f"the energy is {describe(found)}, not a real number")
-        return float(found)
+    def _read(self, value: Any) -> float:
+        if type(value) is float:
+            return value
+        if isinstance(value, bool | str | bytes) or np.ndim(value):
+            raise TypeError(f"the energy is {describe(value)}, not a real number")
+        return float(value)
 
 
 class Gradient(_OfAttitude):
@@ -75,10 +75,10 @@ class Gradient(_OfAttitude):
 
     shape = (3, 3)
 
-    def _read(self, found: Any) -> Array:
-        gradient = real_array(found)
+    def _read(self, value: Any) -> Array:
+        gradient = real_array(value)
         if gradient is None or gradient.shape != (3, 3):
-            raise TypeError(f"the gradient is {describe(found)}, not a matrix (3, 3) of real numbers")
+            raise TypeError(f"the gradient is {describe(value)}, not a matrix (3, 3) of real numbers")
         return gradient
 
 

@@ -54,7 +54,7 @@ class PotentialInTime(Protocol):
     """A potential whose energy also depends on time: `Turning`, and functions declared as time-dependent.
 
     The energy is then not conserved. There is no `energy` or `gradient` of the attitude only, so it cannot be mistaken for a
-    constant field. Methods that support it take `Feature.TIME` or `Feature.TURNING`. `scale` and `kernel_field` are those of
+    constant field. Methods that support it take `Feature.TIME` or `Feature.TURNING`. `scale` and `kernel_field` are as in
     `Potential`. It may have `in_units(energy, time)`, with a unit of time, s, a power of two as well.
     """
 

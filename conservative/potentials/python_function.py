@@ -17,12 +17,16 @@ from .callback import find_address, moment
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
+"""Attitude, along no axis, at which functions are tried."""
 _LATER = 0.7, 0.07, 0.007, 0.0007
 """Times, s, at the first of which functions of time are tried that have a value there: a recording may be shorter."""
 _DIFFERENCE = 1e-5
+"""Step of the finite differences that the gradient is compared with."""
 _AGREEMENT = 1e-4
+"""Largest error of the gradient that is accepted, and torque about a symmetry axis, relative to its largest entry."""
 _AXIS = "a unit vector (3,), world axes, about which the field is symmetric"
 _ROUND_OFF = 8 * 2.0**-53
+"""Share of its terms below which the numerator of V* is only round-off."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -89,6 +93,7 @@ class FunctionPotential:
                 raise BadInput(name, describe(function), "a function of a matrix (3, 3)")
         V = energy if isinstance(energy, Energy) else Energy(energy, time_dependent)
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient, time_dependent)
+        # Without time the functions are tried once. In time, also at a later time: at t = 0 a factor of time may be 0.
         times = ((0.0,), *((t,) for t in _LATER if _has_values(V, G, t)))[:2] if time_dependent else ((),)
         for t in times:
             _check_gradient(V, G, t)
@@ -121,26 +126,26 @@ class FunctionPotential:
             gradient = gradient - np.sum(gradient * turn) / np.sum(turn * turn) * turn
             along_step = np.outer(e, e @ step)
         along, square = float(np.sum(gradient * step)), float(np.sum(along_step * step))
-        lacking = V_1 - V_0 - along
-        # The last is what rounding the attitude changes V by, which is more than V where V is small by cancellation. In a spin
-        # about the axis nothing else is lacking, and the square is 0 or round-off.
+        numerator = V_1 - V_0 - along
+        # The last part of `size` is the change of V by the rounding of the attitude. It exceeds V if the terms of V cancel. In
+        # a spin about the axis the numerator has no other part, and the square is 0 or round-off.
         size = abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())
-        if square == 0 or abs(lacking) <= _ROUND_OFF * size:
+        if square == 0 or abs(numerator) <= _ROUND_OFF * size:
             return gradient
-        return gradient + lacking / square * along_step
+        return gradient + numerator / square * along_step
 
     def in_units(self, energy: float, time: float = 1.0) -> FunctionPotential:
         """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
 
         def convert(function: Callable[..., Any]) -> Callable[..., Any]:
-            return lambda R, *t: function(R, *(each * time for each in t)) / energy
+            return lambda R, *t: function(R, *(now * time for now in t)) / energy
 
         V = Energy(convert(self.energy.at), self.time_dependent)
         G = Gradient(convert(self.gradient.at), self.time_dependent)
         return replace_unchecked(self, energy=V, gradient=G, scale=Size(self.scale() / energy))
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
+        """Return the field of kernels: the address of a callback, valid while the potential lives, and the rows of R_BP."""
         kernel, address, rows = kernels("function_field"), find_address(self), tuple(triple(row) for row in R_BP)
         return kernel.FunctionInTime(address, rows, 0.0) if self.time_dependent else kernel.Function(address, rows)
 
@@ -160,41 +165,41 @@ def _has_values(energy: Energy, gradient: Gradient, t: float) -> bool:
 
 def _check_gradient(energy: Energy, gradient: Gradient, t: Time) -> None:
     """Compare the gradient with differences of the energy at one attitude, and at a time if they depend on it."""
-    found, differences = _probe("gradient", gradient, _PROBE, *t), np.empty((3, 3))
+    dV_dR, differences = _probe("gradient", gradient, _PROBE, *t), np.empty((3, 3))
     for index in np.ndindex(3, 3):
         aside = np.zeros((3, 3))
         aside[index] = _DIFFERENCE
         ahead, behind = (float(_probe("energy", energy, _PROBE + sign * aside, *t)) for sign in (1, -1))
         differences[index] = (ahead - behind) / (2 * _DIFFERENCE)
-    off = np.abs(differences - found).max()
-    if not off <= _AGREEMENT * max(np.abs(found).max(), np.abs(differences).max()):
+    off = np.abs(differences - dV_dR).max()
+    if not off <= _AGREEMENT * max(np.abs(dV_dR).max(), np.abs(differences).max()):
         raise BadInput("gradient", f"a matrix off by {off:.3g} J from differences of the energy", "the derivative of `energy`")
 
 
 def _probe(argument: str, function: Energy | Gradient, R: Array, *t: float) -> Array:
-    """Return what a function gives at one attitude (3, 3); what it raises, and what is not finite, is bad input."""
+    """Return the value of a function at one attitude (3, 3). Raise `BadInput` if it fails, or the value is not finite."""
     allowed = "a function that gives a real number, J" if argument == "energy" else "a function that gives a matrix (3, 3), J"
     try:
-        found = function.at(R, *t)
+        value = function.at(R, *t)
     except PotentialFailed as failure:
         raise BadInput(argument, f"a function that fails: {describe(failure.__cause__)}", allowed) from failure.__cause__
-    return finite_array(argument, found, ((), (3, 3)), f"{allowed}, at every attitude")
+    return finite_array(argument, value, ((), (3, 3)), f"{allowed}, at every attitude")
 
 
 def _check_axis(axis_W: ArrayLike, gradient: Gradient, t: Time) -> Array:
-    """Return the axis, if it is one: a unit vector (3,) along which the field has no torque."""
+    """Return a symmetry axis as an array (3,). Raise `BadInput` if its length is not 1, or the field has a torque along it."""
     axis = finite_array("axis_W", axis_W, ((3,),), _AXIS)
     if abs(np.linalg.norm(axis) - 1) > ROTATION_TOLERANCE:
         raise BadInput("axis_W", describe(axis.tolist()), _AXIS)
-    found = _probe("gradient", gradient, _PROBE, *t)
-    torque, size = abs(moment(np.eye(3), _PROBE, found) @ axis), np.abs(found).max()
+    dV_dR = _probe("gradient", gradient, _PROBE, *t)
+    torque, size = abs(moment(np.eye(3), _PROBE, dV_dR) @ axis), np.abs(dV_dR).max()
     if torque > _AGREEMENT * size:
         raise BadInput("axis_W", f"{axis.tolist()}, about which the field has a torque of {torque:.3g} N m", _AXIS)
     return axis
 
 
 def _size(scale: float | Size | None, gradient: Gradient, times: tuple[Time, ...]) -> Size:
-    """Return the size of V that is given, or the largest of a few gradients at some times."""
+    """Return `scale` if it is given, otherwise the largest gradient of a few attitudes and times."""
     if scale is not None:
         value = scale.value if isinstance(scale, Size) else scale
         return Size(positive_number("scale", value, "a finite energy above 0, J"))

@@ -25,22 +25,27 @@ SCANNED = 2**16
 AGREED = 1e-3
 """Largest difference of both integrals, relative to the integral of the magnitude."""
 ATTITUDE, OTHER = (read_only(rotation_about(axis, angle)) for axis, angle in (((1.0, 2.0, 3.0), 1.0), ((-3.0, 1.0, 2.0), 2.0)))
-"""Attitude of a scan, along no axis: a torque may be 0 in symmetric ones. A corner belongs to the time if the function is not
-smooth at the `OTHER` attitude either."""
-STEEP, MOST_JUMPS = 10.0, 1000
-"""An interval may have a jump if it changes the value by so much more than a neighbour does; more jumps are noise."""
-MOST_CORNERS, LEAST_BEND, NARROW, ZOOM = 4096, 1e-10, 1e-11, 8
-"""More corners are noise. Second differences of a scan that are smaller, relative to the largest value, are no corners. Corners
-are found to a share of t_end, by intervals that are divided into so many parts."""
-CLOSER, NARROWER, WORST = 1024, 64, 8
-"""Number of parts into which an interval is divided, in so many of the worst blocks, and the ratio of the spacings at which
-second differences are compared: they fall with its square in smooth functions, with its first power at corners, not at all in
-noise."""
+"""Attitudes of a scan, along no axis: a torque may be 0 in symmetric ones. A jump or corner at `ATTITUDE` belongs to the time
+if there is one at `OTHER` as well; otherwise it belongs to the attitude."""
+STEEP = 10.0
+"""An interval may have a jump if it changes the value by so many times the change of a neighbour. The same ratio of second
+differences is for corners."""
+MOST_JUMPS, MOST_CORNERS = 1000, 4096
+"""More of them are noise."""
+LEAST_BEND = 1e-10
+"""Second differences of a scan that are smaller, relative to the largest value, are not corners."""
+NARROW, ZOOM = 1e-11, 8
+"""Corners are found to this share of t_end, by dividing an interval into so many parts again and again."""
+WORST, CLOSER = 8, 1024
+"""Noise is looked for in so many of the worst blocks, and each interval there is divided into so many parts."""
+NARROWER = 64
+"""Ratio of the two spacings at which second differences are compared. From the wide spacing to the narrow one, they fall with
+its square in a smooth function, with its first power at a corner, and not at all in noise."""
 
 
 class Smoothness(NamedTuple):
-    """Break points (n,) above 0, s; the longest step that resolves the functions, s; where longer ones differ most, s; and
-    whether no step resolves them.
+    """Break points (n,) above 0, s; the longest step that resolves the functions, s; the interval, s, in which longer steps
+    have the largest error; and whether no step resolves the functions.
     """
 
     breaks: Array
@@ -60,11 +65,11 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
     Functions of time and attitude are evaluated at `ATTITUDE`. So the result is the same for all scenes with these loads,
     such as the bodies of an ensemble, and found once.
     """
-    if all(load.origin for load in loads):  # in other units: a scan takes a second
+    if all(load.origin for load in loads):  # loads in other units: a scan takes a second, its result can be converted
         (_, unit), *_ = (load.origin for load in loads)
-        known = examine(tuple(load.origin[0] for load in loads), t_end * unit)
-        first, last = known.interval
-        return Smoothness(read_only(known.breaks / unit), known.step / unit, (first / unit, last / unit), known.noise)
+        in_s = examine(tuple(load.origin[0] for load in loads), t_end * unit)
+        first, last = in_s.interval
+        return Smoothness(read_only(in_s.breaks / unit), in_s.step / unit, (first / unit, last / unit), in_s.noise)
     step, interval, noise = math.inf, (0.0, t_end), False
     breaks = np.unique(np.concatenate([np.empty(0), *(load.breaks for load in loads)]))
     times = np.linspace(0.0, t_end, SCANNED + 1)
@@ -75,10 +80,10 @@ def examine(loads: tuple[Any, ...], t_end: float) -> Smoothness:
         except Exception:  # a table; or a function that fails, which the run reports
             continue
         other = partial(_at_attitude, load.value, OTHER) if load.of_attitude else None
-        found = _drop_near(_find_jumps(function, times, values, other), breaks, 1e-12 * t_end)
-        if found and not load.may_jump:
-            raise BadInput(load.name, f"a function that jumps at t = {found[0]:g} s", "a function without jumps")
-        breaks = np.union1d(breaks, found)
+        jumps = _drop_near(_find_jumps(function, times, values, other), breaks, 1e-12 * t_end)
+        if jumps and not load.may_jump:
+            raise BadInput(load.name, f"a function that jumps at t = {jumps[0]:g} s", "a function without jumps")
+        breaks = np.union1d(breaks, jumps)
         breaks = np.union1d(breaks, _drop_near(_find_corners(function, times, values, other), breaks, 1e-9 * t_end))
         resolved, where = _resolve(times, values, breaks)
         if resolved <= times[1] and (place := _find_noise(function, times, values, breaks)) is not None:
@@ -92,9 +97,9 @@ def _at_attitude(function: Callable[[float, Array], Array], R_WB: Array, t: floa
     return function(t, R_WB)
 
 
-def _drop_near(found: list[float], breaks: Array, distance: float) -> list[float]:
-    """Return the times, s, that are not within a distance, s, of known ones (n,), s."""
-    return [t for t in found if not len(breaks) or np.abs(breaks - t).min() > distance]
+def _drop_near(times: list[float], breaks: Array, distance: float) -> list[float]:
+    """Return the times, s, that are farther than a distance, s, from all break points (n,), s."""
+    return [t for t in times if not len(breaks) or np.abs(breaks - t).min() > distance]
 
 
 def _value(function: Callable[[float], Array], t: float) -> Array:
@@ -102,28 +107,32 @@ def _value(function: Callable[[float], Array], t: float) -> Array:
 
 
 def _find_jumps(function: Callable[[float], Array], times: Array, values: Array, other: Any) -> list[float]:
-    """Return the times of jumps, s, of a function; of one of attitude, if there is a jump at the `other` one, too."""
+    """Return the times of jumps, s, of a function of time.
+
+    A jump of a function of time and attitude counts if `other`, the function at another attitude, jumps there too.
+    """
     change = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    # The smaller change of both neighbours: next to a jump a function may be steep on one side.
     around = np.minimum(np.append(change[1], change[:-1]), np.append(change[1:], change[-2]))
     steep = np.flatnonzero(change > STEEP * around + 1e-9 * np.abs(values).max())
     jumps = []
     for i in steep.tolist() if len(steep) <= MOST_JUMPS else ():
         a, b, low, high = times[i], times[i + 1], values[i], values[i + 1]
-        while (middle := (a + b) / 2) not in (a, b):
+        while (middle := (a + b) / 2) not in (a, b):  # until no float is between them; keep the half that changes more
             value = _value(function, float(middle))
             if np.linalg.norm(value - low) > np.linalg.norm(high - value):
                 b, high = middle, value
             else:
                 a, low = middle, value
-        if np.linalg.norm(high - low) > change[i] / 4:
-            again = 1.0 if other is None else np.linalg.norm(_value(other, float(b)) - _value(other, float(a)))
-            if again > AGREED * change[i]:
+        if np.linalg.norm(high - low) > change[i] / 4:  # otherwise the function is only steep
+            again = other and np.linalg.norm(_value(other, float(b)) - _value(other, float(a)))
+            if again is None or again > AGREED * change[i]:
                 jumps.append(float(b))
     return jumps
 
 
 def _find_corners(function: Callable[[float], Array], times: Array, values: Array, other: Any) -> list[float]:
-    """Return the times, s, at which the slope of a function jumps; of one of attitude, if it does at the `other` one, too.
+    """Return the times, s, at which the slope of a function jumps. `other` is as in `_find_jumps`.
 
     A second difference across a corner is much larger than its neighbours. It is the jump of the slope times the spacing, for
     any spacing, which distinguishes a corner from noise and from what is smooth in shorter intervals.
@@ -131,20 +140,22 @@ def _find_corners(function: Callable[[float], Array], times: Array, values: Arra
     largest = float(np.abs(values).max())
     bend = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=1)  # at times[1:-1]
     left, right = np.append(0.0, bend[:-1]), np.append(bend[1:], 0.0)
+    # A corner between two times bends at both, so the next but one are compared.
     around = np.maximum(np.append((0.0, 0.0), bend[:-2]), np.append(bend[2:], (0.0, 0.0)))
     sharp = (bend > STEEP * around + LEAST_BEND * largest) & (bend >= left) & (bend > right)
     places = np.flatnonzero(sharp)
     corners = []
     for i in places.tolist() if len(places) <= MOST_CORNERS else ():
         a, b = float(times[i]), float(times[i + 2])
-        turn = float(bend[max(0, i - 1) : i + 2].sum()) / float(times[1])  # of the slope; a corner counts at two times
-        found = _narrow(function, a, b, turn, NARROW * float(times[-1]), largest)
-        if found is not None and other is not None:
+        # The change of the slope: a corner between two times contributes to the second differences at both.
+        turn = float(bend[max(0, i - 1) : i + 2].sum()) / float(times[1])
+        corner = _narrow(function, a, b, turn, NARROW * float(times[-1]), largest)
+        if corner is not None and other is not None:
             h = float(times[1]) / 4
-            again = np.linalg.norm(_value(other, found - h) - 2 * _value(other, found) + _value(other, found + h))
-            found = found if again > AGREED * turn * h else None
-        if found is not None:
-            corners.append(found)
+            again = np.linalg.norm(_value(other, corner - h) - 2 * _value(other, corner) + _value(other, corner + h))
+            corner = corner if again > AGREED * turn * h else None
+        if corner is not None:
+            corners.append(corner)
     return corners
 
 
@@ -152,7 +163,7 @@ def _narrow(function: Callable[[float], Array], a: float, b: float, turn: float,
     """Return the time of a corner between a and b, s, at which the slope changes by `turn`, to a width, s; None without one."""
     while b - a > width:
         t = np.linspace(a, b, ZOOM + 1)
-        values = np.array([_value(function, each) for each in t.tolist()])
+        values = np.array([_value(function, time) for time in t.tolist()])
         bend = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=1)
         i, spacing = int(bend.argmax()), float(t[1] - t[0])
         here = float(bend[max(0, i - 1) : i + 2].sum())
@@ -165,7 +176,7 @@ def _narrow(function: Callable[[float], Array], a: float, b: float, turn: float,
 
 
 def _resolve(times: Array, values: Array, breaks: Array) -> tuple[float, tuple[float, float]]:
-    """Return the longest block that Simpson's rule integrates, s, and the block with the largest difference of the next one."""
+    """Return the length of the longest blocks that Simpson's rule integrates, s, and the worst block of twice the length, s."""
     total, step = float(np.abs(values).mean(axis=0).max()), float(times[1])
     size, result = 2, (step, (0.0, float(times[-1])))
     while size <= SCANNED:
@@ -181,7 +192,7 @@ def _compare_blocks(times: Array, values: Array, breaks: Array, size: int) -> Ar
     """Return the difference of Simpson's rule and the sum over all times in blocks of so many intervals; 0 at breaks."""
     blocks = values[:-1].reshape(-1, size, values.shape[1])
     ends = np.concatenate([blocks[1:, 0], values[-1:]])
-    dense = blocks.mean(axis=1) + (ends - blocks[:, 0]) / (2 * size)
+    dense = blocks.mean(axis=1) + (ends - blocks[:, 0]) / (2 * size)  # the trapezoidal rule with all times
     rule = (blocks[:, 0] + 4 * blocks[:, size // 2] + ends) / 6
     off: Array = np.abs(rule - dense).max(axis=1)
     for side in ("left", "right"):  # a break point between two blocks is part of both
@@ -190,22 +201,22 @@ def _compare_blocks(times: Array, values: Array, breaks: Array, size: int) -> Ar
 
 
 def _find_noise(function: Callable[[float], Array], times: Array, values: Array, breaks: Array) -> tuple[float, float] | None:
-    """Return an interval, s, in which a function is not smooth, if it is so in most of the worst blocks; otherwise None."""
+    """Return an interval, s, in which a function is not smooth, if most of the worst blocks have one; otherwise None."""
     worst = np.argsort(-_compare_blocks(times, values, breaks, 2), kind="stable")[:WORST]
-    found = []
+    noisy = []
     for i in (2 * worst).tolist():
         a, b = float(times[i]), float(times[i + 2])
         closer = np.array([_value(function, t) for t in np.linspace(a, b, 2 * CLOSER + 1).tolist()])
         far, near = (
             float(np.linalg.norm(closer[: -2 * n] - 2 * closer[n:-n] + closer[2 * n :], axis=1).max()) for n in (NARROWER, 1)
         )
-        if near > far / (4 * NARROWER):
-            found.append((a, b))
-    return found[0] if len(found) > WORST / 2 else None
+        if near > far / (4 * NARROWER):  # far / NARROWER at a corner, far / NARROWER^2 where smooth
+            noisy.append((a, b))
+    return noisy[0] if len(noisy) > WORST / 2 else None
 
 
 class Unresolved(NamedTuple):
-    """A table that steps do not resolve: the longest step that does, s, the step that differs most, s, and its corners."""
+    """A table that steps do not resolve: the longest step that does, s, the step with the largest error, s, and its corners."""
 
     step: float
     interval: tuple[float, float]

@@ -69,12 +69,12 @@ class Orbit:
             direction_W is not perpendicular to `normal_W`; or a parameter is not finite, not positive, not an inertia, or has
             the wrong shape.
         """
-        found = GravityGradient(self.rate, inertia, direction_W)
-        nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
-        if abs(found.direction_W @ self.normal_W) > _ACROSS:
+        fixed = GravityGradient(self.rate, inertia, direction_W)
+        nearest = fixed.direction_W - fixed.direction_W @ self.normal_W * self.normal_W
+        if abs(fixed.direction_W @ self.normal_W) > _ACROSS:
             hint = f", such as {nearest.tolist()}" if np.linalg.norm(nearest) > _ACROSS else ""
             allowed = f"a direction in the plane of the orbit, at right angles to {self.normal_W.tolist()}{hint}"
-            raise BadInput("direction_W", describe(found.direction_W.tolist()), allowed)
+            raise BadInput("direction_W", describe(fixed.direction_W.tolist()), allowed)
         return Turning(GravityGradient(self.rate, inertia, nearest), self)
 
 
@@ -92,7 +92,7 @@ class Turned(NamedTuple):
         return self._replace(back=(cosine(half), *scale(-sine(half), self.normal)))
 
     def energy(self, q: Any) -> Any:
-        """Return V in J: that of the fixed field at the attitude in axes O."""
+        """Return V in J of the fixed field at the attitude in axes O."""
         return self.field.energy(product(self.back, q))
 
     def body_torque(self, q: Any) -> Any:
@@ -100,7 +100,7 @@ class Turned(NamedTuple):
         return self.field.body_torque(product(self.back, q))
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return those of the fixed field."""
+        """Return the axes of the fixed field."""
         return self.field.find_constants(J_inverse)
 
     def slope(self, constants: Any, g: Any) -> Any:

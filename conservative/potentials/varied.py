@@ -45,7 +45,7 @@ class OneByOne:
 
     def energies(self, R_WB: Array) -> Array:
         """Return V, (n, m), in J at attitudes (n, m, 3, 3)."""
-        return np.stack([each.energy(R) for each, R in zip(self.potentials, R_WB, strict=True)])
+        return np.stack([potential.energy(R) for potential, R in zip(self.potentials, R_WB, strict=True)])
 
     def scales(self) -> Array:
         """Return the size of the field, (n,), in J."""

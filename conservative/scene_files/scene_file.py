@@ -50,7 +50,7 @@ def choices() -> dict[str, dict[str, list[str]]]:
     """Return the shapes, the kinds of potential and the forms of an attitude, each with its keys."""
     potentials = {name: keys_of(build) for name, build in _POTENTIALS.items()}
     potentials["uniform_gravity"].append("g")
-    potentials["gravity_gradient"].remove("inertia")  # that of the body
+    potentials["gravity_gradient"].remove("inertia")  # the body has it
     return {
         "shape": {name: keys_of(build) for name, build in SHAPES.items()},
         "kind": potentials,
@@ -102,16 +102,16 @@ def load(path: str | Path) -> Scene:
 def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
     """Return the body, and its mass and centre of mass if the file has them."""
     sources = ("inertia", "inertia_com", "shape", *list_entries(BODY_FILES))
-    given = [key for key in table.values if key in sources]
-    if not given:
+    present = [key for key in table.values if key in sources]
+    if not present:
         table.only({*sources, "name", *_PLACEMENT, *(key for shape in SHAPES.values() for key in keys_of(shape))})
         raise table.bad("inertia", "nothing: the body is missing", "one of " + ", ".join(sources))
-    if len(given) > 1:
-        raise table.bad(given[1], f"{given[1]} and {given[0]}", "one of " + ", ".join(sources))
-    if given == ["inertia"]:
+    if len(present) > 1:
+        raise table.bad(present[1], f"{present[1]} and {present[0]}", "one of " + ", ".join(sources))
+    if present == ["inertia"]:
         table.only(("inertia",))
         return table.call(RigidBody), None
-    (kind,) = given
+    (kind,) = present
     if kind == "inertia_com":
         table.only(keys_of(MassDistribution))
         mass = table.call(MassDistribution)
@@ -153,9 +153,9 @@ def _field(top: TomlTable, body: RigidBody, mass: MassDistribution | None) -> An
 
 def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None) -> Potential:
     kind = table.choice("kind", _POTENTIALS)
-    known = {"kind", *keys_of(_POTENTIALS[kind])}
+    keys = {"kind", *keys_of(_POTENTIALS[kind])}
     if kind == "uniform_gravity":
-        table.only({*known, "g"})
+        table.only({*keys, "g"})
         if "g" not in table:
             return table.call(UniformGravity)
         if mass is None:
@@ -164,9 +164,9 @@ def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None)
             raise table.bad("g", "g and weight or com_B", "g alone, or weight and com_B")
         return table.call(mass.gravity)
     if kind == "gravity_gradient":
-        table.only(known - {"inertia"})
+        table.only(keys - {"inertia"})
         return table.call(GravityGradient, inertia=body.inertia)
-    table.only(known)
+    table.only(keys)
     return table.call(_POTENTIALS[kind])
 
 
@@ -218,11 +218,11 @@ def _attitude(table: TomlTable, key: str) -> Array:
             return rotation(key, table.value(key, "a rotation matrix (3, 3)"))
     forms = table.table(key, "one form of a rotation")
     forms.only({*_ATTITUDES, "angle"})
-    given = {"axis" if form == "angle" else form for form in forms.values}
-    if len(given) != 1:
+    used = {"axis" if form == "angle" else form for form in forms.values}
+    if len(used) != 1:
         got = " and ".join(forms.values) or "an empty table"
         raise table.bad(key, got, "a matrix, or one of: quaternion_wxyz; quaternion_xyzw; rotation_vector; axis and angle")
-    return forms.call(_ATTITUDES[given.pop()])
+    return forms.call(_ATTITUDES[used.pop()])
 
 
 def _quaternion(quaternion_wxyz: ArrayLike) -> Array:

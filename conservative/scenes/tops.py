@@ -21,7 +21,7 @@ from ..scene import Scene
 from .transforms import slow_motion, turned
 
 _HEIGHT, _DENSITY, _GRAVITY, _TILT = 0.1, 2700.0, 9.81, math.pi / 3
-"""The cone of Krenk & Nielsen. The height, missing in the paper's text, is that of the companion examples in the literature."""
+"""The cone of Krenk & Nielsen. The height, missing in the paper's text, is from the companion examples in the literature."""
 
 
 def _top(

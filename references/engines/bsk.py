@@ -86,7 +86,7 @@ def _build(given):
 def _add_wheel(given, simulation, craft):
     """Add a balanced reaction wheel without torque, whose absolute momentum about its axis is constant.
 
-    The hub's inertia contains that of the wheel about its axis, which the constant momentum leaves out of the scene's.
+    The hub's inertia contains the wheel's about its axis, which the constant momentum leaves out of the scene's.
     """
     from Basilisk.simulation import reactionWheelStateEffector
     from Basilisk.utilities import simIncludeRW

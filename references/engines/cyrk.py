@@ -62,9 +62,9 @@ def _compile():
 
     @njit
     def solve(address, start, method, times, body, tolerance):
-        found = nbsolve2_ivp(address, (0.0, times[-1]), start, method, times, False, body, tolerance, tolerance)
-        y, steps, status = found.y.T.copy(), found.steps_taken, found.status
-        found.free()
+        result = nbsolve2_ivp(address, (0.0, times[-1]), start, method, times, False, body, tolerance, tolerance)
+        y, steps, status = result.y.T.copy(), result.steps_taken, result.status
+        result.free()
         return y, steps, status
 
     solve.right_hand_side = right_hand_side  # its address is in use

@@ -10,7 +10,7 @@ Parameters
 ----------
 integrator
     "discrete" (the plant's own update), one of Drake's integrators for a continuous plant, such as "runge_kutta5", or
-    "default": that of `Simulator`, with error control and steps of at most dt.
+    "default": the integrator of `Simulator`, with error control and steps of at most dt.
 accuracy
     Relative accuracy of adaptive steps of at most dt, up to 1; 0 for fixed steps of dt.
 

@@ -10,7 +10,7 @@ rate
     "AB3", "AB4" or "AB5" (Adams-Bashforth, all of order 2 here, because the state before the start is taken as constant).
 attitude
     Integrator of the attitude (`simulation/integrator/position/rotational`): one of these, "Buss1", "Buss2" or
-    "LocalLinearization"; empty for that of the rates.
+    "LocalLinearization"; empty for the integrator of the rates.
 
 References
 ----------

@@ -199,7 +199,7 @@ def _model(mj, given):
 WRITTEN = ("file", "child", "joints", "world", "damping")
 """Descriptions of a body by a file."""
 DUMMY = 1, (0.1, 0.2, 0.3), (2, 3, 4), (0.6, 0.8, 0, 0)
-"""A body whose centre and axes are not those of its frame: MuJoCo decides that when it compiles a model."""
+"""A body whose centre and axes differ from its frame: MuJoCo decides that when it compiles a model."""
 
 
 def _inertial(given):
@@ -212,10 +212,10 @@ def _find_callback(mj, model, data):
         return None
     data.time = FIELD
     arrays = [(model, model.numeric_data), (data, data.xmat), (data, data.qfrc_passive)]
-    words = [_find_word(owner, array.ctypes.data) for owner, array in arrays]
-    words.append(_find_word(data, np.float64(FIELD).view(np.int64)))
+    addresses = [_find_word(owner, array.ctypes.data) for owner, array in arrays]
+    addresses.append(_find_word(data, np.float64(FIELD).view(np.int64)))
     mj.mj_resetData(model, data)
-    return _compile_callback(*words).ctypes
+    return _compile_callback(*addresses).ctypes
 
 
 def _find_word(owner, value):
@@ -231,7 +231,7 @@ def _compile_callback(numeric, attitude, force, time):
         from numba.extending import intrinsic
     except ImportError:
         raise NotImplementedError("this field needs numba next to MuJoCo") from None
-    doubles, words = types.CPointer(types.float64), types.CPointer(types.int64)
+    doubles, integers = types.CPointer(types.float64), types.CPointer(types.int64)
     torque = compile_torque()
 
     @intrinsic
@@ -239,7 +239,7 @@ def _compile_callback(numeric, attitude, force, time):
         to_pointer = lambda context, builder, _, args: builder.inttoptr(args[0], context.get_value_type(doubles))  # noqa: E731
         return doubles(types.int64), to_pointer
 
-    @cfunc(types.void(words, words))
+    @cfunc(types.void(integers, integers))
     def passive(model, data):
         if model[numeric] == 0 or read(model[numeric])[0] != FIELD:
             return
@@ -257,7 +257,7 @@ def _start(mj, model, data, given):
 
     qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
     joint as for the ball joint. The free joint's position and velocity, both of its origin in world axes, are ahead of them:
-    those of a free flight, otherwise 0.
+    0 unless the scene is a free flight.
     """
     mj.mj_resetData(model, data)
     data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0

@@ -78,9 +78,9 @@ def prepare(given):
         solver.step(before, after, control, contacts, given.dt)
 
     steps = [partial(step, *states), partial(step, *reversed(states))]
-    for each in steps:
-        each()
-    steps = steps if given.solver == NOT_RECORDED else [record_warp(each) for each in steps]
+    for run_step in steps:
+        run_step()
+    steps = steps if given.solver == NOT_RECORDED else [record_warp(run_step) for run_step in steps]
     # Views of the engine's own arrays: position and quaternion, scalar last; velocities in the world.
     views = [(state.body_q.numpy()[0], state.body_qd.numpy()[0]) for state in states]
 

@@ -1,6 +1,6 @@
 """Nimble on a free joint or a ball joint, stepped from Python (`World.step`), because it has no loop of its own.
 
-Its method is that of DART. It has no settings, and nothing was switched off. Its environment takes 5.6 GB, most of it PyTorch.
+Its method is DART's. It has no settings, and nothing was switched off. Its environment takes 5.6 GB, most of it PyTorch.
 
 References
 ----------

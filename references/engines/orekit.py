@@ -29,7 +29,7 @@ def prepare(given):
     from org.orekit.utils import AngularCoordinates
 
     frame, date = FramesFactory.getGCRF(), AbsoluteDate.ARBITRARY_EPOCH
-    # A rotation of Hipparchus turns the frame, not the vector: that of R_WF converts from world to F components.
+    # A rotation of Hipparchus turns the frame, not the vector: the rotation of R_WF converts from world to F components.
     turn, spin = Rotation(*given.q0.tolist(), False), Vector3D(*given.w0.tolist())
     start = Attitude(date, frame, AngularCoordinates(turn, spin, Vector3D.ZERO))
     axes = zip(given.moments.tolist(), (Vector3D.PLUS_I, Vector3D.PLUS_J, Vector3D.PLUS_K), strict=True)
@@ -38,7 +38,7 @@ def prepare(given):
 
     def run():
         attitudes = [motion.getAttitude(None, date.shiftedBy(time), frame) for time in times]
-        turns, rates = [each.getRotation() for each in attitudes], [each.getSpin() for each in attitudes]
+        turns, rates = [attitude.getRotation() for attitude in attitudes], [attitude.getSpin() for attitude in attitudes]
         q = [(turn.getQ0(), turn.getQ1(), turn.getQ2(), turn.getQ3()) for turn in turns]
         return {"q": np.array(q), "w": np.array([(rate.getX(), rate.getY(), rate.getZ()) for rate in rates])}
 

@@ -25,7 +25,7 @@ def sample(given, step, read):
         for _ in range(n_steps):
             step()
         samples.append({name: np.array(values, float) for name, values in read().items()})  # copies of an engine's own arrays
-    return {name: np.array([each[name] for each in samples]) for name in samples[0]}
+    return {name: np.array([values[name] for values in samples]) for name in samples[0]}
 
 
 def stepped(given, start, step, read, convert=None):
@@ -139,7 +139,7 @@ def compile_derivative():
 
 
 def mujoco_moments(given):
-    """Return the moments (3,). MuJoCo refuses those of a planar body that exceed the sum of the others by a rounding unit."""
+    """Return the moments (3,). MuJoCo refuses a planar body if a moment exceeds the sum of the others by a rounding unit."""
     moments = given.moments_com
     return np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
 

@@ -56,7 +56,7 @@ class EngineData(Distribution):
     precision
         "f64" or "f32", for engines without such a setting.
     fields
-        Names of the potentials that are supported, on bodies about a fixed point; `"Turning"` for those of them that turn.
+        Names of the potentials that are supported, on bodies about a fixed point; `"Turning"` for the ones that turn.
     free_only
         The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
         depends on that.
@@ -99,11 +99,11 @@ SCRIPTS = {kind.suffix: kind.name for kind in KINDS.values() if kind.suffix != "
 @cache
 def read_script(path: Path) -> ModuleType:
     """Return a module with the first comment and `ENGINE`, JSON, of an adapter in another language, and what most share."""
-    words, _, code = path.read_text(encoding="utf-8").partition("ENGINE = ")
+    comment, _, code = path.read_text(encoding="utf-8").partition("ENGINE = ")
     data, _ = json.JSONDecoder().raw_decode(code.replace("\n *", "\n"))
     common = {"kind": SCRIPTS[path.suffix], "module": data["package"], "settings": {"as_installed": False}, "precision": "f32"}
     method_info = {"variants": ("", "as_installed=true"), "as_installed": ("as_installed=true",)}
-    module = ModuleType(f"{__package__}.{path.stem}", words[3:].partition("*/")[0].replace("\n *", "\n"))
+    module = ModuleType(f"{__package__}.{path.stem}", comment[3:].partition("*/")[0].replace("\n *", "\n"))
     vars(module).update(__file__=str(path), ENGINE=common | {"fields": ("UniformGravity",), "method_info": method_info} | data)
     return module
 
@@ -151,11 +151,11 @@ class AdapterMethod(Method):
         if "adapter" not in vars(cls):
             return
         cls.family, cls.data = cls.adapter.__name__.rpartition(".")[2], EngineData(**cls.adapter.ENGINE)
-        method_info, words = cls.data.method_info, {"flight": Feature.FLIGHT, "rotors": Feature.ROTOR}
+        method_info, flags = cls.data.method_info, {"flight": Feature.FLIGHT, "rotors": Feature.ROTOR}
         supports = {feature for kind in FIELDS if kind.__name__ in cls.data.fields for feature in NEEDS[kind]}
-        supports |= {feature for word, feature in words.items() if method_info.get(word)}
+        supports |= {feature for word, feature in flags.items() if method_info.get(word)}
         cls.method_info = MethodInfo(
-            **{name: value for name, value in method_info.items() if name not in words}, supports=frozenset(supports)
+            **{name: value for name, value in method_info.items() if name not in flags}, supports=frozenset(supports)
         )
         if "precision" not in cls.data.settings:
             cls.precision = cls.data.precision

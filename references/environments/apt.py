@@ -31,7 +31,7 @@ class Apt(EnvironmentKind):
         own, *others = (_run_tool("pkg-config", "--modversion", module, advice=advice) for module in modules)
         if version not in ("", own):
             raise BadInput("version", repr(f"{package}=={version}"), f"{own}, the version of the system")
-        return Lock(own, "".join(f"{module}=={each}\n" for module, each in zip(modules, [own, *others], strict=True)))
+        return Lock(own, "".join(f"{module}=={release}\n" for module, release in zip(modules, [own, *others], strict=True)))
 
     def fill(self, folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
         self.command(folder)

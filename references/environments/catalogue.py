@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from .. import engines
-from ..engines import mujoco as _mujoco  # the name without a dash at the front is that of the class in an environment
+from ..engines import mujoco as _mujoco  # the name without a dash at the front belongs to the class in an environment
 from ..engines import pinocchio as _pinocchio
 from .adapter import SCRIPTS, LocalEngine, read_script
 from .engine_method import EngineMethod, engine_class
@@ -37,7 +37,7 @@ class Pinocchio(LocalEngine):
 def __getattr__(name: str) -> type[EngineMethod]:
     """Return the class of an engine that runs in an environment, such as `exudyn`."""
     files = (Path(engines.__file__).with_name(name + suffix) for suffix in (*SCRIPTS, ".py"))
-    file = next((each for each in files if each.is_file()), None)
+    file = next((candidate for candidate in files if candidate.is_file()), None)
     if file is None or name.startswith("_"):
         raise AttributeError(f"{__name__} has no class {name!r}, and there is no adapter of this name in references/engines")
     return engine_class(read_script(file) if file.suffix in SCRIPTS else import_module(f"{engines.__name__}.{name}"))

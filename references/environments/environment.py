@@ -64,7 +64,7 @@ class Environment:
     engine, version
         Name of the engine, such as `bsk`, and its version.
     folder
-        The virtual environment, the folder of `node_modules`, or that of the compiled program.
+        The virtual environment, the folder of `node_modules`, or the folder of the compiled program.
     runtime
         Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
@@ -162,13 +162,17 @@ def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
     folders = folder_of_all().glob("*/[!.]*")
     environments = [environment for folder in folders if (environment := read_environment(folder))]
     chosen = [environment for environment in environments if engine in (None, environment.engine)]
-    return tuple(sorted(chosen, key=lambda each: (each.engine, version_key(each.version))))
+    return tuple(sorted(chosen, key=lambda environment: (environment.engine, version_key(environment.version))))
 
 
 def find_environment(engine: str, version: str = "") -> Environment:
     """Return the environment of a version, by default of the newest installed release. Raise `MissingEnvironment`."""
     environments = list_environments(engine)
-    matching = [each for each in environments if each.version == version or (not version and not each.is_build)]
+    matching = [
+        environment
+        for environment in environments
+        if environment.version == version or (not version and not environment.is_build)
+    ]
     if not matching:
         raise MissingEnvironment(engine, version, tuple(environment.version for environment in environments))
     return matching[-1]

@@ -71,9 +71,9 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
 def install_build(engine: str, path: Path, source: Source) -> Installation:
     """Return the environment of a build, a wheel or a folder of sources, created if it does not exist.
 
-    Its version is that of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is never
-    mistaken for a release or for another build. Raise `BadInput` if the path is neither a wheel of the engine nor a folder of
-    sources, must not be built, or cannot be installed.
+    Its version is the version of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is
+    never mistaken for a release or for another build. Raise `BadInput` if the path is neither a wheel of the engine nor a
+    folder of sources, must not be built, or cannot be installed. It names `--against`, the option of `conservative track`.
     """
     if path.suffix == ".whl" and path.is_file():
         distribution = distribution_of(engine)
@@ -82,8 +82,9 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
         if normal_name(name) != package or not re.fullmatch(r"[0-9][^-]*(-[^-]+){3,4}\.whl", rest):
             raise BadInput("against", repr(path.name), f"a wheel of {package}")
         version = rest.partition("-")[0].lower()
+        # A version has one plus sign at most.
         version += f"{'.' if '+' in version else '+'}{BUILD}{hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
-        if existing := read_environment(folder_of_all() / engine / version):  # without a network
+        if existing := read_environment(folder_of_all() / engine / version):  # needs no network
             return Installation(existing, False, import_trouble(existing, distribution))
         return _install(engine, distribution, resolve_wheel(distribution, path.resolve(), version, source), source)
     if not any((path / name).is_file() for name in ("pyproject.toml", "setup.py")):
@@ -107,14 +108,14 @@ def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> P
 def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     """Return the newest versions with wheels that the engine's file supports, oldest first.
 
-    Raise `BadInput` if the engine is unknown, or the source does not list its versions.
+    Raise `BadInput` for `--last` of `conservative track` if the engine is unknown, or the source does not list its versions.
     """
     distribution = distribution_of(engine)
-    known = KINDS[distribution.kind].list_versions(distribution.package, source)
-    if not known:
+    versions = KINDS[distribution.kind].list_versions(distribution.package, source)
+    if not versions:
         got = f"no list of versions of {distribution.package} from the package index"
         raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
-    supported = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
+    supported = [release for release in versions if version_key(release) >= version_key(distribution.oldest)]
     return tuple(sorted(supported, key=version_key)[-count:])
 
 
@@ -188,8 +189,12 @@ def remove(requirement: str) -> tuple[Environment | Program, ...]:
     engine, version, _ = read_name(requirement, "engine", settings=False)
     if program := find_program(requirement):
         return (register(program, undo=True),)
-    installed = {each.name: each for each in list_environments()}
-    chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))
+    installed = {environment.name: environment for environment in list_environments()}
+    chosen = tuple(
+        environment
+        for environment in installed.values()
+        if environment.engine == engine and version in ("", environment.version)
+    )
     if not chosen:
         near = f"an installed engine: {nearest(requirement, installed)}"
         raise BadInput("engine", repr(requirement), near if installed else "an installed engine (none is installed)")

@@ -31,15 +31,15 @@ class Npm(EnvironmentKind):
     name, lock_file, suffix = "npm", "package-lock.json", ".mjs"
 
     def resolve(self, distribution: Distribution, version: str, source: Source) -> Lock:
-        package, known = distribution.package, self.list_versions(distribution.package, source)
-        if version not in ("", *known):
-            raise BadInput("version", repr(f"{package}=={version}"), f"one of {', '.join(known)}")
+        package, versions = distribution.package, self.list_versions(distribution.package, source)
+        if version not in ("", *versions):
+            raise BadInput("version", repr(f"{package}=={version}"), f"one of {', '.join(versions)}")
         with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"lock-{os.getpid()}-") as name:
             folder = Path(name)
             (folder / "package.json").write_text('{"name": "environment"}', encoding="utf-8")
             options = ("--package-lock-only", "--omit-lockfile-registry-resolved", "--save-exact")
-            _run_npm(folder, "install", *options, f"{package}@{version or known[0]}")
-            return Lock(version or known[0], (folder / self.lock_file).read_text(encoding="utf-8"))
+            _run_npm(folder, "install", *options, f"{package}@{version or versions[0]}")
+            return Lock(version or versions[0], (folder / self.lock_file).read_text(encoding="utf-8"))
 
     def fill(self, folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
         ask = [_find("node"), "-p", "process.versions.node"]
@@ -50,15 +50,15 @@ class Npm(EnvironmentKind):
         (folder / "package.json").write_text(json.dumps(packages.pop("")), encoding="utf-8")
         (folder / "find.mjs").write_text("export const find = (name) => import.meta.resolve(name);", encoding="utf-8")
         _run_npm(folder, "ci")
-        names = (f"{place.rpartition('node_modules/')[2]}=={each['version']}" for place, each in packages.items())
+        names = (f"{place.rpartition('node_modules/')[2]}=={package['version']}" for place, package in packages.items())
         return f"Node {node}", tuple(sorted(names))
 
     def list_versions(self, package: str, source: Source) -> list[str]:
         """Return the releases of a package, newest first. Raise `BadInput` if npm's registry does not list them."""
         if source.find_links is not None:
             raise BadInput("find_links", repr(str(source.find_links)), f"nothing for {package}, which npm installs")
-        known = _run_npm(temporary_folder(), "view", package, "versions")
-        releases = [each for each in ([known] if isinstance(known, str) else known) if "-" not in each]
+        listed = _run_npm(temporary_folder(), "view", package, "versions")
+        releases = [release for release in ([listed] if isinstance(listed, str) else listed) if "-" not in release]
         return sorted(releases, key=version_key, reverse=True)
 
     def command(self, folder: Path) -> tuple[str | Path, ...]:
@@ -80,7 +80,7 @@ def _run_npm(folder: Path, *arguments: str) -> Any:
     done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return json.loads(done.stdout)
-    words = " ".join((done.stdout + done.stderr).split())  # npm hides passwords
-    summary = re.search(r'"summary": "([^"]*)', words)
-    got = f"npm {arguments[0]} {arguments[-1]}, which failed ({summary[1][:300] if summary else words[-300:]})"
+    output = " ".join((done.stdout + done.stderr).split())  # npm hides passwords
+    summary = re.search(r'"summary": "([^"]*)', output)
+    got = f"npm {arguments[0]} {arguments[-1]}, which failed ({summary[1][:300] if summary else output[-300:]})"
     raise BadInput("engine", got, "a network, a package that npm can install, and a disk with room")

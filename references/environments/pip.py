@@ -110,7 +110,7 @@ def _as_bad_input(package: str, name: str, version: str, failure: UvFailed, sour
         newest = sorted(Pip().list_versions(package, source), key=version_key, reverse=True)
         if not newest:
             return BadInput("version", repr(name), "a version that exists")
-        nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
+        nearest = next((release for release in newest if version_key(release) <= version_key(version)), newest[-1])
         return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
     if failure.says("Failed to fetch", "error sending request", "network was disabled"):
         return BadInput("engines", f"no answer for {name!r} from the package index", "a network, or --find-links FOLDER")

@@ -42,7 +42,7 @@ NEEDS: dict[Any, Features] = {kind: frozenset({Feature.TURNING}) if kind is Turn
 
 
 def describe_field(axes: EngineAxes) -> dict[str, Any]:
-    """Return the numbers of all fields; those of a field that the scene does not have are 0."""
+    """Return the numbers of all fields; numbers of a field that the scene does not have are 0."""
     potential: Any = axes.scene.potential
     numbers: dict[str, Any] = {name: np.zeros(3) for name in ("point", "anchor", "direction", "turn")}
     numbers |= {"stiffness": 0.0, "rest_length": 0.0, "strength": 0.0, "gradient": np.zeros((3, 3))}
@@ -99,20 +99,20 @@ def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
 
 
 def join_numbers(every: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the numbers of a run of n bodies, from those of each."""
+    """Return the numbers of a run of n bodies, from the numbers of each body."""
     shared = {name: value for name, value in every[0].items() if name in SHARED}
-    rows = {name: np.array([each[name] for each in every]) for name in every[0] if name not in SHARED}
+    rows = {name: np.array([numbers[name] for numbers in every]) for name in every[0] if name not in SHARED}
     return {**shared, **rows, "rows": list(rows)}
 
 
 def read_states(answer: Mapping[str, Any], shape: tuple[int, ...]) -> States:
     """Return the samples of n bodies, shape (n, s), or of one, (s,). Raise `EngineCrashed` if an answer has other shapes."""
-    kind, name, each = (QUATERNION, "q", (4,)) if "q" in answer else (MATRIX, "R", (3, 3))
+    kind, name, row_shape = (QUATERNION, "q", (4,)) if "q" in answer else (MATRIX, "R", (3, 3))
     try:
-        attitudes, rates = (np.asarray(answer[each], float) for each in (name, "w" if "w" in answer else "w_W"))
+        attitudes, rates = (np.asarray(answer[field], float) for field in (name, "w" if "w" in answer else "w_W"))
     except (TypeError, ValueError):
         raise EngineCrashed("its samples are not arrays: their rows have different lengths") from None
-    if attitudes.shape != (*shape, *each) or rates.shape != (*shape, 3):
+    if attitudes.shape != (*shape, *row_shape) or rates.shape != (*shape, 3):
         raise EngineCrashed(f"it returned attitudes {attitudes.shape} and rates {rates.shape}, not {shape} samples")
     values = np.concatenate([attitudes.reshape(*shape, -1), rates], axis=-1)
     return States(kind, values.reshape(-1, *values.shape[-2:]), rates_in_world="w" not in answer)
@@ -157,7 +157,7 @@ def read_one(axes: EngineAxes, grid: Grid, label: str) -> Callable[[Answer], Tra
                 frame = np.asarray(answer["p"], float), np.asarray(answer["v"], float)
             except (TypeError, ValueError):
                 raise EngineCrashed("its `p` and `v` are not arrays: their rows have different lengths") from None
-            if any(each.shape != (grid.n_samples, 3) for each in frame):
+            if any(part.shape != (grid.n_samples, 3) for part in frame):
                 raise EngineCrashed(f"it returned positions {frame[0].shape} and velocities {frame[1].shape} in free flight")
         return axes.trajectory(grid, label, read_states(answer, (grid.n_samples,)), work, reason, frame=frame)
 

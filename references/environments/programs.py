@@ -105,9 +105,9 @@ def _check_description(engine: dict[str, Any]) -> None:
     """Raise `ValueError` for a field of another kind. Unknown fields are found where they are used."""
     method_info = engine.get("method_info")
     for name, value in [*engine.items(), *(method_info.items() if isinstance(method_info, dict) else ())]:
-        is_right, words = DESCRIPTION.get(name, (lambda value: True, ""))
+        is_right, expected = DESCRIPTION.get(name, (lambda value: True, ""))
         if not is_right(value):
-            raise ValueError(f"`{name}` is {describe(value)}; expected {words}")
+            raise ValueError(f"`{name}` is {describe(value)}; expected {expected}")
 
 
 @cache

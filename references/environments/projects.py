@@ -1,7 +1,7 @@
 """Environments of versions of a project, such as a package that registers a method: of a commit, a folder or a wheel.
 
     FOLDER/wheels/KEY/      the wheel of a version; KEY is its commit or its hash
-    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is that of the package
+    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is the package's
 
 FOLDER is `projects` next to the folder of engines. Wheels and environments stay there, so that the base of many comparisons is
 built once. The other packages of an environment have their current versions: if these have changed, it is created again.
@@ -65,8 +65,8 @@ def _make_environment(wheel: Path, requirements: Sequence[str], source: Source) 
             ours = any(re.match(rf"{US}[./]", member) for member in archive.namelist())
         if not ours and PACKAGE not in versions_in(lock.text):
             raise BadInput("against", f"{wheel.name}, without {PACKAGE}", f"a version that needs {PACKAGE}")
-        environment, known = read_environment(folder), folder / Pip.lock_file  # older versions wrote another file
-        if environment is None or not known.is_file() or known.read_text(encoding="utf-8") != lock.text:
+        environment, stored_lock = read_environment(folder), folder / Pip.lock_file  # older versions wrote another file
+        if environment is None or not stored_lock.is_file() or stored_lock.read_text(encoding="utf-8") != lock.text:
             environment = make(name, lock, folder, source)
     except BadInput as error:
         raise BadInput("against", error.got, error.allowed) from None

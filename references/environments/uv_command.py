@@ -29,15 +29,15 @@ _OF_UV = ("UV_DEFAULT_INDEX", "UV_INDEX", "UV_INDEX_URL", "UV_EXTRA_INDEX_URL", 
 
 
 class UvFailed(RuntimeError):
-    """uv ended with an error. Attribute: `words`, its output."""
+    """uv ended with an error. Attribute: `output`."""
 
-    def __init__(self, words: str) -> None:
-        self.words = re.sub(r"(?<=://)[^/@\s]+@", "", words)  # an index may have a password in its address
+    def __init__(self, output: str) -> None:
+        self.output = re.sub(r"(?<=://)[^/@\s]+@", "", output)  # an index may have a password in its address
         super().__init__(self.summary)
 
     def says(self, *texts: str) -> bool:
         """Return True if the output contains one of the texts."""
-        return any(text in self.words for text in texts)
+        return any(text in self.output for text in texts)
 
     @property
     def no_wheel(self) -> bool:
@@ -48,7 +48,7 @@ class UvFailed(RuntimeError):
     @property
     def summary(self) -> str:
         """The error message in one line."""
-        lines = [line.strip() for line in self.words.splitlines() if line.strip()]
+        lines = [line.strip() for line in self.output.splitlines() if line.strip()]
         errors = [line for line in lines if line.startswith(("error:", "cause:", "×", "╰─▶"))] or lines[-1:]
         return " ".join(errors[-1].split())[:300] if errors else "uv ended with an error"
 

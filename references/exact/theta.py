@@ -20,7 +20,7 @@ from conservative.attitude import Array
 
 from .digits import ComplexArray, Number, mp
 
-_BITS_KEPT = 600  # of a series, relative to its first term: more than those of `mp`
+_BITS_KEPT = 600  # of a series, relative to its first term: more than `mp` has
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
     """Return a multiple of theta_j(v - i y), j = `number`, for 0 <= y <= K' and y_rest = K' - y.
 
     Formula: DLMF 20.2.1 to 20.2.4, transformed by 20.7.30 to 20.7.33 if the lattice is hyperbolic. There theta_2 and
-    theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), gives kappa.
+    theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to the factor of theta_4(v), gives kappa.
     """
     hyperbolic = lattice.hyperbolic
     series = {2: 4, 4: 2}.get(number, number) if hyperbolic else number

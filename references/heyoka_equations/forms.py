@@ -1,10 +1,10 @@
 """Equations of motion as heyoka expressions: the forms that `Heyoka` and `Precise` integrate.
 
 Properties of bodies and fields are runtime parameters, so one compiled integrator serves all scenes of the same form (measured:
-a parameter costs 2 % more than a constant). Terms that vanish for a scene, such as those of equal moments or of a centre of
+a parameter costs 2 % more than a constant). Terms that vanish for a scene, such as terms of equal moments or of a centre of
 mass on an axis, are not in its form.
 
-Source: Euler's and Poisson's equations; the slow frame is that of `conservative.methods.non_spinning`.
+Source: Euler's and Poisson's equations; the slow frame is in `conservative.methods.non_spinning`.
 
 Symbols: q quaternion, scalar first, body to world; w rates in body axes; u rates of the slow frame, world axes; n the body's
 axis of symmetry, world axes.

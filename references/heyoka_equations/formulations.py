@@ -79,7 +79,7 @@ def base_vectors(scene: Scene) -> Formulation:
 
 
 def _with_attitude(scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], kind: int) -> Formulation:
-    """Return Euler's equations with those of an attitude that `write` makes of a matrix."""
+    """Return Euler's equations with the equations of an attitude that `write` makes of a matrix."""
     R_WD, turn_D, (axes, acceleration, values) = express_field(scene)
     equations, rotor = forms.EulerEquations(attitude, acceleration), (hat(axes.rotor) / axes.J[:, None]).ravel().tolist()
     form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *turn_D.tolist(), *rotor, *values])

@@ -99,7 +99,7 @@ class Joint(NamedTuple):
 
 
 class Description:
-    """A model of URDF or SDF: its joints, and the poses of its links, joints and frames. `reading` collects what is said."""
+    """A model of URDF or SDF: its joints, and poses of links, joints and frames. `reading` collects notes and doubts."""
 
     def __init__(self, path: Path, model: Any, search: Sequence[Path] = (), reading: Reading | None = None) -> None:
         self.path, self.model, self.search, self.reading = path, model, search, reading or Reading()
@@ -107,13 +107,13 @@ class Description:
         self.version = model.getroottree().getroot().get("version", "1.0")
         self.own, attribute = ("origin", "link") if self.urdf else ("pose", "name")
         tags = ("link",) if self.urdf else ("joint", "frame", "link")  # a joint of URDF may have the name of its link
-        self.elements = {each.get("name", ""): each for tag in tags for each in model.findall(tag)}
+        self.elements = {element.get("name", ""): element for tag in tags for element in model.findall(tag)}
         self.joints = []
-        for each in model.findall("joint"):
-            ends = [each.find(name) for name in ("parent", "child")]
+        for joint in model.findall("joint"):
+            ends = [joint.find(name) for name in ("parent", "child")]
             parent, child = ("" if end is None else (end.get(attribute) or end.text or "").strip() for end in ends)
-            pose = self.pose(each.find(self.own)) if self.urdf else np.eye(4)
-            self.joints.append(Joint(each.get("name", ""), each.get("type", ""), parent, child, pose))
+            pose = self.pose(joint.find(self.own)) if self.urdf else np.eye(4)
+            self.joints.append(Joint(joint.get("name", ""), joint.get("type", ""), parent, child, pose))
         self._bases = {joint.child: joint for joint in self.joints if joint.kind == "fixed"}
 
     def place(self, name: str) -> Array:
@@ -144,13 +144,13 @@ class Description:
                 (element.text or "").strip() or ("0 0 0 0 0 0" + " 1" * (form == "quat_xyzw")), 6 + (form == "quat_xyzw")
             )
             if element.get("frame"):
-                said = f"<pose> of {name!r} has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
-                self.reading.doubts.append(said)
+                doubt = f"<pose> of {name!r} has frame={element.get('frame')!r}, an attribute of SDF 1.5 that is not read here"
+                self.reading.doubts.append(doubt)
         else:
             values = numbers(element.get("xyz", "0 0 0"), 3) + numbers(element.get("rpy", "0 0 0"), 3)
         if of and (base := element.get("relative_to", of)):
-            said = f"the pose in <{owner.tag}> of {of!r} is relative to {base!r}, which the format does not allow"
-            (self.reading.doubts if base == of else self.reading.invalid).extend([said] * ("relative_to" in element.attrib))
+            doubt = f"the pose in <{owner.tag}> of {of!r} is relative to {base!r}, which the format does not allow"
+            (self.reading.doubts if base == of else self.reading.invalid).extend([doubt] * ("relative_to" in element.attrib))
         if "quat_xyzw" in element.attrib:
             if version_of(self.version) >= (1, 1):
                 values[3:], form = numbers(element.get("quat_xyzw"), 4), "quat_xyzw"
@@ -168,7 +168,7 @@ class Description:
     def weigh(self, element: Any, place: Array, density: float = DENSITY) -> list[Piece]:
         """Return the part in a <geometry> of URDF or SDF at a place (4, 4), m, with a density, kg/m^3; none for a plane.
 
-        Raise `BadInput` for a mesh that cannot be read, and for another shape than those of `weigh`.
+        Raise `BadInput` for a mesh that cannot be read, and for a shape that `weigh` does not know.
         """
         form = element[0]
         values = _values(form)
@@ -190,30 +190,29 @@ class Description:
         auto = not self.urdf and inertial is not None and is_true(inertial.get("auto"))
         try:
             forms = []
-            for each in element.findall("collision"):
-                density = each.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
-                forms += self.weigh(each.find("geometry"), self.inside(name, each), number(str(density)))
+            for collision in element.findall("collision"):
+                density = collision.findtext("density") or (inertial is not None and inertial.findtext("density")) or DENSITY
+                forms += self.weigh(collision.find("geometry"), self.inside(name, collision), number(str(density)))
             link = replace(link, geometry=join(forms))
         except BadInput as error:
             if auto:
                 raise
             self.reading.notes.append(f"the geometry of {name!r} is not used: {reason(error)}")
-        if auto:  # a mass of the file is that of the whole, from libsdformat 15.2 on
+        if auto:  # a mass in the file is the mass of the whole, from libsdformat 15.2 on
             mass = inertial.findtext("mass")
             return link.filled(link.geometry.scale(number(mass) / link.geometry.mass if mass and link.geometry.mass else 1.0))
         if inertial is None and self.urdf:
             return link
         inertial = element.makeelement("inertial") if inertial is None else inertial
-        mass, given = inertial.find("mass"), _values(inertial.find("inertia"))
+        mass, values = inertial.find("mass"), _values(inertial.find("inertia"))
         weight = None if mass is None else mass.get("value") if self.urdf else mass.text
-        missing = [each for each in _I.split() if each not in given] + ["mass"] * (weight is None)
+        missing = [key for key in _I.split() if key not in values] + ["mass"] * (weight is None)
         if self.urdf and missing:
-            said = f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires"
-            self.reading.invalid.append(said)
-        one = "0" if self.urdf else "1"
-        inertia = [[number(given.get(f"i{min(a, b)}{max(a, b)}", one if a == b else "0")) for a in "xyz"] for b in "xyz"]
+            self.reading.invalid.append(f"<inertial> of {name!r} has no {', '.join(missing)}, which the format requires")
+        default = "0" if self.urdf else "1"
+        inertia = [[number(values.get(f"i{min(a, b)}{max(a, b)}", default if a == b else "0")) for a in "xyz"] for b in "xyz"]
         frame, rounding = self.pose(inertial.find(self.own), name), rounding_of(np.ravel(inertia).tolist())
-        return replace(link, mass=number(weight or one), frame=frame, inertia=np.array(inertia), rounding=rounding)
+        return replace(link, mass=number(weight or default), frame=frame, inertia=np.array(inertia), rounding=rounding)
 
     def look(self, element: Any) -> None:
         """Note what no rule here covers in an element; with a mass it is a doubt."""
@@ -222,16 +221,15 @@ class Description:
         owners = [*((name, element) for name in element.attrib), *((child.tag, child) for child in element)]
         for name, owner in () if used == ["*"] else owners:
             if not self.urdf and version_of(self.version) < version_of(SINCE.get((tag, name), "0")):
-                said = f"<{tag}> has {name!r}, which is of SDF {SINCE[tag, name]}, and the file of SDF {self.version}"
-                self.reading.doubts.append(said)
+                doubt = f"<{tag}> has {name!r}, which is of SDF {SINCE[tag, name]}, and the file of SDF {self.version}"
+                self.reading.doubts.append(doubt)
             if name not in used and name not in ignored:
                 if engine := EXTENSIONS.get(name.partition(":")[0]):
                     self._ask(engine, name, owner if owner is not element else None)
                 else:
-                    said = f"<{tag}> has {name!r}, which is not read here"
-                    (self.reading.doubts if tag in MASS or name in ("namespace", "kinematic") else self.reading.notes).append(
-                        said
-                    )
+                    note = f"<{tag}> has {name!r}, which is not read here"
+                    matters = tag in MASS or name in ("namespace", "kinematic")
+                    (self.reading.doubts if matters else self.reading.notes).append(note)
             if name in MASS and len(element.findall(name)) > 1:
                 self.reading.invalid.append(f"<{tag}> has several elements <{name}>")
         for child in element:
@@ -241,7 +239,7 @@ class Description:
     def _ask(self, engine: str, name: str, owner: Any) -> None:
         """Add what an element, or an attribute if the owner is None, asks an engine for."""
         inside = (
-            [] if owner is None else [(each.tag.rpartition(":")[2], *pair) for each in owner.iter() for pair in each.items()]
+            [] if owner is None else [(node.tag.rpartition(":")[2], *pair) for node in owner.iter() for pair in node.items()]
         )
         for tag, key, value in inside or [(name.rpartition(":")[2], "", "")]:
             option = key if name == "mujoco" else f"{tag} {key}"
@@ -260,7 +258,7 @@ def read_xml(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
     for joint in model.joints:
         if joint.kind != "fixed" or joint.parent == "world":
             raise refuse(path, f"the joint {joint.name!r}, which moves or holds the body ({joint.kind})", ONE)
-    links = [model.link(each.get("name", "")) for each in models[0].findall("link")]
+    links = [model.link(element.get("name", "")) for element in models[0].findall("link")]
     roots = [link for link in links if link.name not in fixed]
     if len(roots) != 1:
         raise refuse(path, f"{len(roots)} root links", ONE)

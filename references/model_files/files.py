@@ -45,7 +45,7 @@ def refuse(path: Path, what: str, allowed: str) -> BadInput:
 
 
 def reason(error: BadInput) -> str:
-    """Return what is wrong with a file, without its path."""
+    """Return the mistake of a file, without its path."""
     return error.what if isinstance(error, RefusedFile) else str(error.got)
 
 
@@ -77,7 +77,7 @@ def parse(path: Path, *roots: str) -> Any:
         raise BadInput(
             "file", f"{str(path)!r}: {' '.join(str(getattr(error, 'strerror', None) or error).split())}", allowed
         ) from None
-    wrong = [f"XML line {each.line}: {each.message}" for each in parser.error_log if each.domain_name != "NAMESPACE"]
+    wrong = [f"XML line {error.line}: {error.message}" for error in parser.error_log if error.domain_name != "NAMESPACE"]
     if root is None or wrong:
         raise BadInput("file", f"{str(path)!r}: {' '.join((wrong or ['no XML'])[0].split())}", allowed)
     if root.getroottree().docinfo.doctype:
@@ -87,8 +87,8 @@ def parse(path: Path, *roots: str) -> Any:
     return root
 
 
-def _keep_default(found: re.Match[bytes]) -> bytes:
-    return b"" if found[1] else b" namespace=" + found[2]
+def _keep_default(match: re.Match[bytes]) -> bytes:
+    return b"" if match[1] else b" namespace=" + match[2]
 
 
 def read_bytes(path: Path) -> bytes:
@@ -105,14 +105,14 @@ def find(path: Path, name: str, search: Sequence[Path], what: str = "file") -> P
 
     Raise `Unread` with the reason if it is not there, or elsewhere after links are followed.
     """
-    scheme = next((each for each in _SCHEMES if name.startswith(each)), "")
+    scheme = next((candidate for candidate in _SCHEMES if name.startswith(candidate)), "")
     plain = name.removeprefix(scheme)
     folders = [path.parent, *search]
     tails = [plain] if scheme in ("", "file://") else [plain, plain.partition("/")[2]]
-    found = [place for folder in folders for tail in tails if tail and (place := folder / tail).is_file()]
-    if not found:
+    present = [place for folder in folders for tail in tails if tail and (place := folder / tail).is_file()]
+    if not present:
         raise Unread(f"the {what} {name!r}, which is not there")
-    inside = [each for each in found if any(each.resolve().is_relative_to(folder.resolve()) for folder in folders)]
+    inside = [place for place in present if any(place.resolve().is_relative_to(folder.resolve()) for folder in folders)]
     if not inside:
         raise Unread(f"the {what} {name!r}, which is outside the folder of the model and the search paths")
     return inside[0]
@@ -159,17 +159,17 @@ def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
 
     if "namespace" in root.attrib:
         raise refuse(path, "a namespace, which MJCF has not", "a file of MJCF without xmlns")
-    while (each := next(root.iter("include"), None)) is not None:
-        place = look(each.get("file", ""), True) or path
+    while (element := next(root.iter("include"), None)) is not None:
+        place = look(element.get("file", ""), True) or path
         if place.resolve() in seen:
             raise refuse(path, "files that include each other, or one twice", "each file included once")
         seen.add(place.resolve())
         for child in reversed(parse(place, "mujoco", "mujocoinclude")):
-            each.addnext(child)
-        each.getparent().remove(each)
-    folders = {key: value for each in root.iter("compiler") for key, value in each.attrib.items() if key.endswith("dir")}
-    for each in root.iter():
-        folder = folders.get({"texture": "texturedir"}.get(each.tag, "meshdir"), folders.get("assetdir", ""))
-        for name in [value for key, value in each.attrib.items() if key.startswith("file")]:
-            look(f"{folder}/{name}" if folder else name, each.tag == "model")
+            element.addnext(child)
+        element.getparent().remove(element)
+    folders = {key: value for node in root.iter("compiler") for key, value in node.attrib.items() if key.endswith("dir")}
+    for element in root.iter():
+        folder = folders.get({"texture": "texturedir"}.get(element.tag, "meshdir"), folders.get("assetdir", ""))
+        for name in [value for key, value in element.attrib.items() if key.startswith("file")]:
+            look(f"{folder}/{name}" if folder else name, element.tag == "model")
     return root, missing

@@ -79,9 +79,9 @@ def _compile_mujoco(path, kind):
     option.disableflags = sum(int(getattr(flags, f"mjDSBL_{name}", 0)) for name in forces)
     for joint in spec.joints:
         joint.armature = joint.frictionloss = 0
-    for each in (spec.compiler, *spec.joints):  # the body keeps the axes of the file
-        for name in {"align", "alignfree"}.intersection(dir(each)):
-            setattr(each, name, 0)
+    for part in (spec.compiler, *spec.joints):  # the body keeps the axes of the file
+        for name in {"align", "alignfree"}.intersection(dir(part)):
+            setattr(part, name, 0)
     return mujoco, spec.compile()
 
 
@@ -298,5 +298,5 @@ def _newton(path, kind):
 
 
 _ALL = _mujoco, _pinocchio, _drake, _dart, _pybullet, _newton, _sapien, _brax, _mjx, _mjwarp
-LOADERS = {each.__name__[1:]: each for each in _ALL}
+LOADERS = {loader.__name__[1:]: loader for loader in _ALL}
 """Loaders by the names of engines."""

@@ -26,7 +26,7 @@ from .files import inline, load_mesh, refuse
 from .pieces import ONE, Link, Piece, Reading, join, join_links, make_pose, rounding_of, weigh
 
 _HALF = {"capsule": (1, 2), "cylinder": (1, 2), "box": (2, 2, 2), "ellipsoid": (1, 1, 1), "sphere": (1,)}
-"""Shapes, and the factors from sizes in MJCF, which are half lengths, to those of `weigh`."""
+"""Shapes, and the factors from sizes in MJCF, which are half lengths, to the sizes of `weigh`."""
 
 
 class NotRead(Exception):
@@ -44,16 +44,16 @@ def parse_mjcf(path: Path, search: Sequence[Path] = ()) -> tuple[Any, Any, list[
         raise _refuse(path, error, "reads") from None
     spec.modelfiledir = str(path.parent)
     aligned = 0
-    for each in (spec.compiler, *spec.joints):  # the same body in other axes
-        for name in {"align", "alignfree"}.intersection(dir(each)):
-            aligned |= int(getattr(each, name)) == 1
-            setattr(each, name, 0)
+    for part in (spec.compiler, *spec.joints):  # the same body in other axes
+        for name in {"align", "alignfree"}.intersection(dir(part)):
+            aligned |= int(getattr(part, name)) == 1
+            setattr(part, name, 0)
     return mujoco, spec, ["the axes of the body are its principal axes by an option of the file"] * aligned
 
 
 def _refuse(path: Path, error: Exception, does: str) -> BadInput:
-    words = " ".join(str(error).removeprefix("Error: ").split())
-    return refuse(path, f"an error ({words})", f"a file that MuJoCo {does}")
+    message = " ".join(str(error).removeprefix("Error: ").split())
+    return refuse(path, f"an error ({message})", f"a file that MuJoCo {does}")
 
 
 def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
@@ -62,20 +62,20 @@ def compile_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> Piece:
     Raise `BadInput` for a file that it does not compile, and for several bodies.
     """
     mujoco, spec, _ = parse_mjcf(path, search)
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             model = spec.compile()
         except (ValueError, mujoco.FatalError) as error:
             raise _refuse(path, error, "compiles") from None
-    reading.notes.extend(f"MuJoCo warns: {each.message}" for each in said)
+    reading.notes.extend(f"MuJoCo warns: {warning.message}" for warning in caught)
     if model.njnt > (model.nq == 7):
         raise refuse(path, f"the joint {model.jnt(model.njnt - 1).name!r}, which moves", ONE)
     if (roots := (model.body_parentid[1:] == 0).sum()) != 1:
         raise refuse(path, f"{roots} bodies in the world", ONE)
     mujoco.mj_kinematics(model, data := mujoco.MjData(model))
     parts = [Piece(float(model.body_mass[k]), np.zeros(3), np.diag(model.body_inertia[k])) for k in range(1, model.nbody)]
-    poses = [make_pose(*each) for each in zip(data.xipos[1:], data.ximat[1:].reshape(-1, 3, 3), strict=True)]
+    poses = [make_pose(*pose) for pose in zip(data.xipos[1:], data.ximat[1:].reshape(-1, 3, 3), strict=True)]
     base = np.linalg.inv(make_pose(data.xpos[1], data.xmat[1].reshape(3, 3)))
     return join(part.place(base @ pose) for part, pose in zip(parts, poses, strict=True))
 
@@ -114,11 +114,11 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
         link = Link(pose, name=body.name, geometry=geometry)
         if body.explicitinertial and options.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
             full = body.fullinertia
-            given = body.inertia if np.isnan(full[0]) else full
+            numbers = body.inertia if np.isnan(full[0]) else full
             inertia = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
-            inertia = np.diag(given) if len(given) == 3 else inertia
+            inertia = np.diag(numbers) if len(numbers) == 3 else inertia
             frame = make_pose(body.ipos, _turn(body.iquat, body.ialt, options))
-            link = replace(link, mass=float(body.mass), frame=frame, inertia=inertia, rounding=rounding_of(given))
+            link = replace(link, mass=float(body.mass), frame=frame, inertia=inertia, rounding=rounding_of(numbers))
         elif options.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE:
             link = link.filled(geometry)
         moments, axes = np.linalg.eigh(link.inertia)
@@ -127,7 +127,7 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
             raised[:] = raised.mean()
         link = link if (raised == moments).all() else replace(link, inertia=(axes * raised) @ axes.T)
         links = [replace(link, mass=max(link.mass, options.boundmass))]
-        return links + [each for child in body.bodies for each in read(child, pose @ _pose(child, options))]
+        return links + [link for child in body.bodies for link in read(child, pose @ _pose(child, options))]
 
     links = read(spec.worldbody.bodies[0], np.eye(4))
     if options.settotalmass > 0:
@@ -151,7 +151,7 @@ def _shell(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
 
 def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequence[Path]) -> list[Array]:
     """Return vertices and triangles of a mesh whose volume is the same by all rules of MuJoCo, as it is convex."""
-    mesh = next((each for each in spec.meshes if (each.name or Path(each.file).stem) == geom.meshname), None)
+    mesh = next((asset for asset in spec.meshes if (asset.name or Path(asset.file).stem) == geom.meshname), None)
     if mesh is None or kind != "mesh" or not mesh.file or np.any(mesh.refpos) or abs(mesh.refquat[0]) != 1:
         raise NotRead(f"the mesh {geom.meshname!r} of a geometry of type {kind!r}")
     if mesh.inertia == mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL:
@@ -164,7 +164,7 @@ def _mesh(mujoco: Any, spec: Any, geom: Any, kind: str, path: Path, search: Sequ
 
 
 def _pose(element: Any, options: Any, own: Array | None = None) -> Array:
-    """Return the pose (4, 4) of an element in its body from its `own`, with those of the frames around it."""
+    """Return the pose (4, 4) of an element in its body from its `own` and the poses of the frames around it."""
     own = make_pose(element.pos, _turn(element.quat, element.alt, options)) if own is None else own
     return own if element.frame is None else _pose(element.frame, options) @ own
 

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia: of parts, of links, of shapes, and what is said about a file that has them."""
+"""Mass, centre of mass and inertia of parts, links and shapes, and the result of reading a file that has them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Piece:
     rounding: float = 0.0
 
     def place(self, pose: Array) -> Piece:
-        """Return the part in other axes, in which its own have a pose (4, 4)."""
+        """Return the part in other axes; `pose` (4, 4) is the pose of its present axes in them."""
         R = pose[:3, :3]
         return Piece(self.mass, R @ self.com + pose[:3, 3], R @ self.inertia @ R.T, self.rounding)
 
@@ -44,14 +44,14 @@ class Piece:
 
     @property
     def excess(self) -> float:
-        """Largest moment minus the sum of the others, kg m^2, without round-off; a body has none."""
+        """Largest moment minus the sum of the others, kg m^2; 0 for a body that can exist, and for round-off."""
         moments = np.linalg.eigvalsh(self.inertia)
         excess = float(moments[2] - moments[0] - moments[1])
         return excess if excess > 1e-9 * moments[2] else 0.0
 
     @property
     def flaw(self) -> str:
-        """Why no body has this mass and inertia; empty if one has, or may have within the digits of a planar body's moments."""
+        """Reason that no body can have this mass and inertia; empty if a body can, within the digits of its moments."""
         moments = np.linalg.eigvalsh(self.inertia)
         if not self.mass > 0:
             return "the mass is not positive"
@@ -59,7 +59,8 @@ class Piece:
             return "there is a mass without inertia"
         if not moments[0] > 0:
             return "a principal moment is not positive"
-        # A single digit says too little to excuse a body: 0.01, 0.02, 0.04 is a mistake.
+        # The largest moment of a planar body is the sum of the others, and rounded digits can be above it. At most a tenth is
+        # excused: 0.01, 0.02, 0.04 is a mistake, although moments with a single digit may be off by more.
         slack = max(1e-6 * moments[2], min(self.rounding, 0.1 * moments[2]))
         return "a moment exceeds the sum of the others" if self.excess > slack else ""
 
@@ -67,15 +68,15 @@ class Piece:
 def rounding_of(moments: Iterable[Any]) -> float:
     """Return the largest rounding error of a sum of three moments, kg m^2, from the digits that they are written with."""
     exponents = [Decimal(str(moment)).normalize().as_tuple().exponent for moment in moments if moment and np.isfinite(moment)]
-    return 1.5 * 10.0 ** min(map(int, exponents), default=-300)
+    return 1.5 * 10.0 ** min(map(int, exponents), default=-300)  # three times half a unit of the last digit
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
     """A link, fixed to the root link.
 
-    `pose` (4, 4) is its pose in the root link, and `frame` (4, 4) that of the inertial frame in the link, m. `inertia` (3, 3)
-    is in the inertial frame, kg m^2, with a `rounding` as in `Piece`. `geometry` is its geometry with `DENSITY`.
+    `pose` (4, 4) is the pose of the link in the root link, and `frame` (4, 4) the pose of the inertial frame in the link, m.
+    `inertia` (3, 3) is in the inertial frame, kg m^2, with a `rounding` as in `Piece`. `geometry` has the density `DENSITY`.
     """
 
     pose: Array
@@ -93,7 +94,7 @@ class Link:
 
     @property
     def flaw(self) -> str:
-        """Why no body has this mass and inertia, as `Piece.flaw`; empty for a link without both, which is a frame."""
+        """The reason of `Piece.flaw`; empty for a link without mass and inertia, which is a frame."""
         return self.part.flaw if self.mass or self.inertia.any() else ""
 
     def filled(self, part: Piece) -> Link:
@@ -129,13 +130,16 @@ def make_pose(place: Any = (0, 0, 0), R: Array | Rotation | None = None) -> Arra
 
 
 def errors(part: Piece, other: Piece, scale: Piece | None = None) -> dict[str, float]:
-    """Return the differences of the `QUANTITIES`, relative to those of `scale`, by default `part`."""
+    """Return the differences of the `QUANTITIES`, relative to the values of `scale`, by default of `part`."""
     unit = scale or part
+    # A centre of mass can be at 0, so its error is relative to the size of the body, which the inertia shows. A body that is
+    # much smaller than its distance is a point: its centre has an error of rounding at that distance.
     size = np.sqrt(abs(np.trace(unit.inertia) / unit.mass)) if unit.mass else 0.0
-    size = max(size, 1e-9 * np.linalg.norm(unit.com)) or 1.0  # below that the centre of mass is round-off
+    size = max(size, 1e-9 * np.linalg.norm(unit.com)) or 1.0
     pairs = (other.mass - part.mass, unit.mass), (other.com - part.com, size), (other.inertia - part.inertia, unit.inertia)
-    found = [np.linalg.norm(each) and np.linalg.norm(each) / (np.linalg.norm(of) or 1e-300) for each, of in pairs]
-    return dict(zip(QUANTITIES, map(float, np.nan_to_num(found, nan=np.inf)), strict=True))
+    norms = [(np.linalg.norm(difference), np.linalg.norm(whole)) for difference, whole in pairs]
+    relative = [error and error / (whole or 1e-300) for error, whole in norms]  # no error of a value of 0 is 0, not nan
+    return dict(zip(QUANTITIES, map(float, np.nan_to_num(relative, nan=np.inf)), strict=True))
 
 
 def distance(part: Piece, other: Piece, scale: Piece | None = None) -> float:
@@ -149,7 +153,7 @@ def differing(part: Piece, other: Piece, tolerance: float) -> list[str]:
     texts = {
         "mass": ([part.mass], [other.mass], "kg"),
         "centre of mass": (part.com, other.com, "m"),
-        "inertia": (*(each.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] for each in (part, other)), "kg m^2"),
+        "inertia": (*(piece.inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] for piece in (part, other)), "kg m^2"),  # xx ... yz
     }
     return [f"{name} {list_numbers(texts[name][0])} and {list_numbers(texts[name][1])} {texts[name][2]}" for name in far]
 
@@ -159,7 +163,7 @@ ROUND_OFF = 1e-7
 
 
 def list_numbers(values: Any, unit: float = 0.0) -> str:
-    """Return numbers as text, with 0 for the round-off of numbers of the size `unit`."""
+    """Return numbers as text, with 0 for numbers that are round-off beside the largest one, or beside `unit`."""
     values = np.ravel(values)
     least = ROUND_OFF * max(unit, np.abs(values).max())
     return " ".join(f"{value:.4g}" if abs(value) > least else "0" for value in values)
@@ -167,11 +171,11 @@ def list_numbers(values: Any, unit: float = 0.0) -> str:
 
 @dataclass
 class Reading:
-    """What this package reads of a file: its links, the root first, and what has to be said about the file.
+    """The result of reading a file: its links, the root first, and remarks.
 
-    `notes` name what is not read because it does not matter. `doubts` say why another body may be right, too: no engine is
-    called wrong against them. `invalid` says how the file breaks the rules of its format, so that an engine may refuse it.
-    `asks` has options of the file for one engine that may change the body, as texts by the engine and the option.
+    `notes` name parts of the file that are not read because they do not matter. `doubts` are reasons that another body may be
+    right, too: no engine is called wrong against them. `invalid` names rules of the format that the file breaks, so that an
+    engine may refuse it. `asks[engine][option]` is the text of an option that is for one engine and may change the body.
     """
 
     links: list[Link] = field(default_factory=list)
@@ -181,7 +185,7 @@ class Reading:
     asks: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def ask(self, engine: str, option: str, value: str, text: str) -> None:
-        """Add an option for an engine; a note if it cannot change the body."""
+        """Add an option for an engine, or a note if it cannot change the body."""
         if touched(option) and value not in _OFF:
             self.asks.setdefault(engine, {})[option] = text
         else:
@@ -195,22 +199,24 @@ _TOUCHED = {
     "settotalmass": ("mass", "inertia"),
 }
 _OFF = ("false", "0", "auto", "-1", "0 5")
-"""Values of such options that ask for nothing."""
+"""Values with which such an option has no effect; "0 5" is the default of MuJoCo's `inertiagrouprange`."""
 
 
 def touched(option: str) -> Sequence[str]:
     """Return the `QUANTITIES` that an option of an engine may change."""
-    known = re.search("mass|inertia|density", option.lower()) and "rotor" not in option.lower()
-    return _TOUCHED.get(option.lower(), QUANTITIES if known else ())
+    # The inertia of a rotor belongs to a joint.
+    changes_mass = re.search("mass|inertia|density", option.lower()) and "rotor" not in option.lower()
+    return _TOUCHED.get(option.lower(), QUANTITIES if changes_mass else ())
 
 
 def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
-    """Return the part of a shape after an affine map `pose` (4, 4), which may scale it; none for another kind.
+    """Return a list with the part of a shape after an affine map `pose` (4, 4), which may scale it; empty for other kinds.
 
     Shapes are centred and about the third axis: "box" (edges), "sphere" (radius), "ellipsoid" (semi-axes), "cylinder" and
     "capsule" (radius, length of the cylinder), "cone" (radius, height, centred at half of it, the tip up), "mesh" (vertices and
-    triangles), m. The density is that after the map, kg/m^3.
+    triangles), m. The density is valid after the map, kg/m^3.
     """
+    # `second` is the integral of x x' about the centroid; an affine map A takes it to A second A'. J = tr(second) 1 - second.
     centroid = np.zeros(3)
     if kind == "mesh":  # tetrahedra from the origin
         corners = np.asarray(sizes[0], float)[np.asarray(sizes[1])]
@@ -226,7 +232,8 @@ def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
     elif kind in ("cylinder", "capsule"):
         r, length = sizes
         rod, ball = math.pi * r * r * length, 4 / 3 * math.pi * r**3 * (kind == "capsule")
-        ends = ball * (length**2 / 4 + 3 * length * r / 8)  # of the hemispheres along the axis, in addition to those of a ball
+        # The halves of a ball are moved to the ends, which adds this along the axis: the centroid of a half is at 3 r / 8.
+        ends = ball * (length**2 / 4 + 3 * length * r / 8)
         volume = rod + ball
         second = np.diag([rod * r * r / 4] * 2 + [rod * length**2 / 12 + ends]) + ball * r * r / 5 * np.eye(3)
     elif kind == "cone":
@@ -235,6 +242,6 @@ def weigh(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
         second = volume * np.diag([r * r * 3 / 20] * 2 + [length**2 * 3 / 80])
     else:
         return []
-    A, size = pose[:3, :3], density * abs(np.linalg.det(pose[:3, :3])) * math.copysign(1, volume)  # a mesh may be inside out
-    second = size * A @ second @ A.T
-    return [Piece(size * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]
+    A, factor = pose[:3, :3], density * abs(np.linalg.det(pose[:3, :3])) * math.copysign(1, volume)  # a mesh may be inside out
+    second = factor * A @ second @ A.T
+    return [Piece(factor * volume, A @ centroid + pose[:3, 3], np.trace(second) * np.eye(3) - second)]

@@ -74,13 +74,13 @@ class Model(Reading):
 
     @property
     def _repaired(self) -> bool:
-        """Whether the reference reader is an engine that has repaired an impossible inertia."""
+        """True if the reference reader is an engine that has repaired an impossible inertia."""
         bad = self.kind == "sdf" and self.own and (self.own.flaw or self.own.excess)
         return bool(bad and self.reference and not (self.reference.flaw or self.reference.excess))
 
     @property
     def disagree(self) -> str:
-        """How the readers disagree; "" if they do not, or if no body is like any reading."""
+        """Disagreement of the readers; "" if they agree, or if no body is like any reading."""
         if not self.own or self._repaired or all(part.flaw for part in (self.own, self.reference) if part):
             return ""
         if self.reference and (far := differing(self.reference, self.own, AGREE)):
@@ -89,7 +89,7 @@ class Model(Reading):
 
     @property
     def flaw(self) -> str:
-        """Why no body is like that of the file; "" if one is, or if the readers disagree about it."""
+        """Reason that no body is like the file's; "" if a body can be, or if the readers disagree about it."""
         return "" if self.disagree else self.truth.flaw
 
     @property
@@ -99,7 +99,7 @@ class Model(Reading):
 
     @property
     def lonely(self) -> str:
-        """Why there is one reader only; "" if there are two."""
+        """Reason that there is one reader only; "" if there are two."""
         if self.own and not self.reader:
             how = {"sdf": "conservative engines install drake"}.get(self.kind, "pip install pin")
             return f"no reference reader is installed ({how})"
@@ -107,19 +107,19 @@ class Model(Reading):
 
     def _asks(self, engine: str) -> dict[str, str]:
         """Return the options of the file for an engine that change this body."""
-        found = {key: text for name, asks in self.asks.items() if engine in _family(name) for key, text in asks.items()}
+        asked = {key: text for name, asks in self.asks.items() if engine in _family(name) for key, text in asks.items()}
         possible = not self.truth.flaw and not self.bad
-        return {key: text for key, text in found.items() if not (possible and key == "balanceinertia")}
+        return {key: text for key, text in asked.items() if not (possible and key == "balanceinertia")}
 
     def doubt(self, engine: str, differs: Sequence[str] = QUANTITIES) -> str:
         """Return why nothing can be said against an engine whose body `differs` in these quantities; "" if it can."""
         asks = self._asks(engine)
         excused = asks and set(differs) <= {name for option in asks for name in touched(option)}
-        said = [f"the file asks for {', '.join(asks.values())}"] if excused else []
-        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *said]))
+        excuse = [f"the file asks for {', '.join(asks.values())}"] if excused else []
+        return "; ".join(filter(None, [self.disagree, *self.invalid, *self.bad, *self.doubts, *excuse]))
 
     def alone(self, engine: str) -> bool:
-        """Whether an engine would be compared with itself."""
+        """Return True if an engine would be compared with itself."""
         return self.own is None and engine in FAMILY.get(self.kind, ())
 
     def asked_for(self, engine: str, seen: Piece, tolerance: float) -> str:
@@ -218,7 +218,7 @@ def _read(model: Model, search: Sequence[Path]) -> None:
         if kind != "mjcf" or isinstance(error, MissingEngine):  # only MuJoCo defines MJCF
             raise
         model.own_refuses = reason(error) if isinstance(error, BadInput) else f"{type(error).__name__}"
-    finite = [number for each in model.links for number in (each.mass, *each.inertia.flat, *each.frame.flat, *each.pose.flat)]
+    finite = [number for link in model.links for number in (link.mass, *link.inertia.flat, *link.frame.flat, *link.pose.flat)]
     if not np.isfinite(finite).all():
         raise refuse(path, "numbers that are not finite", "finite numbers in m, kg and kg m^2")
     if kind != "mjcf" and not any(link.mass for link in model.links):
@@ -243,12 +243,12 @@ def _read(model: Model, search: Sequence[Path]) -> None:
     truth = model.truth
     model.links = model.links or [Link(np.eye(4)).filled(truth)]
     if model.flaw or truth.excess:
-        said = (
+        text = (
             f"no body is like this: {model.flaw}" if model.flaw else "the digits of the file leave open if a body is like this"
         )
         moments = list_numbers(np.linalg.eigvalsh(truth.inertia))
-        model.notes.append(f"{said} (mass {truth.mass:.4g} kg, principal moments {moments} kg m^2)")
-    asks = [f"the file asks {name} for {', '.join(each.values())}" for name, each in model.asks.items()]
+        model.notes.append(f"{text} (mass {truth.mass:.4g} kg, principal moments {moments} kg m^2)")
+    asks = [f"the file asks {name} for {', '.join(options.values())}" for name, options in model.asks.items()]
     model.notes = list(dict.fromkeys([*model.notes, *model.invalid, *model.bad, *model.doubts, *asks]))
 
 

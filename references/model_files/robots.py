@@ -55,7 +55,7 @@ def split(path: Path, kind: str, folder: Path, search: Sequence[Path] = ()) -> B
 
 def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[str, list[str]]:
     """Return the names that are fixed to each root, itself first; `parents` has the parents of those that are fixed."""
-    found: dict[str, list[str]] = {}
+    groups: dict[str, list[str]] = {}
     for name in names:
         root, seen = name, {name}
         while root in parents:
@@ -65,8 +65,8 @@ def group(path: Path, names: Sequence[str], parents: Mapping[str, str]) -> dict[
             if root not in names:
                 raise refuse(path, f"a joint to {root!r}, which is not there", "joints between links of the file")
             seen.add(root)
-        found.setdefault(root, []).append(name)
-    return {root: [root, *(member for member in members if member != root)] for root, members in found.items()}
+        groups.setdefault(root, []).append(name)
+    return {root: [root, *(member for member in members if member != root)] for root, members in groups.items()}
 
 
 def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
@@ -78,13 +78,13 @@ def _links(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         if model.find("include") is not None or model.find("model") is not None:
             raise refuse(path, "a model within another, or an include", "models without includes")
         prefix = f"{model.get('name')}: " if len(models) > 1 else ""
-        bodies += [replace(each, name=prefix + each.name) for each in _links_of(path, model, folder, search, bool(prefix))]
+        bodies += [replace(body, name=prefix + body.name) for body in _links_of(path, model, folder, search, bool(prefix))]
     return bodies
 
 
 def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], several: bool) -> Bodies:
     urdf, frames = model.tag == "robot", Description(path, model, search)
-    links = {each.get("name", ""): each for each in model.findall("link")}
+    links = {link.get("name", ""): link for link in model.findall("link")}
     parents, moving = _tree(path, frames, links)
     groups = group(path, list(links), parents)
     held = is_true(model.findtext("static"))
@@ -99,8 +99,9 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
         except Unread as error:
             missing[str(error)] = None
     meshes = ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1))
-    one = set(groups) == {next(iter(links), "")} and not moving  # not on a floating joint: engines then have a massless root
-    alone = one and not (several or held or elsewhere or meshes)
+    # Not on a floating joint, because engines then have a massless root.
+    one_free = set(groups) == {next(iter(links), "")} and not moving
+    alone = one_free and not (several or held or elsewhere or meshes)
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
     bodies: Bodies = []
     for name, members in groups.items():
@@ -136,19 +137,19 @@ def _copy(path: Path, model: Any, frames: Description, members: Sequence[str], s
     Meshes are left out unless the mass follows from them; then they get their absolute path.
     """
     copy = deepcopy(model)
-    for each in [each for each in copy if each.tag.partition(":")[0] not in EXTENSIONS]:
-        if each.tag == "joint" and frames.urdf and each.find("child").get("link") in members[1:]:
-            for child in [child for child in each if child.tag not in ("origin", "parent", "child")]:
-                each.remove(child)  # such as <mimic>, which refers to other joints
-        elif each.tag != "link" or each.get("name") not in members:
-            copy.remove(each)
+    for element in [element for element in copy if element.tag.partition(":")[0] not in EXTENSIONS]:
+        if element.tag == "joint" and frames.urdf and element.find("child").get("link") in members[1:]:
+            for child in [child for child in element if child.tag not in ("origin", "parent", "child")]:
+                element.remove(child)  # such as <mimic>, which refers to other joints
+        elif element.tag != "link" or element.get("name") not in members:
+            copy.remove(element)
     for link in copy.findall("link"):
         inertial = link.find("inertial")
         auto = inertial is not None and is_true(inertial.get("auto"))
-        for each in [*link.findall("visual"), *link.findall("collision")]:
-            mesh = each.find("geometry/mesh")
-            if each.tag == "visual" or (mesh is not None and not auto):
-                link.remove(each)
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if shape.tag == "visual" or (mesh is not None and not auto):
+                link.remove(shape)
             elif mesh is not None and mesh.find("uri") is not None:
                 mesh.find("uri").text = str(find(path, mesh.findtext("uri"), search).resolve())
     if frames.urdf:
@@ -156,8 +157,8 @@ def _copy(path: Path, model: Any, frames: Description, members: Sequence[str], s
     base = np.linalg.inv(frames.place(members[0]))
     for link in copy.findall("link"):  # poses and joints of SDF may refer to frames that are left out
         name = link.get("name")
-        for each in link.findall("collision"):
-            _place(each, frames.inside(name, each))
+        for collision in link.findall("collision"):
+            _place(collision, frames.inside(name, collision))
         _place(link, base @ frames.place(name))
     for child in members[1:]:
         joint = copy.makeelement("joint", name=f"{child}_is_fixed", type="fixed")
@@ -176,8 +177,8 @@ def _text(element: Any, tag: str, text: str) -> Any:
 
 def _place(element: Any, pose: Any) -> None:
     """Give an element of SDF its pose (4, 4) in its parent as numbers."""
-    for each in element.findall("pose"):
-        element.remove(each)
+    for old in element.findall("pose"):
+        element.remove(old)
     if np.abs(pose - np.eye(4)).max() > 1e-15:
         angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
         element.insert(0, _text(element, "pose", " ".join(map(repr, [*pose[:3, 3].tolist(), *angles.tolist()]))))
@@ -201,36 +202,36 @@ def _place_for(folder: Path, path: Path, suffix: str) -> Path:
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of an MJCF file: those in the world, and those on joints."""
     root, missing = inline(path, search)
-    spec, found = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
+    spec, entries = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
 
     def walk(element: Any, inherited: str, world: bool) -> None:
         inherited = element.get("childclass", inherited)
         for child in element:
             if child.tag == "body":
                 if world or _moves(child):
-                    found.append((child, child.get("childclass", inherited)))
+                    entries.append((child, child.get("childclass", inherited)))
                 walk(child, inherited, False)
             elif child.tag in ("frame", "replicate"):
                 walk(child, inherited, world)
 
-    for each in root.findall("worldbody"):
-        walk(each, "main", True)
-    free = all(len(_moves(body)) <= 1 and all(joint.get("type") == "free" for joint in _moves(body)) for body, _ in found)
-    alone = len(found) == 1 and free and bool(_moves(found[0][0])) and not missing
+    for worldbody in root.findall("worldbody"):
+        walk(worldbody, "main", True)
+    free = all(len(_moves(body)) <= 1 and all(joint.get("type") == "free" for joint in _moves(body)) for body, _ in entries)
+    alone = len(entries) == 1 and free and bool(_moves(entries[0][0])) and not missing
     notes = [f"engines get a copy without {name!r}, which is not in the file's folder or a search path" for name in missing[:1]]
-    for each in root.findall("compiler") * (not alone):
-        if float(each.attrib.pop("settotalmass", "-1")) > 0:
+    for compiler in root.findall("compiler") * (not alone):
+        if float(compiler.attrib.pop("settotalmass", "-1")) > 0:
             notes.append("settotalmass is left out: masses are those before they are scaled")
     bodies: Bodies = []
-    for number, (body, inherited) in enumerate(found):
+    for number, (body, inherited) in enumerate(entries):
         joints = spec.body(body.get("name")).joints if body.get("name") else ()
-        pivots = [(each.type.name.removeprefix("mjJNT_").lower(), np.array(each.pos)) for each in joints]
+        pivots = [(joint.type.name.removeprefix("mjJNT_").lower(), np.array(joint.pos)) for joint in joints]
         name, copy = body.get("name") or f"body {number}", deepcopy(body)
         copy.attrib.update({"name": name} | ({"childclass": inherited} if inherited != "main" else {}))
         for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
             copy.attrib.pop(key, None)
         made = root.makeelement("mujoco", {"model": path.stem, **root.attrib})  # Drake needs a name
-        made.extend(deepcopy(each) for each in root if each.tag in {"compiler", "default", "asset"})
+        made.extend(deepcopy(child) for child in root if child.tag in {"compiler", "default", "asset"})
         _lighten(path, made, copy, root, search)
         if next(copy.iter("inertial", "geom"), None) is None:
             continue
@@ -248,8 +249,8 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
 def _moves(body: Any) -> list[Any]:
     """Return the joints of a body of MJCF; a <freejoint> gets its type."""
-    for each in body.findall("freejoint"):
-        each.set("type", "free")
+    for joint in body.findall("freejoint"):
+        joint.set("type", "free")
     return [*body.findall("joint"), *body.findall("freejoint")]
 
 
@@ -258,29 +259,29 @@ def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]
 
     The other meshes get their absolute path.
     """
-    for each in list(body.iter("body", "joint", "freejoint", "site", "camera", "light")):
-        if each is not body and (each.tag != "body" or _moves(each)):
-            each.getparent().remove(each)
-    options = {key: value for each in root.findall("compiler") for key, value in each.attrib.items()}
+    for part in list(body.iter("body", "joint", "freejoint", "site", "camera", "light")):
+        if part is not body and (part.tag != "body" or _moves(part)):
+            part.getparent().remove(part)
+    options = {key: value for compiler in root.findall("compiler") for key, value in compiler.attrib.items()}
     for geom in list(body.iter("geom")):
         written = next(geom.iterancestors("body")).find("inertial") is not None and options.get("inertiafromgeom") != "true"
         if written and (geom.get("mesh") or geom.get("type") in (None, "mesh")):
             geom.getparent().remove(geom)
-    for each in [*made.iter("geom"), *body.iter("geom")]:
-        each.attrib.pop("material", None)
-    used = {each.get("mesh") for each in body.iter("geom")}
+    for geom in [*made.iter("geom"), *body.iter("geom")]:
+        geom.attrib.pop("material", None)
+    used = {geom.get("mesh") for geom in body.iter("geom")}
     base = options.get("meshdir", options.get("assetdir", ""))
-    for each in made.iter("compiler"):
+    for compiler in made.iter("compiler"):
         for key in ("assetdir", "meshdir", "texturedir"):
-            each.attrib.pop(key, None)
-    for each in [each for asset in made.findall("asset") for each in asset]:
-        name = each.get("file", "")
-        if each.tag != "mesh" or (each.get("name") or Path(name).stem) not in used:
-            each.getparent().remove(each)
+            compiler.attrib.pop(key, None)
+    for asset in [asset for assets in made.findall("asset") for asset in assets]:
+        name = asset.get("file", "")
+        if asset.tag != "mesh" or (asset.get("name") or Path(name).stem) not in used:
+            asset.getparent().remove(asset)
         elif name:
-            each.set("name", each.get("name") or Path(name).stem)
+            asset.set("name", asset.get("name") or Path(name).stem)
             try:
-                each.set("file", str(find(path, f"{base}/{name}" if base else name, search).resolve()))
+                asset.set("file", str(find(path, f"{base}/{name}" if base else name, search).resolve()))
             except Unread as error:
                 allowed = "the mesh in the folder of the file or in one of --search"
                 raise refuse(path, f"a body whose mass follows from {error}", allowed) from None
@@ -298,7 +299,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     for joint in stage.joints:
         api = physics.Joint(joint)
         ends = [[str(target) for target in end.GetTargets()] for end in (api.GetBody0Rel(), api.GetBody1Rel())]
-        if joint.IsA(physics.FixedJoint) and all(ends) and all(each[0] in names for each in ends):
+        if joint.IsA(physics.FixedJoint) and all(ends) and all(targets[0] in names for targets in ends):
             parents[ends[1][0]] = ends[0][0]
             continue
         number = 1 if ends[1] else 0
@@ -312,7 +313,7 @@ def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     bodies: Bodies = []
     for name, members in groups.items():
         copy = Usd.Stage.Open(stage.stage.Flatten())
-        for joint in [each for each in copy.Traverse() if each.IsA(physics.Joint)]:
+        for joint in [prim for prim in copy.Traverse() if prim.IsA(physics.Joint)]:
             target = [str(target) for target in physics.Joint(joint).GetBody1Rel().GetTargets()]
             if not (joint.IsA(physics.FixedJoint) and set(target).intersection(members[1:])):
                 joint.SetActive(False)

@@ -1,7 +1,7 @@
 """Bodies out of model files (URDF, SDF, MJCF, USD) for scene files, by the readers of `conservative verify`.
 
 A body turns about its joint. Bodies welded to it are included; bodies on further joints are not. A free body turns about its
-centre of mass. Body axes are those of the link, or of the body of MJCF or USD.
+centre of mass. Body axes are the axes of the link, or of the body of MJCF or USD.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ def body_from_file(path: str | PathLike[str], name: str, kind: str) -> MassDistr
             models = read_files([Path(text)], Path(folder))
     except BadInput as error:
         raise BadInput("path", error.got, error.allowed) from None
-    roots = {each: f"root element <{tag}>" for tag, each in ROOTS.items()} | {"usd": "USD"}
+    roots = {kind_of_root: f"root element <{tag}>" for tag, kind_of_root in ROOTS.items()} | {"usd": "USD"}
     if models[0].kind != kind:
         raise BadInput("path", f"{text!r}: {roots[models[0].kind]}", f"a file with {roots[kind]}" if kind != "usd" else "USD")
-    model = next((each for each in models if each.body.name == name), None)
-    able = [each.body.name for each in models if _turns(each)]
-    if model is None and not any(name == link.name for each in models for link in each.links):
+    model = next((loaded for loaded in models if loaded.body.name == name), None)
+    able = [loaded.body.name for loaded in models if _turns(loaded)]
+    if model is None and not any(name == link.name for loaded in models for link in loaded.links):
         raise BadInput("name", f"{name!r}, which is not in {text!r} with a mass", nearest(name, able))
     if model is None or not _turns(model):
         allowed = "one that a joint turns" + (": " + ", ".join(sorted(able)) if able else "; this file has none")

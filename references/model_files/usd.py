@@ -1,6 +1,6 @@
 """Rigid bodies of USD files, twice: as usd-core computes them, and from the attributes by the rules of UsdPhysics.
 
-usd-core opens the stage in both, after a look at what its layers refer to. Volumes of shapes are those of `weigh` in both; a
+usd-core opens the stage in both, after a look at the references of its layers. Volumes of shapes are from `weigh` in both; a
 round shape whose scale differs by axis is an ellipsoid in one, as it is drawn, and has the largest scale in the other, as in
 the schema's parser.
 """
@@ -25,7 +25,7 @@ from .pieces import DENSITY, ONE, Link, Piece, Reading, join, make_pose, roundin
 ASKS = {"newton": "newton", "mjc": "newton"}
 """Namespaces of attributes that ask an engine for something."""
 _SHAPES = {"cube": ("box", "size"), "sphere": ("sphere", "radius")} | {
-    each: (each, "radius", "height") for each in ("cylinder", "capsule", "cone")
+    name: (name, "radius", "height") for name in ("cylinder", "capsule", "cone")
 }
 
 
@@ -42,10 +42,10 @@ class Stage:
         def look(place: Path, seen: set[Path]) -> None:
             layer = Sdf.Layer.FindOrOpen(str(place))
             for name in filter(None, layer.GetCompositionAssetDependencies() if layer else []):  # none within the file
-                found = find(place, name, (path.parent, *search))
-                if found not in seen:
-                    seen.add(found)
-                    look(found, seen)
+                file = find(place, name, (path.parent, *search))
+                if file not in seen:
+                    seen.add(file)
+                    look(file, seen)
 
         self.path, self.physics = path, UsdPhysics
         try:
@@ -64,7 +64,7 @@ class Stage:
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self.joints = [prim for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get() is not False]
         children = [target for prim in self.joints for target in UsdPhysics.Joint(prim).GetBody1Rel().GetTargets()]
-        self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are those of the root
+        self.bodies.sort(key=lambda prim: prim.GetPath() in children)  # axes are the root's
 
     def pose(self, prim: Any) -> tuple[Array, Array]:
         """Return the pose (4, 4) of a prim, m, and its linear map (3, 3) in these axes, the scale. A body has no shear."""
@@ -78,16 +78,16 @@ class Stage:
         return make_pose(self.metre * world[:3, 3], R), R.T @ world[:3, :3]
 
     def colliders(self, body: Any) -> list[Any]:
-        """Return the enabled colliders of a body, without those of enabled bodies below it."""
+        """Return the enabled colliders of a body, without the colliders of enabled bodies below it."""
         from pxr import Usd
 
-        found, prims, api = [], iter(Usd.PrimRange(body, Usd.TraverseInstanceProxies())), self.physics.CollisionAPI
+        colliders, prims, api = [], iter(Usd.PrimRange(body, Usd.TraverseInstanceProxies())), self.physics.CollisionAPI
         for prim in prims:
             if prim != body and prim in self.bodies:
                 prims.PruneChildren()
             elif prim.HasAPI(api) and api(prim).GetCollisionEnabledAttr().Get() is not False:
-                found.append(prim)
-        return found
+                colliders.append(prim)
+        return colliders
 
     def form(self, prim: Any, pose: Array, density: float, stay_round: bool = False) -> Piece:
         """Return the part of a collider after a map `pose` (4, 4), with lengths in the units of the stage before it.
@@ -187,7 +187,7 @@ def read_usd(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
     """
     stage = Stage(path, search)
     bodies, joints = stage.bodies, stage.joints
-    if not bodies or len(joints) != len(bodies) - 1 or not all(each.IsA(stage.physics.FixedJoint) for each in joints):
+    if not bodies or len(joints) != len(bodies) - 1 or not all(joint.IsA(stage.physics.FixedJoint) for joint in joints):
         raise refuse(path, f"{len(bodies)} rigid bodies and the joints {[joint.GetName() for joint in joints]}", ONE)
     return [_link(stage, body, reading) for body in bodies]
 
@@ -197,8 +197,8 @@ def _link(stage: Stage, body: Any, reading: Reading) -> Link:
     for attribute in [authored for prim in dict.fromkeys([body, *colliders]) for authored in prim.GetAuthoredAttributes()]:
         space, colon, name = attribute.GetName().partition(":")
         if colon and space in ASKS:
-            said = f"{attribute.GetPath()} = {attribute.Get()}"
-            reading.ask(ASKS[space], name, str(attribute.Get()).lower(), said)
+            text = f"{attribute.GetPath()} = {attribute.Get()}"
+            reading.ask(ASKS[space], name, str(attribute.Get()).lower(), text)
         elif colon and space not in ("physics", "xformOp", "primvars", "material"):
             reading.notes.append(f"{attribute.GetPath()} is an attribute of a vendor, which is not read here")
     for name in ("kinematicEnabled", "startsAsleep"):

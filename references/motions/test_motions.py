@@ -11,7 +11,7 @@ ANGLE = 0.01  # |w| h, rad: 0.1, 0.03 or 0.01
 SINGLE = False  # single precision
 HAS = {"rotor", "torque", "damping", "fixed point", "orbit"}  # motions that need anything else are skipped
 NAMES = "attitude", "rates", "energy", "momentum"
-NEAR = 0.8  # sum of the squares of four logarithms, of errors over those of a mistake that explains them
+NEAR = 0.8  # sum of the squares of four logarithms: errors over the errors of a mistake that explains them
 
 
 # YOUR ENGINE
@@ -45,7 +45,7 @@ def rotate(q, v):
 
 
 def errors(m, i, q, w):
-    """Return the error of the attitude, rad, and those of rates, energy and momentum relative to the scales of the motion."""
+    """Return the errors of the attitude, rad, and of rates, energy and momentum relative to the scales of the motion."""
     L, exact, scale = [dot(row, w) for row in m["inertia_B"]], m["quaternion_wxyz"][i], m["scale"]
     energy = dot(L, w) / 2 + m.get("weight", 0) * rotate(q, m.get("com_B", [0, 0, 0]))[2]
     momentum = rotate(q, [x + y for x, y in zip(L, m.get("rotor_momentum_B", [0, 0, 0]))])
@@ -61,12 +61,12 @@ def errors(m, i, q, w):
 def worst(m, steps):
     """Return the largest errors of a motion with so many steps before each sample."""
     states = simulate(m, m["t"][0] / steps, steps, len(m["t"]))
-    every = zip(*(errors(m, i, list(q), list(w)) for i, (q, w) in enumerate(states)))
-    return [max(math.inf if math.isnan(x) else x for x in each) for each in every]
+    rows = zip(*(errors(m, i, list(q), list(w)) for i, (q, w) in enumerate(states)))
+    return [max(math.inf if math.isnan(x) else x for x in column) for column in rows]
 
 
 def distance(found, limit, known):
-    """Return how far errors are from those of a mistake, where they are above the tolerance."""
+    """Return the distance of errors above the tolerance from the errors of a mistake."""
     return sum(math.log(max(x, y) / max(known[name], y)) ** 2 for x, y, name in zip(found, limit, NAMES))
 
 
@@ -81,13 +81,13 @@ def test_motion(path):
     if missing := set(m["features"]) - HAS:
         pytest.skip(f"it has {', '.join(missing)}")
     tested.append(m["name"])
-    (allowed,) = (each for each in m["tolerance"] if each["order"] == ORDER and each["angle"] == ANGLE)
+    (allowed,) = (row for row in m["tolerance"] if row["order"] == ORDER and row["angle"] == ANGLE)
     limit = [allowed[name] + SINGLE * m["single"] for name in NAMES]
     found = worst(m, allowed["steps"])
     most = max(range(4), key=lambda k: found[k] / limit[k])
     if (ratio := found[most] / limit[most]) <= 1:
         return
-    near = {each["mistake"]: distance(found, limit, each) for each in m["catches"]}
+    near = {mistake["mistake"]: distance(found, limit, mistake) for mistake in m["catches"]}
     near = {name: apart for name, apart in near.items() if apart < NEAR}
     half = worst(m, 2 * allowed["steps"])[most]
     falls = math.log2(found[most] / half) if 0 < half < math.inf and found[most] < math.inf else 0.0
@@ -113,7 +113,7 @@ def summary():
         if 10 * len(votes[best]) < len(failing):
             break
         lines.append(f'"{best}" explains {len(votes[best])} of them')
-        rest = {name: each for name, each in rest.items() if best not in each[0]}
+        rest = {name: explained for name, explained in rest.items() if best not in explained[0]}
     order = sorted(falls for _, falls in failing.values())[len(failing) // 2]
     if 2 * len(rest) > len(failing) and 0.5 <= order < ORDER - 0.5:
         lines.append(f"this program has order {order:.1f}, {ORDER} was declared")

@@ -43,11 +43,11 @@ _FEW_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Heyoka(Method):
-    """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
+    """heyoka's adaptive Taylor integrator in double precision; dt is only the interval between samples.
 
     Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
     vectorised within a step). `fast_math` is on for base vectors only, which then take 14 % less to 8 % more time. Samples are
-    values of the steps' Taylor polynomials and as accurate as the steps. Fields are those of
+    values of the steps' Taylor polynomials and as accurate as the steps. Fields are in
     `conservative.references.heyoka_equations.accelerations`.
 
     Parameters
@@ -167,8 +167,8 @@ class Heyoka(Method):
             _begin(integrator, parameters, problem.start)
             return _bind_loop(integrator, problem.start, t)
 
-        def convert(found: tuple[Array, int, str]) -> Trajectory:
-            states, steps, reason = found
+        def convert(result: tuple[Array, int, str]) -> Trajectory:
+            states, steps, reason = result
             return problem.axes.trajectory(grid, label, samples(states[None]), Counters(steps), reason)
 
         return EngineRun(loop, convert, bind)
@@ -180,14 +180,14 @@ class Heyoka(Method):
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         axes = take_axes(bodies, grid, self.unsupported)
-        problems = [getattr(formulations, self.frame)(each.scene) for each in axes or ()]
+        problems = [getattr(formulations, self.frame)(axis.scene) for axis in axes or ()]
         if not problems or any(problem.form != problems[0].form for problem in problems):
             return None
         if self.numbers == "compiled" and any(problem.parameters != problems[0].parameters for problem in problems):
             raise BadInput("numbers", "'compiled' for bodies that differ", "bodies with the same equations, or 'parameters'")
         width = self.width or int(forms.heyoka().recommended_simd_size())
         padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
-        rows = (np.array([getattr(each, name) for each in padded]) for name in ("parameters", "start"))
+        rows = (np.array([getattr(problem, name) for problem in padded]) for name in ("parameters", "start"))
         parameters, start = (row.reshape(-1, width, row.shape[1]).swapaxes(1, 2).copy() for row in rows)
         batches = self.integrators(problems[0], width), parameters, start
         march, t = _run_batches if self.driver == "batch" else _run_ensemble, grid.t
@@ -296,6 +296,8 @@ def _run_ensemble(integrators: forms.Integrators, parameters: Array, start: Arra
     with integrators.borrow() as integrator:
         for sample, time in enumerate(t[1:], start=1):
             done = hy.ensemble_propagate_until_batch(integrator, time, len(start), begin, max_workers=1, max_steps=STEP_LIMIT)
-            made = [each[0] for each in done]
-            states[sample] = np.concatenate([np.where(each.time == time, each.state, np.nan) for each in made], axis=1)
+            made = [entry[0] for entry in done]
+            states[sample] = np.concatenate(
+                [np.where(integrator.time == time, integrator.state, np.nan) for integrator in made], axis=1
+            )
     return states

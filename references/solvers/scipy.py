@@ -38,7 +38,7 @@ _COMPILED: dict[str, dict[str, Any]] = {
     **{"DOP853": {"name": "dop853"}, "RK45": {"name": "dopri5"}, "LSODA": {"name": "lsoda"}},
     **{"BDF": {"name": "vode", "method": "bdf", "with_jacobian": True}, "Adams": {"name": "vode", "method": "adams"}},
 }
-"""Settings of `scipy.integrate.ode` for those of its integrators that are like ours."""
+"""Settings of `scipy.integrate.ode` for its integrators that are like ours."""
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
 
 Derivative = Callable[[float, Array], Array]
@@ -46,7 +46,7 @@ Derivative = Callable[[float, Array], Array]
 
 @dataclass(frozen=True)
 class SciPy(Method):
-    """SciPy's integrators with their own step control; dt is only the distance of samples.
+    """SciPy's integrators with their own step control; dt is only the interval between samples.
 
     The state is the quaternion, scalar first, of principal axes F in the world, and the rates in F. numba compiles the
     right-hand side for the fields of this package. Any other potential works as well, through its gradient.
@@ -115,8 +115,8 @@ class SciPy(Method):
             with np.errstate(all="ignore"):  # a diverging run is reported by its status
                 return solve_pieces(scene, pieces, grid.t, solver, grid.last)
 
-        def convert(found: tuple[Array, Counters, str]) -> Trajectory:
-            y, work, reason = found
+        def convert(result: tuple[Array, Counters, str]) -> Trajectory:
+            y, work, reason = result
             return axes.trajectory(grid, self.label, States(QUATERNION, y[None]), work, *([reason] if reason else []))
 
         smooth, longest = len(pieces) == 1 and scene.body.motor is None, scene.smoothness(grid.last).step
@@ -146,11 +146,11 @@ def solve_pieces(
 ) -> tuple[Array, Counters, str]:
     """Return states (n, 7), a quaternion and rates in principal axes, at increasing times t (n,), s, from a solver.
 
-    `pieces` are those of `list_derivatives`, for the same `last`: the solver starts again in each. The integrated rates are
+    `pieces` are from `list_derivatives`, for the same `last`: the solver starts again in each. The integrated rates are
     J^-1 (J w + h): a motor changes h, but not the sum. Return also the steps and evaluations, and the reason if the states end
     early.
     """
-    found, steps, evaluations, reason = list[Array](), 0, 0, ""
+    samples, steps, evaluations, reason = list[Array](), 0, 0, ""
     wheel = wheel_rates(scene)
     y = initial_state(principal_axes(scene))
     y[4:] += wheel(pieces[0][0])
@@ -159,17 +159,17 @@ def solve_pieces(
         last = b == pieces[-1][1]
         some = t[(t >= a) & ((t < b) | last)]
         if not np.isfinite(derivative(a, y)).all():  # SciPy would look for a first step for ever
-            found.append(y[None][: len(some)])
+            samples.append(y[None][: len(some)])
             break
         states, work, reason = solver.march(derivative, (a, b), y, some if last else np.append(some, b), longest)
         steps, evaluations = steps + work[0], evaluations + work[1]
-        found.append(states[: len(some)])
+        samples.append(states[: len(some)])
         if reason:
             break
         y = states[-1]
-    states = np.concatenate(found)
+    states = np.concatenate(samples)
     if scene.body.motor is not None:
-        states[:, 4:] -= np.array([wheel(each) for each in t[: len(states)].tolist()]).reshape(-1, 3)
+        states[:, 4:] -= np.array([wheel(time) for time in t[: len(states)].tolist()]).reshape(-1, 3)
     return states, Counters(steps, evaluations=evaluations), reason
 
 
@@ -199,11 +199,11 @@ class SolveIvp(Settings):
         integrate = load("scipy.integrate", "scipy", "SciPy")
         kind = _count_steps(getattr(integrate, self.integrator))
         try:
-            found = integrate.solve_ivp(f, span, y, kind, t, rtol=self.rtol, atol=self.atol, max_step=longest)
+            result = integrate.solve_ivp(f, span, y, kind, t, rtol=self.rtol, atol=self.atol, max_step=longest)
         except (ArithmeticError, ValueError) as error:  # implicit solvers refuse matrices that are not finite or singular
             return y[None][: np.count_nonzero(t[:1] == span[0])], (kind.steps, 0), str(error)
-        states = np.reshape(found.y, (7, -1)).T  # SciPy returns an empty list if the first step failed
-        return states, (kind.steps, int(found.nfev)), found.message if len(states) < len(t) else ""
+        states = np.reshape(result.y, (7, -1)).T  # SciPy returns an empty list if the first step failed
+        return states, (kind.steps, int(result.nfev)), result.message if len(states) < len(t) else ""
 
     def bind(self, f: Derivative, y: Array, t: Array, longest: float) -> Callable[[], Any]:
         solve = load("scipy.integrate", "scipy", "SciPy").solve_ivp
@@ -235,8 +235,8 @@ class Ode(Settings):
                     counts = solver._integrator.iwork[17:15:-1] if restarts else solver._integrator.iwork[10:12]
                     work = counts + work * restarts
                 if not solver.successful():
-                    known = solver._integrator.messages | {-2 if restarts else -1: f"step limit of {STEP_LIMIT} reached"}
-                    return np.reshape(states, (-1, 7)), work.tolist(), known.get(solver.get_return_code(), "it failed")
+                    messages = solver._integrator.messages | {-2 if restarts else -1: f"step limit of {STEP_LIMIT} reached"}
+                    return np.reshape(states, (-1, 7)), work.tolist(), messages.get(solver.get_return_code(), "it failed")
                 if not np.isfinite(y).all():
                     return np.reshape(states, (-1, 7)), work.tolist(), "the state is not finite"
                 states.append(y)
@@ -258,7 +258,7 @@ class Ode(Settings):
     def _make(self, f: Derivative, longest: float, steps: int | None = None) -> Any:
         failures, nothing = list[BaseException](), np.full(7, np.nan)
 
-        def guarded(t: float, y: Array) -> Array:  # `dop853` never ends after an exception, such as that of Ctrl-C
+        def guarded(t: float, y: Array) -> Array:  # `dop853` never ends after an exception, such as Ctrl-C's
             try:
                 return f(t, y)
             except BaseException as failure:

@@ -62,7 +62,7 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     with suppress(OSError):  # of a working directory that was removed
         folder = os.getcwd()  # noqa: PTH109  # links are not resolved
     while True:
-        kept = [_bytes_of(each, tuple(by_value)) for each in shared]
+        kept = [_bytes_of(value, tuple(by_value)) for value in shared]
         content = dump((sys.path, folder, kept, dump(work, shared, by_value)))
         try:
             worker = process or _idle.pop()

@@ -37,7 +37,7 @@ LARGEST_ANSWER = 1 << 30
 """Largest answer in bytes."""
 LARGEST_FILE = 1 << 28
 """Largest file in bytes that a program with a memory limit may write, including its output."""
-_LAST_WORDS = 300
+_LONGEST_LINE = 300
 _ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")  # above a stack, of Python and of Node
 _PATIENCE = 2.0  # s, for a program to end when its input closes
 _LONGEST_WAIT = 1e6  # s
@@ -148,7 +148,7 @@ class Worker:
     folder
         Folder in which each process gets a working directory, removed when it ends; by default the current directory.
     variables
-        Environment variables of the process; by default those of this one.
+        Environment variables of the process; by default the same as of this one.
     memory
         Memory limit in bytes, which only Linux supports; 0 for none.
     show_output
@@ -206,12 +206,12 @@ class Worker:
 
     def _check(self, do: str, answer: dict[str, Any]) -> None:
         """Raise `EngineCrashed` if a field of an answer is not as in `ANSWERS`. Drop optional ones that are None."""
-        for name, (is_right, words) in (_OF_ANY | dict(ANSWERS.get(do, {}))).items():
+        for name, (is_right, expected) in (_OF_ANY | dict(ANSWERS.get(do, {}))).items():
             if name in answer and answer[name] is None and name in _OPTIONAL:
                 del answer[name]
             if name in answer and not is_right(answer[name]):
                 value = shorten(repr(answer[name])[:100])
-                raise EngineCrashed(f"{self._command[0]} answers `{do}` with `{name}`: {value}; expected {words}")
+                raise EngineCrashed(f"{self._command[0]} answers `{do}` with `{name}`: {value}; expected {expected}")
 
     def greet(self, limit: float = START_LIMIT) -> dict[str, Any]:
         """Return the answer of the program to `hello`, within a limit in s if it has to start. Raise as `ask`."""
@@ -337,13 +337,13 @@ class Worker:
             process.wait(_PATIENCE)
         except subprocess.TimeoutExpired:  # it closed its pipes, but goes on
             process.kill()
-        code, words = process.wait(), self._last_words()
+        code, last_line = process.wait(), self._last_line()
         self._end()
         how = f"exit code {code}" if code >= 0 else f"signal {-code}"
         name = f" ({signal.Signals(-code).name})" if -code in set(signal.Signals) else ""
-        return f"{how}{name}" + (f": {words}" if words else "")
+        return f"{how}{name}" + (f": {last_line}" if last_line else "")
 
-    def _last_words(self) -> str:
+    def _last_line(self) -> str:
         """Return the last line of output. If Python or Node printed a stack, return the line above it, with the error."""
         if self._output is None:
             return ""
@@ -351,8 +351,8 @@ class Worker:
         self._output.seek(max(0, size - 8192))
         lines = [line.strip() for line in self._output.read().decode(errors="replace").splitlines() if line.strip()]
         stack = next((i for i, line in enumerate(lines) if line.startswith(_ERRORS)), None)
-        words = lines if stack is None else lines[: stack + 1]
-        return "".join(char if char.isprintable() else "?" for char in (words[-1] if words else ""))[:_LAST_WORDS]
+        last_lines = lines if stack is None else lines[: stack + 1]
+        return "".join(char if char.isprintable() else "?" for char in (last_lines[-1] if last_lines else ""))[:_LONGEST_LINE]
 
     def _end(self, at_once: bool = False) -> None:
         if self._process is not None:

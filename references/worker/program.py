@@ -59,9 +59,9 @@ def _name_numbers(value: Any) -> Any:
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
-        return {name: _name_numbers(each) for name, each in value.items()}
+        return {name: _name_numbers(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_name_numbers(each) for each in value]
+        return [_name_numbers(item) for item in value]
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -76,9 +76,9 @@ def from_json(data: bytes) -> Message:
 
 def _restore_numbers(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _restore_numbers(each) for name, each in value.items()}
+        return {name: _restore_numbers(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_restore_numbers(each) for each in value]
+        return [_restore_numbers(item) for item in value]
     return NOT_FINITE.get(value, value) if isinstance(value, str) else value
 
 

@@ -113,7 +113,8 @@ def element(
     duration, name = float(times[-1]), trajectories[0].scene.name
     content = {"duration": duration, "frames": len(times), "truth": truth, "colours": COLOURS}
     data = json.dumps(content | {"panels": [panel.data() for panel in panels]}, separators=(",", ":"), allow_nan=False)
-    return frame(panels, name, duration, id, data.replace("<", "\\u003c"), legend(panels, truth))  # no end of the script
+    data = data.replace("<", "\\u003c")  # a label with </script> must not end the script that contains the data
+    return frame(panels, name, duration, id, data, legend(panels, truth))
 
 
 def frame(

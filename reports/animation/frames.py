@@ -29,7 +29,7 @@ MOST = 1e6
 """Largest angular momentum in the data of a panel, relative to the initial one; the arrow ends before."""
 ERROR = "attitude error, rad"
 LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
-"""Largest values that are good, and fair, of the attitude error; those of drifts are 1e-10 and 1e-3."""
+"""Largest values that are good, and fair, of the attitude error; for drifts they are 1e-10 and 1e-3."""
 FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
 COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
@@ -152,7 +152,7 @@ class Panel:
         """Return the data for the player: rounded, and numbers as the frames from which they have a text and a grade."""
         values = {"size": self.solid.size, "tip": self.tip, "q": np.roll(to_quaternion(self.R_WP), -1, axis=1), "L": self.L_W}
         texts = [[self.text(name, frame) for frame in range(len(self.R_WP))] for name in self.sizes]
-        starts = [[next(same) for _, same in groupby(enumerate(each), lambda pair: pair[1])] for each in texts]
+        starts = [[next(same) for _, same in groupby(enumerate(track), lambda pair: pair[1])] for track in texts]
         shown = [[(frame, *text) for frame, text in start] for start in starts]
         return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {
             "shape": self.solid.shape,
@@ -190,10 +190,11 @@ def largest_values(trajectory: Trajectory, error: Array | None) -> dict[str, Arr
 def longest(trajectories: Sequence[Trajectory]) -> float:
     """Return the time, s, up to which the motions can be watched; infinity if all of it."""
     ends = []
-    for each in [trajectory for trajectory in trajectories if trajectory.ok] or trajectories:
-        turned = np.cumsum(np.diff(each.t) * np.linalg.norm(each.w_WB_B[1:], axis=1))
+    right = [trajectory for trajectory in trajectories if trajectory.ok]
+    for trajectory in right or trajectories:
+        turned = np.cumsum(np.diff(trajectory.t) * np.linalg.norm(trajectory.w_WB_B[1:], axis=1))
         within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # of the angle that `make_panels` takes from a mean rate
-        ends.append(math.inf if within == len(turned) else float(each.t[within]))
+        ends.append(math.inf if within == len(turned) else float(trajectory.t[within]))
     return max(ends, default=math.inf)
 
 
@@ -218,10 +219,10 @@ def make_panels(
         raise BadInput("t_end", got, f"at most {MOST_FRAMES * TURN / rate:.3g} s, so that the motion can be watched")
     times, exact = np.linspace(0.0, duration, frames), None if truth is None else trajectories[truth]
     panels = []
-    for each, label, known in zip(trajectories, labels, values or [None] * len(trajectories), strict=True):
-        if known is None:
-            known = largest_values(each, None if exact is None or each is exact else _errors(each, exact))
-        panels.append(_panel(each, label, times, known))
+    for trajectory, label, largest in zip(trajectories, labels, values or [None] * len(trajectories), strict=True):
+        if largest is None:
+            largest = largest_values(trajectory, None if exact is None or trajectory is exact else _errors(trajectory, exact))
+        panels.append(_panel(trajectory, label, times, largest))
     return times, panels
 
 
@@ -236,7 +237,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     share = np.clip((times - t[before]) / np.where(after > before, t[after] - t[before], 1.0), 0.0, 1.0)
     start, stop = Rotation.from_matrix(trajectory.R_WB[before]), Rotation.from_matrix(trajectory.R_WB[after])
     R_WB = (start * Rotation.from_rotvec(share[:, None] * (start.inv() * stop).as_rotvec())).as_matrix()
-    last = np.append(before[:-1], len(t) - 1)  # the last numbers are those of the whole run
+    last = np.append(before[:-1], len(t) - 1)  # the last numbers belong to the whole run
     lengths = np.linalg.norm(trajectory.momentum_W, axis=1)
     tip = np.asarray(getattr(scene.potential, "com_B", np.zeros(3))) @ body.R_BP
     solid = _solid_of(body.moments, tip)

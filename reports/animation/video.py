@@ -1,6 +1,6 @@
 """Animations as .gif, and their last frame as .png: the scene of the page, drawn by Pillow.
 
-Its fonts have no other letters than those of ASCII, so that others are written without accents, or as question marks.
+Its fonts have letters of ASCII only, so that others are written without accents, or as question marks.
 """
 
 from __future__ import annotations

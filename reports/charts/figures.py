@@ -56,9 +56,9 @@ def _with_range(points: pd.DataFrame, name: str = "microseconds") -> pd.DataFram
     Times of a single process have no range: both ends are the time.
     """
     ends = []
-    for each, mean in zip(points["times"] if "times" in points else points["time"], points["time"], strict=True):
-        known = [time for time in each if not math.isnan(time)] if isinstance(each, tuple) else []
-        ends.append((min(known), max(known)) if len(known) > 1 else (mean, mean))
+    for processes, mean in zip(points["times"] if "times" in points else points["time"], points["time"], strict=True):
+        times = [time for time in processes if not math.isnan(time)] if isinstance(processes, tuple) else []
+        ends.append((min(times), max(times)) if len(times) > 1 else (mean, mean))
     low, high = np.array(ends, dtype=float).reshape(-1, 2).T * 1e6
     return points.drop(columns="times", errors="ignore").assign(**{name: points["time"] * 1e6, "low": low, "high": high})
 
@@ -76,7 +76,7 @@ def _about_bars(data: pd.DataFrame) -> str:
 
 
 def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
-    """Return dashed rising lines of known slopes with labels, from the two ends of each: columns text, and those of x and y."""
+    """Return dashed rising lines of known slopes with labels, from the two ends of each: columns of text, x and y."""
     base = alt.Chart(ends).encode(x=x, y=y)
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
     logs: Any = ends.set_index("text").apply(np.log).groupby("text")
@@ -150,7 +150,7 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
         powers = [10.0**k for k in range(-12, 13, 3)]
         if 0 < largest < powers[0]:  # of round-off alone: one number on each side
             decade = math.floor(math.log10(largest))
-            powers = [max(each for each in (float(f"{digit}e{decade}") for digit in (1, 2, 5)) if each <= largest)]
+            powers = [max(power for power in (float(f"{digit}e{decade}") for digit in (1, 2, 5)) if power <= largest)]
         ticks = [-p for p in powers if -p >= 10 * ends[0]] + [0.0] + [p for p in powers if p <= 10 * ends[1]]
         axis = alt.Axis(
             title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"
@@ -202,7 +202,7 @@ def growth_guides(part: pd.DataFrame, largest: float) -> pd.DataFrame:
     rows = []
     for text, power in _GROWTHS:
         factor = min(last / first, (largest / least) ** (1 / power))
-        rows += [(text, first * each, least * each**power) for each in (1.0, factor)]
+        rows += [(text, first * stretch, least * stretch**power) for stretch in (1.0, factor)]
     return pd.DataFrame(rows, columns=["text", "t", "shown"])
 
 

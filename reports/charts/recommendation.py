@@ -19,14 +19,18 @@ STEP, TOLERANCE = "step, s", "tolerance"
 
 
 def points(recommendation: Recommendation) -> pd.DataFrame:
-    """Return a row for each probe: name and family, kind and value of the setting, error to expect, rad, number."""
+    """Return a row for each probe, which is a trial run of a method with a setting.
+
+    Columns: name and family of the method, kind and value of the setting, expected error in rad, number of the run, and whether
+    the setting is recommended.
+    """
     rows = [
         {
             "name": method_text(advice),
             "family": probe.method.family,
             "kind": STEP if tolerance_setting(probe.method) is None else TOLERANCE,
             "setting": probe.setting,
-            "expected": min(probe.expected, math.pi),
+            "expected": min(probe.expected, math.pi),  # the largest angle; an axis has no place for infinity
             "run": number,
             "recommended": probe is advice.best and advice.reached,
         }
@@ -38,20 +42,23 @@ def points(recommendation: Recommendation) -> pd.DataFrame:
 
 def costs(recommendation: Recommendation) -> pd.DataFrame:
     """Return a row for each method that reaches the error: name, setting, cost in µs per simulated second."""
-    reaching = [advice for advice in recommendation.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
-    rows = [{"name": method_text(a), "setting": setting_text(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
+    rows = [
+        {"name": method_text(advice), "setting": setting_text(advice.best), "cost": advice.cost * 1e6}
+        for advice in recommendation.advice
+        if advice.reached and advice.best and not math.isnan(advice.cost)
+    ]
     return pd.DataFrame(rows, columns=["name", "setting", "cost"])
 
 
 def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
-    data, prices, asked = points(recommendation), costs(recommendation), recommendation.conditions
+    data, prices, question = points(recommendation), costs(recommendation), recommendation.conditions
     families = families_of(data)
-    panels = [_probes(part, str(kind), families, asked.error) for kind, part in data.groupby("kind", sort=True)]
+    panels = [_probes(part, str(kind), families, question.error) for kind, part in data.groupby("kind", sort=True)]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, families))
-    title = f"{asked.scene.name}: {asked.error:g} rad over {asked.duration:g} s"
+    title = f"{question.scene.name}: {question.error:g} rad over {question.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return apply_style(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 

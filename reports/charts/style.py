@@ -66,8 +66,8 @@ def family_colours() -> dict[str, str]:
 
 def order_lines(families: Mapping[str, str]) -> Families:
     """Return lines in the order of legends: families in the order of their colours, numbers by value."""
-    known = list(family_colours())
-    rank = {name: known.index(family) if family in known else len(known) for name, family in families.items()}
+    coloured = list(family_colours())
+    rank = {name: coloured.index(family) if family in coloured else len(coloured) for name, family in families.items()}
     return {name: families[name] for name in sorted(rank, key=lambda name: (rank[name], _by_value(name)))}
 
 
@@ -85,10 +85,10 @@ def _by_value(name: str) -> list[tuple[float, str]]:
 def colours(families: Families) -> dict[str, str]:
     """Return the colour of each line: the colour of its family, which is the same in every picture."""
     named = family_colours()
-    nameless = sorted(name for name, each in registry.list_families().items() if each.role in (Role.OURS, Role.BASELINE))
+    nameless = sorted(name for name, family in registry.list_families().items() if family.role in (Role.OURS, Role.BASELINE))
     strangers = [name for name in dict.fromkeys([*nameless, *sorted(set(families.values()))]) if name not in named]
-    known = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
-    return {name: known[family] for name, family in families.items()}
+    assigned = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
+    return {name: assigned[family] for name, family in families.items()}
 
 
 def number_in_family(families: Families) -> dict[str, int]:
@@ -110,7 +110,8 @@ def look(families: Families, second: str, **legend: Any) -> dict[str, Any]:
     looks_of = {"color": colours(families), second: dict(zip(families, of_settings, strict=True))}
     channels = {"color": alt.Color, "shape": alt.Shape, "strokeDash": alt.StrokeDash}
     return {
-        name: channels[name]("name:N", scale=scale(each), sort=list(families), legend=shown) for name, each in looks_of.items()
+        name: channels[name]("name:N", scale=scale(values), sort=list(families), legend=shown)
+        for name, values in looks_of.items()
     }
 
 

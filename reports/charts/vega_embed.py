@@ -75,7 +75,7 @@ def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420) -> list[S
 
     Tooltips contain `shown`: keys of `SHOWN`, or fields with kind and title.
     """
-    tooltip = [SHOWN[each] if isinstance(each, str) else each for each in shown]
+    tooltip = [SHOWN[key] if isinstance(key, str) else key for key in shown]
     whole: Spec = specification(chart)
     if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
@@ -95,7 +95,7 @@ def _panels(spec: Spec, shared: Spec) -> Iterator[Spec]:
 
 
 def _parts(spec: Spec) -> Sequence[Spec] | None:
-    return next((spec[way] for way in ("vconcat", "hconcat", "concat") if way in spec), None)
+    return next((spec[direction] for direction in ("vconcat", "hconcat", "concat") if direction in spec), None)
 
 
 def _panel(panel: Spec, whole: Spec, tooltip: Sequence[Shown], height: int) -> Spec:
@@ -103,7 +103,7 @@ def _panel(panel: Spec, whole: Spec, tooltip: Sequence[Shown], height: int) -> S
     data = whole["datasets"]
     for unit in units:
         rows = data[unit.get("data", panel.get("data"))["name"]] if "data" in unit or "data" in panel else ()
-        _prepare(unit, [each for each in tooltip if not rows or each[0] in rows[0]])
+        _prepare(unit, [entry for entry in tooltip if not rows or entry[0] in rows[0]])
     fields = set(_fields(panel))
     tables = {unit["data"]["name"]: as_csv(data[unit["data"]["name"]], fields) for unit in units if "data" in unit}
     for unit in units:

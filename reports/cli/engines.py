@@ -69,7 +69,7 @@ def install(
             yield install(name, Source(find_links, allow_build), force)
 
     done = _show(install_each(), installation_line, as_json, f"installing {', '.join(names)}")
-    ctx.exit(int(any(each.trouble for each in done)))
+    ctx.exit(int(any(engine.trouble for engine in done)))
 
 
 @engines.command(
@@ -77,7 +77,7 @@ def install(
     epilog=epilog("conservative engines add ./my_engine", "conservative engines add 'node engine.js' --project"),
 )
 @click.argument("command")
-@click.option("--name", default="", help="Name of the engine.  [default: that of the program's file]")
+@click.option("--name", default="", help="Name of the engine.  [default: the name of the program's file]")
 @click.option("--project", is_flag=True, help="Register it in conservative.toml of this project, not for the user.")
 @json_option
 def add(command: str, name: str, project: bool, as_json: bool) -> None:
@@ -116,7 +116,7 @@ def list_engines(as_json: bool) -> None:
 @click.argument("names", nargs=-1, required=True, metavar="NAME[@VERSION]...")
 @json_option
 def remove(names: tuple[str, ...], as_json: bool) -> None:
-    """Remove the environment of each NAME@VERSION, or all environments of NAME. A program is not an engine any more."""
+    """Remove the environment of each NAME@VERSION, or all environments of NAME. A program is unregistered."""
     require_extra("conservative engines", "environments")
     from conservative.references.environments.install import remove
 

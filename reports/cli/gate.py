@@ -56,7 +56,7 @@ OF_VERSIONS = (
 @click.option(
     "--update",
     metavar="REASON",
-    help="Accept RESULTS, all of one commit, as the new baseline, and record the reason in its history.",
+    help="Accept RESULTS, which must be of one commit, as the new baseline, and record the reason in its history.",
 )
 @click.option(
     "--against",
@@ -77,7 +77,7 @@ OF_VERSIONS = (
     "--accept-slower",
     multiple=True,
     metavar="NAME=6x[: REASON]",
-    help="With --against: accept that a method takes up to so many times as long. For CI, a line in conservative.toml.",
+    help="With --against: accept that a method takes up to this many times as long. In CI, use conservative.toml instead.",
 )
 @click.option(
     "--processes", type=click.IntRange(2), metavar="N", help="With --against: number of processes per version.  [default: 7]"
@@ -132,7 +132,7 @@ def _judge(options: dict[str, Any]) -> Document:
     from ..document.model import Document, Paragraph, Table, filled
 
     path = options["baseline"] or baseline.PATH
-    runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
+    runs = [results.read(path) for path in options["results"] or [results.FOLDER / results.FILE]]
     if options["update"] is None:
         before = baseline.read(path)
         verdicts = [decide(before, run) for run in runs]

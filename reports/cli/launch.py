@@ -10,7 +10,7 @@ import warnings
 from ..terminal.interrupts import handle_signals, received
 
 _shown = set[str]()
-"""Texts of warnings that were printed: methods with the same steps warn of the same."""
+"""Texts of warnings that were printed: several methods can give the same warning."""
 
 
 def launch() -> None:
@@ -20,11 +20,11 @@ def launch() -> None:
     _separate_stdout()
     warnings.showwarning = show_warning
     try:
-        from .main import main
+        from .main import main  # here: an interrupt during these imports is handled as well
 
         main(prog_name="conservative")
     except (KeyboardInterrupt, Exception):
-        if not received:
+        if not received:  # after a signal, libraries can turn the interrupt into an exception of their own
             raise
         print("Interrupted", file=sys.stderr)
         sys.exit(received[0].exit_code)
@@ -38,10 +38,12 @@ def show_warning(message: Warning | str, *place: object, **options: object) -> N
 
 
 def _open_streams() -> None:
-    """Open closed ones of stdin, stdout and stderr. Otherwise the next opened file would get their descriptor."""
+    """Open stdin, stdout and stderr if they are closed. Otherwise the next opened file would get their descriptor."""
+    # A new descriptor is the smallest free one: while it is 2 or less, one of the three was closed.
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
+    # Python has set the stream of a closed descriptor to None.
     sys.stdin, sys.stdout, sys.stderr = (
         stream or os.fdopen(number, "w" if number else "r", closefd=False)
         for number, stream in enumerate((sys.stdin, sys.stdout, sys.stderr))

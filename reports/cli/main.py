@@ -74,14 +74,14 @@ def _as_click(error: Exception) -> Exception:
 
 
 FIRST = """\
-conservative run brick_flip                      integrate a tumbling brick, and say how wrong the result is
-conservative watch brick_flip                    see it move, beside other methods
-conservative recommend brick_flip --error 1e-6   which method to use, with which step
+conservative run brick_flip                      integrate a tumbling brick, and show its errors
+conservative watch brick_flip                    see the motion
+conservative recommend brick_flip --error 1e-6   find the method and the step to use
 conservative verify run.csv --body my_body.toml  is a recorded motion right, and if not, what is wrong?
-conservative report                              measure all methods on the paper's scenes: a page, in a minute
-conservative new > my_body.toml                  describe your own body; each command takes this file
+conservative report                              compare methods and engines: a page, in a minute or two
+conservative new > my_body.toml                  describe your own body; every command accepts this file
 conservative --help                              all commands"""
-"""What can be done, for somebody who types the name of the command only."""
+"""What to do first, for a user who types only the name of the command."""
 
 
 @click.group(
@@ -97,7 +97,7 @@ conservative --help                              all commands"""
 @click.version_option(package_name="conservative-rotation", message="%(prog)s %(version)s")
 @click.pass_context
 def main(context: click.Context) -> None:
-    """Integrate the rotation of rigid bodies with conserved energy and momentum, and compare with physics engines.
+    """Integrate the rotation of rigid bodies, and measure and verify integrators and physics engines.
 
     Tab completion in bash: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)". In zsh and fish: zsh_source, fish_source.
     """

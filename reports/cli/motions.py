@@ -18,10 +18,10 @@ from .options import Command, FilePath, epilog, json_option, option, require_rep
 @click.option("--force", is_flag=True, help="Replace files that this command did not write.")
 @json_option
 def motions(out: Path, force: bool, as_json: bool) -> None:
-    """Write 48 short motions as JSON and CSV, with tolerances and the mistakes that they catch.
+    """Write 48 short motions as JSON and CSV, with tolerances and the mistakes that each motion reveals.
 
-    The files are those of references/motions, to the last digit. Solutions are computed again in multi-precision and tolerances
-    measured again, with all designs of right programs, which takes some minutes.
+    The files equal those of references/motions to the last digit. The command computes all solutions again in multi-precision,
+    and measures all tolerances again with right programs of all designs, which takes some minutes.
     """
     from conservative.benchmarks.verification.motions import files
 

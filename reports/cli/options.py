@@ -35,7 +35,7 @@ VOCABULARY: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxy
         "picture": (("--picture",), ()),
     }
 )
-"""Options of several commands: their names, and those of the last release, which work with a note until the next one."""
+"""Options of several commands: their names, and their names in the last release, which work with a note until the next one."""
 FAILED = "a run failed"
 FAILED_OR_INACCURATE = f"{FAILED}, or its attitude error is above 0.1 rad"
 EXIT_CODES = {
@@ -64,8 +64,8 @@ class OldName(click.ClickException):
 
     def __init__(self, old: str, arguments: Iterable[str] = ()) -> None:
         new = OLD_NAMES[old]
-        given = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
-        super().__init__(f"{old} is now {new}. Run: conservative {new} {given}".rstrip())
+        rest = shlex.join(arguments) or ("SUBJECT..." if new.startswith("verify") else "")
+        super().__init__(f"{old} is now {new}. Run: conservative {new} {rest}".rstrip())
 
 
 class Gone(click.ClickException):
@@ -289,8 +289,8 @@ skip_missing_option = click.option(
 quick_option = click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
 engines_option = names_option(
     "engines",
-    "Add engines: NAME, NAME@VERSION, or `all`, the installed ones (see `conservative engines`). A report gets a section that "
-    "compares them.",
+    "Engines to add: NAME, NAME@VERSION, or `all` for all installed engines (see `conservative engines`). A report gets a "
+    "section that compares them.",
     "E,F",
     completion.engine_lists,
 )
@@ -300,7 +300,7 @@ find_links_option = click.option(
     help="Install from this folder of wheels, without a network.",
 )
 allow_build_option = click.option(
-    "--allow-build", is_flag=True, help="Build packages that have no wheel, which runs their code."
+    "--allow-build", is_flag=True, help="Build packages without a wheel from source, which runs their code."
 )
 
 

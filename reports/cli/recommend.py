@@ -64,10 +64,10 @@ def recommend(
     out: Path | None,
     picture: Path | None,
 ) -> None:
-    """Say which method and setting to use for SCENE, a name or a file, and what else reaches the error at what cost.
+    """Find the method and setting to use for SCENE, a name or a scene file, and list others that reach the error.
 
     Our method for the scene and the engines make short probe runs at several settings. Errors after the end of a probe are
-    extrapolated, and the result states how.
+    extrapolated, by a law that the result contains.
     """
     require_extra("conservative recommend", "report")
     from ..terminal.progress import progress

@@ -63,9 +63,9 @@ from .options import (
     "--time-limit",
     type=float,
     metavar="S",
-    help="Time budget per run, s. Slower methods get fewer points. Slow runs of a study on a scene, such as those of an own "
-    "potential in Python, take up to 100 budgets together; the others are skipped, with the reason. A run beyond ten times the "
-    "budget (at least 60 s) is stopped.  [default: 0.15, with --full 0.6]",
+    help="Time budget per run, s. Slower methods get fewer points. Slow runs of a study on a scene, such as runs with a "
+    "potential in Python, may take up to 100 budgets together; further ones are skipped, with the reason. A run beyond ten "
+    "times the budget (at least 60 s) is stopped.  [default: 0.15, with --full 0.6]",
 )
 @click.option("--png", is_flag=True, help="Write pictures as PNG as well as SVG.")
 @click.option("--latex", is_flag=True, help="Write a table of errors, drifts, orders and times as LaTeX, report.tex.")
@@ -77,10 +77,10 @@ from .options import (
 def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes and three random bodies.
 
-    The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
-    error. Open OUT/index.html; OUT/engine_NAME.html is the page of an engine that is named. The folder OUT is replaced when
-    the report is complete. Until then, finished studies are in OUT.partial.json. A part that cannot be drawn is a sentence in
-    its place, and the exit code is 1; --resume then draws it without measuring.
+    The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against error.
+    Open OUT/index.html. With --engines, OUT/engine_NAME.html is a page about each engine. The folder OUT is replaced when the
+    report is complete. Until then, finished studies are in OUT.partial.json. If a part cannot be drawn, a sentence takes its
+    place and the exit code is 1. --resume then draws it without measuring.
     """
     require_extra("conservative report", "report")
     from .. import report as work

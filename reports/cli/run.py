@@ -44,13 +44,13 @@ FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
 )
 @scene_argument
 @methods_option(
-    "Methods with settings, such as taylor:order=12 (see `conservative list`); several make a table. A name alone stands for "
+    "Methods with settings, such as taylor:order=12 (see `conservative list`). Several make a table. A name alone stands for "
     "the default variant; `report --methods` runs all variants.  [default: chosen for --error; with --dt the paper's, reduced]"
 )
 @target_option
 @option(
     "dt",
-    "Step size, s; of adaptive methods and with --error the sampling interval.  [default: the scene's]",
+    "Step size, s. For adaptive methods and with --error: sampling interval.  [default: the scene's]",
     type=float,
     metavar="S",
 )
@@ -59,7 +59,7 @@ FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
 @click.option(
     "--truth/--no-truth",
     default=None,
-    help="Errors against the reference solution, at up to 20,000 samples.  [default: unless it takes long]",
+    help="Compute errors against the reference solution, at up to 20,000 samples.  [default: unless it takes long]",
 )
 @click.option("--csv", type=Output(SAMPLES), help="Write t, R_WB, q_WB (wxyz), w_WB_B, energy, momentum of each sample.")
 @option("out", f"Write {', '.join(FILES)} into this folder.", type=Output(FILES))
@@ -75,11 +75,11 @@ def run(
     out: Path | None,
     **files: Path | None,
 ) -> None:
-    """Integrate SCENE once and print its errors, drifts and final state; with several methods, a table.
+    """Integrate SCENE, a name or a scene file, and print errors, drifts and the final state; with several methods, a table.
 
     Without --methods and --dt, the method and the step are chosen for an attitude error of 1e-6 rad. With --methods or --dt,
-    every step is stored, of longer runs a million evenly spaced ones. If the run fails, the files contain the samples before
-    the failure. The exit code is 1 if a run fails or its attitude error is above 0.1 rad.
+    every step is stored, or a million evenly spaced steps of longer runs. If the run fails, the files contain the samples
+    before the failure. The exit code is 1 if a run fails or its attitude error is above 0.1 rad.
     """
     if files["picture"] is not None:
         require_extra("conservative run --picture", "report")

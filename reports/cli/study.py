@@ -44,7 +44,7 @@ class StudyCommand(OutputCommand):
         from conservative.benchmarks.studies.studies import STUDIES  # takes a second, which only this help needs
 
         with formatter.section("Names"):
-            formatter.write_dl([(name, each.about) for name, each in STUDIES.items()])
+            formatter.write_dl([(name, declared.about) for name, declared in STUDIES.items()])
 
 
 @click.command(

@@ -56,7 +56,7 @@ from .options import (
     "attitude=any and rate=any: uniformly distributed attitudes and directions.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")
-@methods_option("Method, or method:settings; one.  [default: chosen for --error; with --dt as for `conservative run`]")
+@methods_option("One method, with settings or without.  [default: chosen for --error; with --dt as in `conservative run`]")
 @option("dt", "Step size, s.  [default: chosen for --error; with --methods the scene's]", type=float, metavar="S")
 @target_option
 @t_end_option
@@ -89,7 +89,8 @@ def sweep(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Integrate random variations of SCENE, and show the spread of attitudes, the drifts and the failures.
+    """Integrate random variations of SCENE, a name or a scene file, and show the spread of attitudes, the drifts and the
+    failures.
 
     Without --methods and --dt, both are chosen for an attitude error of 1e-6 rad. The exit code is 1 if a body fails or the
     attitude error is above 0.1 rad.

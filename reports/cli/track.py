@@ -43,7 +43,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 )
 @click.argument("engine", shell_complete=completion.engines)
 @click.argument("versions", nargs=-1)
-@click.option("--last", type=click.IntRange(1), metavar="N", help="The newest N versions, in addition to VERSIONS.")
+@click.option("--last", type=click.IntRange(1), metavar="N", help="Also compare the newest N versions.")
 @click.option(
     "--against",
     type=FilePath(),
@@ -51,12 +51,14 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
     help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence or an "
     "invariant, or if a run fails that succeeded before.",
 )
-@click.option("--bump", metavar="REF", help="The versions in the lock or requirements files of a git ref and of this folder.")
+@click.option(
+    "--bump", metavar="REF", help="Compare the versions in the lock or requirements files of a git ref and of this folder."
+)
 @names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
-@names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
+@names_option("settings", "Settings of the engine, such as RK4.  [default: the settings that a report shows]")
 @names_option(
     "verify",
-    "Also show in which version a case of these checks became right or wrong: motions, pairs.",
+    "Also run these checks (motions, pairs), and show the version in which a case became right or wrong.",
     "CHECKS",
 )
 @json_option
@@ -68,9 +70,8 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
-    ENGINE can have the first version, as in mujoco@3.6.0. Versions that have no environment are installed first, each in its
-    own. With --against, the exit code is 1 if an order, an
-    invariant or the end of a run is lost.
+    ENGINE can contain the first version, as in mujoco@3.6.0. Versions without an environment are installed first, each in an
+    environment of its own. With --against, the exit code is 1 if an order, an invariant or the end of a run is lost.
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
@@ -117,7 +118,9 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         with progress() as step:
             compared = compare_engine(sides, step)
         with progress() as step:
-            found = [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
-        answer = build(compared, against is not None, made, changes(found) if checks else None)
+            verified = (
+                [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
+            )
+        answer = build(compared, against is not None, made, changes(verified) if checks else None)
         answer = write(answer)
     show(answer, as_json, silent=True)

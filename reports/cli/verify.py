@@ -52,7 +52,7 @@ LISTS = ("only", "pairs", "engines")
 @click.command(
     cls=OutputCommand,
     short_help="Verify a recording, an engine, a program or a model file.",
-    codes={1: "a subject is wrong", 3: "none is wrong, and one is undecided or not tested"},
+    codes={1: "a subject is wrong", 3: "no subject is wrong, and one is undecided or not tested"},
     epilog=epilog(
         "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
@@ -64,14 +64,20 @@ LISTS = ("only", "pairs", "engines")
     ),
 )
 @click.argument("subjects", nargs=-1, metavar="SUBJECT...", shell_complete=completion.subjects)
-@click.option("--body", shell_complete=completion.scenes, help="Recordings: scene file or scene, with body, field and start.")
+@click.option(
+    "--body",
+    shell_complete=completion.scenes,
+    help="Recordings: scene (file or name) with the body, the field and the initial state.",
+)
 @click.option(
     "--columns",
     metavar="MAP",
-    help="Recordings: columns by name or number, time=1,w=2:3:4,q=5:6:7:8 (R, euler, rotvec, mrp, crp).",
+    help="Recordings: columns by name or number, such as time=1,w=2:3:4,q=5:6:7:8 (also R, euler, rotvec, mrp, crp).",
 )
 @click.option(
-    "--quaternion", type=click.Choice(["wxyz", "xyzw"]), help="Recordings: order of numbered columns.  [default: what fits]"
+    "--quaternion",
+    type=click.Choice(["wxyz", "xyzw"]),
+    help="Recordings: order in numbered columns.  [default: the one that fits]",
 )
 @click.option("--euler", metavar="ZYX", help="Recordings: sequence of Euler angles, zyx for yaw, pitch, roll.")
 @click.option(
@@ -80,30 +86,33 @@ LISTS = ("only", "pairs", "engines")
 @click.option(
     "--units",
     type=click.Choice(["deg", "rad", "deg/s", "rad/s"]),
-    help="Recordings: unit of angles and rates whose columns name none; with /s of rates only.",
+    help="Recordings: unit of angles and rates if their columns have none; deg/s and rad/s for rates only.",
 )
 @click.option(
     "--start",
     type=click.Choice(["row", "scene"]),
     default="row",
     show_default=True,
-    help="Recordings: the motion starts in the first row, or at the scene's t = 0.",
+    help="Recordings: initial state from the first row, or from the scene at t = 0.",
 )
 @click.option("--from", "start_time", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
 @click.option("--until", "end_time", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
-@error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: by digits and noise]")
+@error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: from digits and noise]")
 @names_option("only", "Checks to run: motions, order, repeatability, pairs, protocol, times.  [default: all]", "CHECKS")
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
 @click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
 @names_option(
-    "engines", "Model files: engines or programs that load them.  [default: those installed]", "E,F", completion.engine_lists
+    "engines",
+    "Model files: engines or programs that load them.  [default: the installed engines]",
+    "E,F",
+    completion.engine_lists,
 )
 @click.option("--search", multiple=True, type=FilePath(), help="Model files: folder of meshes and packages; repeatable.")
 @json_option
 @click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
 @click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
-@option("out", f"Write {', '.join(FILES)} into this folder; the last two of a recording.", type=Output(FILES))
+@option("out", f"Write {', '.join(FILES)} into this folder; the last two only for a recording.", type=Output(FILES))
 @picture_option
 @click.pass_context
 def verify(
@@ -117,16 +126,16 @@ def verify(
     out: Path | None,
     picture: Path | None,
     scripts: Path | None,
-    **given: Any,
+    **values: Any,
 ) -> None:
-    """Decide whether each SUBJECT is right, and name the mistakes that explain what is wrong.
+    """Decide whether each SUBJECT is right, and name the mistakes that explain the errors.
 
-    A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method
-    of this package, a program (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder
-    of recordings or of model files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines
-    load the small model files of this package, each with one trap.
+    A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method of this package, a program
+    (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder of recordings or of model
+    files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines load the small model files
+    of this package, each of which tests one rule of a format.
 
-    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided.
+    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested.
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")
@@ -137,14 +146,14 @@ def verify(
 
     names = [name for text in subjects for name in split_subject(text)]
     if not names:
-        if not given["engines"]:
+        if not values["engines"]:
             raise click.UsageError("Missing argument 'SUBJECT...'.")
         from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
 
         names = [str(CATALOGUE)]
-    every = [each.kind for each in expand(names)]
+    every = [subject.kind for subject in expand(names)]
     kinds, alone = set(every), every == [Kind.RECORDING]
-    options = used({"picture": picture, "scripts": scripts, **given}, kinds)
+    options = used({"picture": picture, "scripts": scripts, **values}, kinds)
     if picture is not None and not alone:
         raise BadInput("picture", f"{len(every)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
@@ -152,19 +161,19 @@ def verify(
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        found = verify(names, tell=step, **options)
+        verifications = verify(names, tell=step, **options)
         made = {
-            "csv": lambda: section.findings_text(found),
-            "errors.csv": lambda: section.errors_text(found),
-            "errors.svg": lambda: draw(found),
-            "picture": lambda: draw(found, picture),
+            "csv": lambda: section.findings_text(verifications),
+            "errors.csv": lambda: section.errors_text(verifications),
+            "errors.svg": lambda: draw(verifications),
+            "picture": lambda: draw(verifications, picture),
         }
-        document = section.build(found, {} if kinds == {Kind.RECORDING} else facts())
+        document = section.build(verifications, {} if kinds == {Kind.RECORDING} else facts())
         written = write(document, **made)
     show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
     if scripts is not None:  # after the result, which a script that cannot be written must not cost
-        write_scripts(found, scripts, ctx.meta["force"])
-    ctx.exit(section.exit_code(found))
+        write_scripts(verifications, scripts, ctx.meta["force"])
+    ctx.exit(section.exit_code(verifications))
 
 
 def split_subject(text: str) -> list[str]:
@@ -172,13 +181,13 @@ def split_subject(text: str) -> list[str]:
     return [text] if Path(text).exists() or " " in text or "," not in text else split_names("subjects", (text,))
 
 
-def used(given: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
+def used(values: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
     """Return the options on the command line as `verify` takes them. Raise `BadInput` for one that no subject uses."""
     from conservative.benchmarks.verification.verify import USED_BY, Kind
 
     ctx, options = click.get_current_context(), dict[str, Any]()
     users_of = USED_BY | {"scripts": USED_BY["pairs"], "only": tuple(Kind)}
-    for name, value in given.items():
+    for name, value in values.items():
         if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
             continue
         users = users_of.get(name, (Kind.RECORDING,))
@@ -198,26 +207,26 @@ def facts() -> dict[str, str]:
     return provenance().facts
 
 
-def draw(found: Sequence[Verification], path: Path | None = None) -> bytes:
+def draw(verifications: Sequence[Verification], path: Path | None = None) -> bytes:
     """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures
 
-    (recording,) = found
+    (recording,) = verifications
     details: Any = recording.details
     limits = {quantity.name: quantity.allowed for quantity in details.quantities if math.isfinite(quantity.allowed)}
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 
 
-def write_scripts(found: Sequence[Verification], folder: Path, force: bool) -> None:
+def write_scripts(verifications: Sequence[Verification], folder: Path, force: bool) -> None:
     """Write a script of each pair that differs into a folder."""
     from conservative.benchmarks.verification.pairs import PairFinding
     from conservative.benchmarks.verification.pairs.script import MARK
     from conservative.files import make_folder, write_text
 
-    findings = [finding for each in found for finding in each.findings]
-    scripts = {each.script_file: each.script for each in findings if isinstance(each, PairFinding) and each.script}
+    findings = [finding for verification in verifications for finding in verification.findings]
+    scripts = {pair.script_file: pair.script for pair in findings if isinstance(pair, PairFinding) and pair.script}
     for name in scripts:
         require_replaceable(folder / name, MARK, "scripts", force)
     if scripts:

@@ -45,13 +45,13 @@ if TYPE_CHECKING:
 )
 @scene_argument
 @methods_option(
-    "Methods, one panel each; the reference solutions `exact` and `precise` are also the outline in the other panels.  "
+    "Methods, one panel each. The reference solutions `exact` and `precise` are also drawn as outlines in the other panels.  "
     "[default: chosen for --error; with --dt the paper's, reduced]"
 )
 @target_option
 @option(
     "dt",
-    "Step size, s; with --error the sampling interval.  [default: the step that an engine's users take, or the scene's]",
+    "Step size, s; with --error the sampling interval.  [default: the usual step of an engine, or the scene's]",
     type=float,
     metavar="S",
 )
@@ -73,11 +73,12 @@ def watch(
     as_json: bool,
     out: Path,
 ) -> None:
-    """Integrate SCENE with each method and show the motions side by side, on one clock.
+    """Integrate SCENE, a name or a scene file, with each method and show the motions side by side, on one clock.
 
-    The body is its inertia box, the arrow its angular momentum. The numbers are the largest drifts and attitude error so far. A
-    motion that ends early, or is wrong by more than 0.1 rad, is named; the exit code is 1 if none reaches its end. Without
-    --methods and --dt, the motion is accurate to 1e-6 rad.
+    The body is drawn as a box, or a symmetric top as a cone, with the same moments. The arrow is the angular momentum. The
+    numbers are the largest drifts and attitude error so far. Motions that end early, or whose attitude error exceeds 0.1 rad,
+    are reported. The exit code is 1 if no motion reaches its end. Without --methods and --dt, the motion is accurate to 1e-6
+    rad.
     """
     from conservative import registry
     from conservative.method import Role
@@ -93,34 +94,35 @@ def watch(
 
     def integrate(planned: list[work.Planned], t_end: float | None) -> list[tuple[Trajectory, Grid]]:
         made = [] if target is None else [work.run_chosen(body, target, dt, t_end)]
-        for each in planned:
-            tell(0.4 * len(made) / len(planned), each.typed)
-            made.append((work.run_on(body, each.method, each.grid), each.grid))
+        for competitor in planned:
+            tell(0.4 * len(made) / len(planned), competitor.typed)
+            made.append((work.run_on(body, competitor.method, competitor.grid), competitor.grid))
         return made
 
     plan = partial(work.plan_runs, body, names, dt, usual=True)
     planned, drawn, part = [] if target else plan(t_end), [], ""
-    shown = [each for each in planned if not each.refusal]
-    data = [each.refused(body) for each in planned if each.refusal]
+    shown = [competitor for competitor in planned if not competitor.refusal]
+    data = [competitor.refused(body) for competitor in planned if competitor.refusal]
     with output_files(None, (), out=out) as write, progress() as tell:
         tell(0.0, "choosing a method" if target else shown[0].typed)
         runs = integrate(shown, t_end)
         if (end := longest([run for run, _ in runs if len(run)])) < math.inf:
             part = f" Only the first {end:.3g} s are drawn, because the body turns too often."
-            shown = [each for each in plan(end) if not each.refusal] if shown else []
+            shown = [competitor for competitor in plan(end) if not competitor.refusal] if shown else []
             runs = integrate(shown, end)
-        truth = next((run for each, (run, _) in zip(shown, runs, strict=False) if each.method.role == Role.TRUTH), None)
+        exact = (run for competitor, (run, _) in zip(shown, runs, strict=False) if competitor.method.role == Role.TRUTH)
+        truth = next(exact, None)
         for number, (run, grid) in enumerate(runs):
             tell(0.4 + 0.2 * number / len(runs), "errors")
-            found = work.compare(run, grid, None)
+            compared = work.compare(run, grid, None)
             if target is None:
-                each = shown[number]
-                summary = work.summarize(run, each.method, grid.dt, each.typed)
+                competitor = shown[number]
+                summary = work.summarize(run, competitor.method, grid.dt, competitor.typed)
             else:
                 summary = work.summarize_chosen(run)
-            data.append(summary | {"error": work.describe_errors(found)})
+            data.append(summary | {"error": work.describe_errors(compared)})
             if len(run):  # an engine that crashes at its start has no samples
-                errors = None if isinstance(found, str) or run is truth else found.at_samples(len(run))
+                errors = None if isinstance(compared, str) or run is truth else compared.at_samples(len(run))
                 drawn.append((run, f"{summary['typed']}, dt = {summary['dt']:.3g} s", largest_values(run, errors)))
         if failure := runs[0][0].failure if not drawn else None:
             raise failure
@@ -130,7 +132,7 @@ def watch(
             Animation(motions, labels, outline, values).render, out.suffix, lambda share: tell(0.6 + 0.4 * share, "drawing")
         )
         lost = write(Document("conservative watch", body.name, []), out=draw).failures
-    notes = [f"{each['typed']}: {status}." for each in data if (status := work.status_of(each)) != work.RIGHT]
+    notes = [f"{summary['typed']}: {status}." for summary in data if (status := work.status_of(summary)) != work.RIGHT]
     failures = [] if any(run.ok for run, _ in runs) else [f"{run.label} on {body.name}: {run.outcome}" for run, _ in runs]
     where = "" if lost else f"Wrote {out}." + " Open it in a browser." * (out.suffix == ".html")
     blocks: list[Block] = [Paragraph(f"{where}{part}".strip()), *([Items.of(notes)] if notes else [])]

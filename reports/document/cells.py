@@ -42,7 +42,7 @@ def factor(ratio: float, digits: int = 2) -> str:
 
 
 def numeric(value: float, text: str = "", digits: int = 2) -> Cell:
-    """Return a number as a cell that the page sorts by its value; the default text is that of `number`."""
+    """Return a number as a cell that the page sorts by its value; `number` makes the default text."""
     return Cell(text or number(value, digits), value=value)
 
 
@@ -54,7 +54,7 @@ def size(value: float) -> Cell:
 def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED, SMALL)) -> Cell:
     """Return a size with the symbol of its grade, a dash for NaN; the default text is the size, rounded up (see `bound`).
 
-    `limits` are the largest sizes that are good, and fair. By default they are those of drifts.
+    `limits` are the largest sizes that are good, and fair. By default they are the limits of drifts.
     """
     if math.isnan(value):
         return Cell(DASH, Grade.NONE, value=value)

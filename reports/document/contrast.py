@@ -25,9 +25,9 @@ def stand_ins(colours: Iterable[str], paper: str) -> dict[str, str]:
     return {colour: _readable(colour, paper) for colour in sorted(colours) if contrast(colour, paper) < LEAST}
 
 
-def contrast(one: str, other: str) -> float:
+def contrast(first: str, second: str) -> float:
     """Return the contrast of two colours, 1 to 21."""
-    low, high = sorted((_luminance(one), _luminance(other)))
+    low, high = sorted((_luminance(first), _luminance(second)))
     return (high + 0.05) / (low + 0.05)
 
 

@@ -108,8 +108,8 @@ def _numeric_columns(table: Table) -> list[bool]:
 
 def _order(cell: Cell) -> str:
     """Return the number of a cell as JavaScript reads it; empty without one."""
-    known = cell.value is not None and not math.isnan(cell.value)
-    return str(cell.value).replace("inf", "Infinity") if known else ""
+    finite = cell.value is not None and not math.isnan(cell.value)
+    return str(cell.value).replace("inf", "Infinity") if finite else ""
 
 
 def _place(ratio: float) -> float:

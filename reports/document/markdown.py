@@ -16,7 +16,7 @@ def _refuse(figure: Figure) -> str:
 
 
 def escape(value: object) -> str:
-    """Return a text without the characters that Markdown would not show, such as those of a name with HTML in it."""
+    """Return a text without the characters that Markdown would not show, such as HTML in a name."""
     return re.sub(r"`[^`]+`|[<*\[\]\\]|&(?=#?\w+;)|(?<!\w)_|_(?!\w)|^[#>+-](?= )", _escape_match, str(value))
 
 
@@ -43,7 +43,7 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
                 yield f"**{text}**" if block.role is Emphasis.LEAD else text
             case Items():
                 subjects = (f"**{escape(item.subject)}**: " * bool(item.subject) for item in block.items)
-                yield "\n".join(f"- {each}{escape(item.text)}" for each, item in zip(subjects, block.items, strict=True))
+                yield "\n".join(f"- {subject}{escape(item.text)}" for subject, item in zip(subjects, block.items, strict=True))
             case Facts():
                 yield table(Table(("", ""), block.facts))
             case Table():

@@ -218,7 +218,7 @@ class Section:
     folded: bool = False
     """True if the page shows only the title until a reader opens it."""
     source: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
-    """Columns and values that select the rows of its tables in `measurements.csv`, within those of the section around it."""
+    """Columns and values that select the rows of its tables in `measurements.csv`, within the rows of the section around it."""
 
 
 Block = Paragraph | Items | Links | Facts | Table | Figure | Motion | Section
@@ -288,7 +288,7 @@ def walk(blocks: Iterable[Block]) -> Iterator[Block]:
 def without_figures(blocks: Iterable[Block]) -> list[Block]:
     """Return blocks and the blocks of their sections without figures, for a document without a folder for pictures."""
     kept = [block for block in blocks if not isinstance(block, Figure)]
-    return [replace(each, blocks=without_figures(each.blocks)) if isinstance(each, Section) else each for each in kept]
+    return [replace(block, blocks=without_figures(block.blocks)) if isinstance(block, Section) else block for block in kept]
 
 
 AnyBlock = TypeVar("AnyBlock", bound=Block)

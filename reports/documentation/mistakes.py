@@ -62,7 +62,7 @@ UNSEEN = {
     "steps": "an error of the method, which the order shows",
 }
 """Kinds of mistakes that a program does not have, with the reason."""
-LOADERS = {each.key for each in (*LOADED, *FITTED)}
+LOADERS = {mistake.key for mistake in (*LOADED, *FITTED)}
 """Keys of mistakes of loaders of model files, which are named there (tests/benchmarks/verification/test_bodies.py)."""
 OF_LOADERS, NO_MOTION = "only a loader has it", "a model file has no motion"
 """Reasons why a mistake cannot be seen in a motion, and in a model file."""
@@ -209,7 +209,7 @@ BY_HAND: Mapping[str, Callable[[Compared], Rows]] = {
     "sleep": _stands(NUMBERS["time"], 0.0),
     "halt": _stands(NUMBERS["time"], 1.0),
     "frozen motion": lambda case: (np.repeat(case.exact[0][:1], len(case.t), 0), np.repeat(case.exact[1][:1], len(case.t), 0)),
-    **{name: _some(_fifth, name) for name, each in BY_KEY.items() if isinstance(each, RowHabit) and each.periodic},
+    **{name: _some(_fifth, name) for name, mistake in BY_KEY.items() if isinstance(mistake, RowHabit) and mistake.periodic},
     "rates at sign changes": _some(_signs, "rates at sign changes"),
     "single rows": _single_rows,
     "first row": _first_row,
@@ -247,9 +247,9 @@ def in_recording(key: str, attitudes: bool = True) -> str:
     """Return whether the verification of a recording with rates names a planted mistake."""
     if is_of_loaders(key):
         return OF_LOADERS
-    if (found := planted(key)) is None:
+    if (example := planted(key)) is None:
         return NOT_NAMED
-    scene, (R, w) = found
+    scene, (R, w) = example
     t = times_of(key)
     case = case_of(scene, t)
     if not attitudes and (case.errors(case.exact[0], w)[1] < 1e-6).all():
@@ -296,7 +296,7 @@ def in_program(key: str) -> str:
     findings, named, _ = programs.motion_findings("planted", programs.run_motions(solve, 2))
     if not any(finding.verdict == "wrong" for finding in findings):
         return "no exact motion shows it"
-    keys = [[explanation.keys for explanation in each.explanations] for each in named]
+    keys = [[explanation.keys for explanation in group.explanations] for group in named]
     if keys and (key,) in keys[0]:
         return NAMED if len(keys[0]) == 1 else WITH_OTHERS
     return f"as {' + '.join(keys[0][0])}" if keys and len(keys[0]) == 1 else NOT_NAMED
@@ -311,7 +311,7 @@ def in_test_files(key: str) -> str:
 
 @cache
 def _caught() -> frozenset[str]:
-    return frozenset(each["mistake"] for motion in load() for each in files.read(motion.name)["catches"])
+    return frozenset(caught["mistake"] for motion in load() for caught in files.read(motion.name)["catches"])
 
 
 def row_of(key: str) -> dict[str, str]:

@@ -104,11 +104,11 @@ def sections(path: str) -> dict[str, str]:
     """
     text, folder = (ROOT / path).read_text(encoding="utf-8"), posixpath.dirname(path)
     starts = [match.start() for match in HEADING.finditer(text) if match[0].startswith("## ")]
-    found = {}
+    pages = {}
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         title = text[start + 3 : text.index("\n", start)]
-        found[posixpath.join(folder, anchor(title))] = HEADING.sub(lambda match: match[1] or match[0], text[start:end])
-    return found
+        pages[posixpath.join(folder, anchor(title))] = HEADING.sub(lambda match: match[1] or match[0], text[start:end])
+    return pages
 
 
 def linked(name: str, path: str, text: str, pages: dict[str, dict[str, str]], source: Path) -> str:
@@ -217,7 +217,7 @@ def divide_tables(app: Any, doctree: Any) -> None:
             parts.append(part := table.deepcopy())
             (group,) = part.findall(nodes.tgroup)
             group["cols"] = 1 + min(width, more + 1 - start)
-            for row in [*part.findall(nodes.row), [each for each in group if isinstance(each, nodes.colspec)]]:
+            for row in [*part.findall(nodes.row), [column for column in group if isinstance(column, nodes.colspec)]]:
                 for number, cell in enumerate(list(row)):
                     if number and not start <= number < start + width:
                         cell.parent.remove(cell)
@@ -274,7 +274,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.site", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("site"), help="[default: site]")
     parser.add_argument("--report", type=Path, help="folder of a report to include: conservative report --out FOLDER")
-    folder, report = (given := parser.parse_args()).folder, given.report
+    folder, report = (arguments := parser.parse_args()).folder, arguments.report
     if report and not (report / "index.html").is_file():
         parser.error(f"--report: got {report}; expected a folder that conservative report wrote")
     require_extra("the documentation site", "docs")

@@ -69,12 +69,12 @@ class Checkpoint:
         result = StudyResult(tuple(findings), self.process)
         studies = {
             name: {
-                "by": each.by,
-                "rows": [measurement.flat(row) for row in each.findings if isinstance(row, Measurement)],
-                "samples": [measurement.flat_samples(line) for line in each.findings if isinstance(line, Samples)],
-                "verified": to_plain(part for part in each.findings if isinstance(part, Verified)),
+                "by": stored.by,
+                "rows": [measurement.flat(row) for row in stored.findings if isinstance(row, Measurement)],
+                "samples": [measurement.flat_samples(line) for line in stored.findings if isinstance(line, Samples)],
+                "verified": to_plain(part for part in stored.findings if isinstance(part, Verified)),
             }
-            for name, each in {**self.results, name: result}.items()
+            for name, stored in {**self.results, name: result}.items()
         }
         content = {"format": FORMAT, "command": self.process["command"], "terms": self.terms, "studies": studies}
         write_text(self.path, json.dumps(content, ensure_ascii=False), "out")  # floats are restored exactly, NaN as NaN

@@ -60,9 +60,9 @@ class Measurements:
         """Return the tables of the findings of studies, and those on engines."""
         every = list(findings)
         return cls(
-            measurement.frame(each for each in every if isinstance(each, Measurement)),
-            measurement.samples_frame(each for each in every if isinstance(each, Samples)),
-            tuple(each for each in every if isinstance(each, Verified)),
+            measurement.frame(row for row in every if isinstance(row, Measurement)),
+            measurement.samples_frame(line for line in every if isinstance(line, Samples)),
+            tuple(part for part in every if isinstance(part, Verified)),
         )
 
     def content(self, source: Provenance) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from .provenance import LockedEngine
 class Kind:
     """A kind of report: its longest studies, whether it has all methods, and the random bodies in each field.
 
-    `time_limit` is the time budget of a run, s, None for that of `Study`; `processes` is the number that time in turn.
+    `time_limit` is the time budget of a run, s, None for the default of `Study`; `processes` is the number that time in turn.
     """
 
     extent: Extent
@@ -73,7 +73,10 @@ class Plan:
         """The locks of the environments that engines run in, sorted by name."""
         methods = (*self.methods, *self.engines)
         used = {method.environment.folder: method.environment for method in methods if isinstance(method, EngineMethod)}
-        locks = (LockedEngine(f"{each.engine}=={each.version}", each.runtime, each.packages) for each in used.values())
+        locks = (
+            LockedEngine(f"{environment.engine}=={environment.version}", environment.runtime, environment.packages)
+            for environment in used.values()
+        )
         return tuple(sorted(locks, key=lambda lock: lock.name))
 
     @property
@@ -104,12 +107,12 @@ def plan_report(
     full, quick
         The kind of the report, see `KINDS`; `quick` also for each study.
     skip_missing, time_limit
-        See `Study`. The default limit is that of the kind.
+        See `Study`. The default limit depends on the kind.
     png, latex
         True if pictures are also written as PNG, and a table as LaTeX.
     bodies, seed
-        Random bodies in each field, and their seed. Default: those of the kind; in a default report in `FEW_BODIES` fields, and
-        none if a scene or a method is named; in a full one none if a scene is named.
+        Random bodies in each field, and their seed. The default depends on the kind. A default report has one in each of
+        `FEW_BODIES` fields, and none if a scene or a method is named; a full one has none if a scene is named.
 
     Raises
     ------
@@ -133,24 +136,24 @@ def plan_report(
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     shared = {"truth": remember_truths(), "skip_missing": skip_missing}
 
-    def methods_of(each: Declaration) -> tuple[Method, ...]:
+    def methods_of(declared: Declaration) -> tuple[Method, ...]:
         """Return the methods of a study; none if the report does not have it."""
-        if each.extent > kind.extent or (each.draw and not bodies) or (each.scenes and names):
+        if declared.extent > kind.extent or (declared.draw and not bodies) or (declared.scenes and names):
             return ()
-        if each.draw and few:
+        if declared.draw and few:
             return tuple(method for method in compared if method.name in FEW_METHODS)
-        mine = every if each.draw else compared
-        return each.in_report(tuple(dict.fromkeys((*mine, *named))) if each.named else mine)
+        mine = every if declared.draw else compared
+        return declared.in_report(tuple(dict.fromkeys((*mine, *named))) if declared.named else mine)
 
     made: list[Study] = []
-    for each in STUDIES.values():
-        if not (taken := methods_of(each)):
+    for declared in STUDIES.values():
+        if not (taken := methods_of(declared)):
             continue
-        limit = kind.time_limit if time_limit is None and not (named and each.named) else time_limit
-        extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if each.draw else shared
-        settings = {"quick": quick or (few and each.draw is not None), "time_limit": limit, **extent, **dict(each.more)}
-        study = each.plan(taken, () if each.scenes else chosen, kind.processes, **settings)
-        if each.draw and few:
+        limit = kind.time_limit if time_limit is None and not (named and declared.named) else time_limit
+        extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if declared.draw else shared
+        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent, **dict(declared.more)}
+        study = declared.plan(taken, () if declared.scenes else chosen, kind.processes, **settings)
+        if declared.draw and few:
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
         made.append(study)
     arguments = {scene.name: text for scene, text in zip(chosen, names or selection.DEFAULT_SCENES, strict=True)}

@@ -30,7 +30,7 @@ class Provenance:
     """Everything that is needed to repeat a report.
 
     `resumed` has a sentence for each earlier process that measured a part. `environments` are the locks of the engines'
-    environments. `commit` is that of the source, with "+changes" if files differ from it, or "unknown" outside git.
+    environments. `commit` is the commit of the source, with "+changes" if files differ from it, or "unknown" outside git.
     """
 
     command: str
@@ -55,16 +55,16 @@ class Provenance:
 
 
 def provenance(arguments: list[str] | None = None) -> Provenance:
-    """Return the provenance of this process; `arguments` are those of the command, default this process's.
+    """Return the provenance of this process; `arguments` are the command's, by default this process's.
 
     Commands call it before any work: files and the commit can change meanwhile.
     """
-    words = sys.argv[1:] if arguments is None else arguments
+    command = sys.argv[1:] if arguments is None else arguments
     packages = {package.metadata["Name"]: package.version for package in distributions()}
     here = Path(__file__)
     tracked = git(here.parent, "ls-files", "--error-unmatch", here.name)  # False inside another project's working tree
     return Provenance(
-        shlex.join(["conservative", *words]),
+        shlex.join(["conservative", *command]),
         machine(),
         f"{platform.python_implementation()} {platform.python_version()}",
         dict(sorted(packages.items(), key=lambda item: item[0].lower())),

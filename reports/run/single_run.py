@@ -69,7 +69,7 @@ class Planned:
 def read_error(error: float | None, dt: float | None, names: Sequence[str]) -> float | None:
     """Return the attitude error, rad, for which a command chooses the method and the step, or None if it does not.
 
-    The default is that of `integrate`. Raise `BadInput` for an error and a method.
+    The default is as in `integrate`. Raise `BadInput` for an error and a method.
     """
     if error is not None and names:
         raise BadInput("methods", ", ".join(names), "none together with --error, which chooses the method")
@@ -91,7 +91,7 @@ def plan_runs(scene: Scene, names: Sequence[str], dt: float | None, t_end: float
     for name, method in chosen:
         step = min(method.method_info.usual_dt or scene.dt, longest) if usual and dt is None else dt
         planned.append(Planned(name, method, bounded_grid(scene, step, t_end), method.unsupported(scene) or ""))
-    if all(each.refusal for each in planned):
+    if all(run.refusal for run in planned):
         require_support(planned[0].method, scene)
     return planned
 
@@ -107,9 +107,9 @@ def run_methods(
 ) -> tuple[list[dict[str, Any]], Trajectory]:
     """Return the summary of each method on a scene, with its errors, and the trajectory of the last one.
 
-    `target` is the attitude error, rad, for which method and step are chosen (`read_error`). The errors are those of
-    `find_errors`. Of several methods, `wall_time`, s, is that of the fastest run after a short first one, which compiles; a
-    method that does not support the scene has the outcome "unsupported".
+    `target` is the attitude error, rad, for which method and step are chosen (`read_error`). The errors come
+    from `find_errors`. Of several methods, `wall_time`, s, is the time of the fastest run after a short first one, which
+    compiles; a method that does not support the scene has the outcome "unsupported".
 
     Raises
     ------
@@ -124,20 +124,20 @@ def run_methods(
         errors = find_errors(trajectory, grid, truth, scene_name, t_end)
         return [summarize_chosen(trajectory) | {"error": errors}], trajectory
     planned, summaries = plan_runs(scene, method_names, dt, t_end), []
-    for each in planned:
-        _ = each.method.label  # raises `MissingEngine`
-    for number, each in enumerate(planned):
-        step(number / len(planned), each.typed)
-        if each.refusal:
-            summaries.append(each.refused(scene))
+    for run in planned:
+        _ = run.method.label  # raises `MissingEngine`
+    for number, run in enumerate(planned):
+        step(number / len(planned), run.typed)
+        if run.refusal:
+            summaries.append(run.refused(scene))
             continue
         timed = {}
         if len(planned) == 1:
-            trajectory = run_on(scene, each.method, each.grid)
+            trajectory = run_on(scene, run.method, run.grid)
         else:
-            trajectory, timed["wall_time"] = time_run(scene, each.method, each.grid)
-        errors = find_errors(trajectory, each.grid, truth, scene_name, t_end)
-        summaries.append(summarize(trajectory, each.method, each.grid.dt, each.typed) | {"error": errors, **timed})
+            trajectory, timed["wall_time"] = time_run(scene, run.method, run.grid)
+        errors = find_errors(trajectory, run.grid, truth, scene_name, t_end)
+        summaries.append(summarize(trajectory, run.method, run.grid.dt, run.typed) | {"error": errors, **timed})
     return summaries, trajectory
 
 
@@ -234,23 +234,23 @@ def find_errors(
     """Return the largest errors against the reference solution, or the reason why there are none; see `compare`.
 
     `attitude` is in rad and `rate` in rad/s. If the attitude error is above `LARGE`, `better` is the result of `find_better`.
-    `scene_name` and `t_end` are those of the command; without a name there is no search.
+    `scene_name` and `t_end` are options of the command; without a name there is no search.
     """
     if wanted is not False and not trajectory.ok:
         return {"reason": "not computed, because the run did not reach its end"}
-    found = compare(trajectory, grid, wanted)
-    errors = describe_errors(found)
-    if isinstance(found, str) or scene_name is None or errors["attitude"] <= LARGE:
+    compared = compare(trajectory, grid, wanted)
+    errors = describe_errors(compared)
+    if isinstance(compared, str) or scene_name is None or errors["attitude"] <= LARGE:
         return errors
-    return errors | {"better": find_better(found.truth, grid, found.stride, scene_name, t_end)}
+    return errors | {"better": find_better(compared.truth, grid, compared.stride, scene_name, t_end)}
 
 
-def describe_errors(found: Compared | str) -> dict[str, Any]:
+def describe_errors(compared: Compared | str) -> dict[str, Any]:
     """Return the summary of errors: the largest ones, the number of compared samples and the label of the truth."""
-    if isinstance(found, str):
-        return {"reason": found}
-    largest = {"attitude": float(found.attitude.max()), "rate": float(found.rate.max())}
-    return largest | {"samples": len(found.numbers), "truth": found.truth.label}
+    if isinstance(compared, str):
+        return {"reason": compared}
+    largest = {"attitude": float(compared.attitude.max()), "rate": float(compared.rate.max())}
+    return largest | {"samples": len(compared.numbers), "truth": compared.truth.label}
 
 
 def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_end: float | None) -> dict[str, Any] | None:
@@ -268,14 +268,14 @@ def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_e
         parts = math.ceil(grid.dt / choice.dt * (1 - ROUNDING))
         if grid.n_steps * parts > MOST_TRIED:
             return None
-        found = choice.method.solve(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * stride * parts))
+        trajectory = choice.method.solve(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * stride * parts))
     except (BadInput, MissingEngine):  # such as an error that takes too many steps
         return None
-    errors = angle_between(truth.R_WB[: len(found)], found.R_WB)
+    errors = angle_between(truth.R_WB[: len(trajectory)], trajectory.R_WB)
     good = int(np.argmax([*~(errors <= LARGE), True]))  # samples before the first with a large error
     if good < 2:
         return None
-    end_time = t_end if good == n else float(found.t[good - 1])
+    end_time = t_end if good == n else float(trajectory.t[good - 1])
     command = ["conservative", "run", scene_name, "-m", choice.method.name, "--dt", f"{grid.dt / parts:.10g}"]
     command += [] if end_time is None else ["--t-end", f"{end_time:.10g}"]
     return {"command": shlex.join(command), "attitude": float(errors[:good].max()), "shorter": good < n}

@@ -30,7 +30,7 @@ def plan_study(
 ) -> Study:
     """Return a study by name. Omitted scenes, methods and engines are the defaults of the study.
 
-    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are those of random bodies.
+    `sizes` are the numbers of bodies of the study of throughput, such as `1e3`; `bodies` and `seed` are of random bodies.
     For the others see `Study`.
 
     Raises
@@ -42,10 +42,12 @@ def plan_study(
     """
     choice("name", name, tuple(studies.STUDIES))
     declared = studies.STUDIES[name]
-    given = {"scenes": scenes, "methods": methods, "sizes": sizes, "bodies": bodies, "seed": seed}
-    _require_options(declared, {option: value for option, value in given.items() if value not in (None, (), [])})
+    options = {"scenes": scenes, "methods": methods, "sizes": sizes, "bodies": bodies, "seed": seed}
+    _require_options(declared, {option: value for option, value in options.items() if value not in (None, (), [])})
     counts = tuple(read_count("sizes", size) for size in sizes)
-    extent = {key: each for key, each in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if each is not None}
+    extent = {
+        key: value for key, value in {"sizes": counts or None, "bodies": bodies, "seed": seed}.items() if value is not None
+    }
     ours = selection.methods(methods or None, skip_missing, declared.settings)
     others = declared.of_engines(engine_selection.select_engines(engines, skip_missing)) if engines else ()
     compared = tuple(dict.fromkeys((*ours, *others)))
@@ -54,9 +56,9 @@ def plan_study(
     return declared.plan(compared, selection.scenes(scenes) if scenes else (), processes, **settings)
 
 
-def _require_options(declared: Declaration, given: Mapping[str, Any]) -> None:
+def _require_options(declared: Declaration, options: Mapping[str, Any]) -> None:
     """Raise `BadInput` if an option is given that the study does not have."""
-    for option, value in given.items():
+    for option, value in options.items():
         if option not in declared.options:
             text = ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
             allowed = f"nothing: the study {declared.name!r} has no {option}; it has {', '.join(declared.options)}"

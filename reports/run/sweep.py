@@ -101,7 +101,7 @@ def plan(
     method: Sequence[str],
     **settings: Any,
 ) -> Sweep:
-    """Return the sweep. `varied` is a result of `read_spread`, and the settings are those of `integrate_many`.
+    """Return the sweep. `varied` is a result of `read_spread`, and the settings are arguments of `integrate_many`.
 
     `method` has one name or none. Without a method and a step dt, s, both are chosen for an error, rad (`read_error`).
 
@@ -133,8 +133,8 @@ def plan(
             find_ensemble(out, settings["resume"])
     except BadInput as error:
         raise _in_options(error) from None
-    given = {name: value for name, value in settings.items() if value not in (None, False)}
-    return Sweep(scene, starts, given, varied, seed, samples, steps)
+    options = {name: value for name, value in settings.items() if value not in (None, False)}
+    return Sweep(scene, starts, options, varied, seed, samples, steps)
 
 
 def run_sweep(sweep: Sweep, step: Step) -> tuple[Ensemble, Summary]:
@@ -239,9 +239,9 @@ def _own_error(scene: Scene, method: Method, grid: Grid) -> dict[str, Any]:
         estimate = trials_of(scene).estimate(method, replace(grid, n_steps=grid.n_steps // parts * parts))[0].error
     if math.isfinite(estimate):
         return {"estimate": estimate, "reached": estimate <= LARGE}
-    found = find_errors(run_on(scene, method, grid), grid, None, None, None)
-    attitude = found.get("attitude")
-    return {"estimate": attitude, "reached": attitude is not None and attitude <= LARGE, "reason": found.get("reason")}
+    summary = find_errors(run_on(scene, method, grid), grid, None, None, None)
+    attitude = summary.get("attitude")
+    return {"estimate": attitude, "reached": attitude is not None and attitude <= LARGE, "reason": summary.get("reason")}
 
 
 def rate_text(value: float) -> str:

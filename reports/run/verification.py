@@ -37,13 +37,17 @@ def verify_methods(methods: Sequence[Method], step: Step, checks: Sequence[str] 
         if isinstance(method, Missing):
             findings = (Finding(method.name, checks[0], "", Verdict.NOT_TESTED, detail=str(method.error)),)
         else:
-            findings = tuple(finding for found in verify(method, only=checks, tell=tell) for finding in found.findings)
+            findings = tuple(
+                finding for verification in verify(method, only=checks, tell=tell) for finding in verification.findings
+            )
         yield Verified(names_of(method), findings)
 
 
 def to_plain(verified: Iterable[Verified]) -> list[dict[str, Any]]:
     """Return findings as JSON values, which `from_plain` reads."""
-    return [{"names": dict(each.names), "findings": [_plain(finding) for finding in each.findings]} for each in verified]
+    return [
+        {"names": dict(setting.names), "findings": [_plain(finding) for finding in setting.findings]} for setting in verified
+    ]
 
 
 def from_plain(values: Iterable[Mapping[str, Any]]) -> tuple[Verified, ...]:

@@ -32,7 +32,7 @@ def section(measured: Measured) -> Section:
     families: dict[MethodClass, list[tuple[str, str]]] = {MethodClass.GENERAL: [], MethodClass.SOLUTION: []}
     for scene in measured.plan.scenes:
         points, general_times = of_scene(measured.points, scene.name), dict[float, float]()
-        for kind, found in families.items():
+        for kind, fastest in families.items():
             errors = ERRORS if kind is MethodClass.GENERAL else ERRORS[-1:]
             for side in sides(costs(points, errors), kind, errors):
                 if side.ours and side.ours.time < general_times.get(side.error, math.inf):  # a closed form has to be faster
@@ -40,7 +40,7 @@ def section(measured: Measured) -> Section:
                     line = points[points["name"] == side.ours.name]
                     line = line[[error <= side.error for error in credit(line["error"].tolist())]]
                     best = line.sort_values("time").iloc[0]
-                    found.append((scene.name, str(best["family"])))
+                    fastest.append((scene.name, str(best["family"])))
                     engine, cost = side.theirs.name if side.theirs else DASH, numeric(1e6 * side.ours.time)
                     argument = shlex.quote(measured.plan.arguments[scene.name])
                     command = f"conservative run {argument} -m {best['method']} --dt {best['dt']:.10g}"

@@ -16,11 +16,11 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
     from conservative.benchmarks.verification.finding import Verdict
 
     findings = [finding for verification in verifications for finding in verification.findings]
-    engines = list(dict.fromkeys(each.subject for each in findings))
-    verdicts = {(each.case, each.subject): each.verdict for each in findings}
-    cases = list(dict.fromkeys(each.case for each in findings))
+    engines = list(dict.fromkeys(finding.subject for finding in findings))
+    verdicts = {(finding.case, finding.subject): finding.verdict for finding in findings}
+    cases = list(dict.fromkeys(finding.case for finding in findings))
     tested, right, wrong, undecided = (
-        [each for each in findings if each.verdict in kinds]
+        [finding for finding in findings if finding.verdict in kinds]
         for kinds in (set(Verdict) - {Verdict.NOT_TESTED}, {Verdict.RIGHT}, {Verdict.WRONG}, {Verdict.UNDECIDED})
     )
     count = f"{len(cases)} {'body' if len(cases) == 1 else 'bodies'}"
@@ -31,17 +31,17 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
         (body.case, body.subject): body for verification in verifications for body in _bodies(verification)
     }
     parties = [
-        [each.case, each.subject, *_readings(body.readings), "–" if body.seen is None else _describe(body.seen)]
-        for each in [*wrong, *undecided]
-        if (body := details.get((each.case, each.subject))) and (body.seen or each in undecided)
+        [finding.case, finding.subject, *_readings(body.readings), "–" if body.seen is None else _describe(body.seen)]
+        for finding in [*wrong, *undecided]
+        if (body := details.get((finding.case, finding.subject))) and (body.seen or finding in undecided)
     ]
-    explained = [each for each in right if each.detail]
+    explained = [finding for finding in right if finding.detail]
     notes = [Item(note, verification.subject) for verification in verifications for note in verification.notes]
     return filled(
         Paragraph(lead, Emphasis.LEAD),
         Table(["body", *engines], rows),
-        Items([_item(each, True) for each in wrong]),
-        Items([_item(each) for each in [*undecided, *explained]]),
+        Items([_item(finding, True) for finding in wrong]),
+        Items([_item(finding) for finding in [*undecided, *explained]]),
         Table(["body", "engine", "by the reference reader", "by this package", "in the engine"], parties) if parties else None,
         Items(notes),
     )

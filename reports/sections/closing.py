@@ -52,7 +52,7 @@ class Line:
 def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Iterator[Line]:
     """Yield a line for each method on a scene, in the order of measurement.
 
-    The table is that of `names.with_names`; the points are those of the scene (see `rows.points`). If the methods were `named`,
+    The table comes from `names.with_names`; the points belong to the scene (see `rows.points`). If the methods were `named`,
     each has its line, also if it does not support the scene or is not installed. Otherwise such methods have none, and methods
     that differ only in tolerance are one line, with the drifts and errors of the default tolerance, which is the last.
     """
@@ -64,14 +64,14 @@ def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
     orders = lines.orders(of_study(table, convergence.STUDY.name, scene.name))
     timed = of_study(table, speed.STUDY.name, scene.name)
     steps, seconds = (
-        of_measure(timed, each).groupby("method")["value"].last() for each in (Measure.TIME_PER_STEP, Measure.TIME)
+        of_measure(timed, measure).groupby("method")["value"].last() for measure in (Measure.TIME_PER_STEP, Measure.TIME)
     )
     for _, line in accuracy.groupby("method" if named else "series", sort=False):
         rows = line[line["method"] == line["method"].iloc[-1]]
         method, family, series = rows[["method", "family", "series"]].iloc[0]
         values = (
-            float(known.get(key, math.nan))
-            for known, key in ((orders, method), (steps, method), (seconds, method), (reached, series))
+            float(column.get(key, math.nan))
+            for column, key in ((orders, method), (steps, method), (seconds, method), (reached, series))
         )
         yield Line(
             display_name(family, "", rows["setting" if named else "series_setting"].iloc[0]),

@@ -73,7 +73,7 @@ def build(
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
     for change in decided.violations:
         failed.setdefault((change.row.scene, change.row.method), []).append(change.finding)
-    packages = [(each.title, each.environment.runtime, ", ".join(each.packages)) for each in versions]
+    packages = [(version.title, version.environment.runtime, ", ".join(version.packages)) for version in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
     notes = Items.of(f"note: {note}" for note in decided.notes)
     data = {

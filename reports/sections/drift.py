@@ -25,11 +25,11 @@ _WHY = (
 )
 
 
-def section(measured: Measured, found: Sequence[Result]) -> Section:
+def section(measured: Measured, results: Sequence[Result]) -> Section:
     """Return the section, about the methods of `tumbling.results`."""
-    scene, methods = measured.main_scene, drawn(found)
+    scene, methods = measured.main_scene, drawn(results)
     draw = {"The chart of drift": drift_figure, "The curves on spheres": spheres_figure}
-    drawings = [attempt(what, partial(each, measured, scene, methods)) for what, each in draw.items()]
+    drawings = [attempt(what, partial(make, measured, scene, methods)) for what, make in draw.items()]
     return Section("Where drift comes from", filled(Paragraph(_WHY, Emphasis.LEAD), *drawings), "drift", "Drift")
 
 
@@ -69,16 +69,16 @@ def spheres_figure(measured: Measured, scene: Scene, methods: Sequence[str] | No
     curves = _select(measured, of_scene(lines.curves(measured.samples), scene.name), methods)
     if curves.empty:
         return None
-    title, words = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
+    title, text = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
     if scene.free:
         title = "polhode on the momentum sphere"
-        words = "The angular momentum in body axes. Line: the exact curve, which is closed. Drift leaves it, or the sphere."
+        text = "The angular momentum in body axes. Line: the exact curve, which is closed. Drift leaves it, or the sphere."
     absent = "" if methods else ", ".join(sorted(_competitors(measured) - set(curves["method"])))
     failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
     name = f"sphere_{scene.name}" if methods is None else "polhodes"
     exact = spheres.polhode(scene)
     panels = [spheres.chart(curve, exact) for _, curve in curves.groupby("name", sort=False)]
-    return Figure(name, f"{scene.name}: {title}", words + failed, panels=panels, layout=Layout.SPHERES)
+    return Figure(name, f"{scene.name}: {title}", text + failed, panels=panels, layout=Layout.SPHERES)
 
 
 def _competitors(measured: Measured) -> set[str]:

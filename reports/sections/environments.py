@@ -16,7 +16,7 @@ def build() -> Document:
     lines = [str(program) for program in programs.values()]
     for engine in (name for name in registry.list_engines() if name not in programs):
         mine = [environment for environment in environments if environment.engine == engine]
-        installed = [f"{each.name}: {each.runtime}, {', '.join(each.packages)}" for each in mine]
+        installed = [f"{environment.name}: {environment.runtime}, {', '.join(environment.packages)}" for environment in mine]
         lines += installed or [f"{engine}: no environment"]
     data = {"engines": registry.list_engines(), "environments": environments, "programs": programs}
     return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)

@@ -16,13 +16,13 @@ from ..rows.names import ABSENT, of_study, outcomes, with_outcome, without_outco
 
 def section(table: pd.DataFrame) -> Section:
     """Return the section of the rows of a report that are not apart (see `Measured.together`)."""
-    words = (
+    text = (
         "Runs that did not reach their end, and runs that were skipped, such as those that would have exceeded `--time-limit`. "
         "Errors are relative to a reference solution that a second, independent one confirms."
     )
     absent = Section("Unsupported or not installed", filled(unsupported(table)), folded=True)
     title = "Failures, unsupported runs, and the reference solutions"
-    return Section(title, filled(Paragraph(words), failures(table), absent, truths(table)), "failures", "Failures")
+    return Section(title, filled(Paragraph(text), failures(table), absent, truths(table)), "failures", "Failures")
 
 
 def failures(table: pd.DataFrame) -> Table:
@@ -48,7 +48,7 @@ def unsupported(table: pd.DataFrame) -> Table:
         [*map(str, key), ", ".join(members["name"].unique())]
         for key, members in rows.groupby(["scene", "outcome", "reason"], sort=False)
     ]
-    return Table(["scene", "outcome", "reason (its numbers are those of the first run)", "methods"], body)
+    return Table(["scene", "outcome", "reason (with the numbers of the first run)", "methods"], body)
 
 
 def truths(table: pd.DataFrame) -> Table:

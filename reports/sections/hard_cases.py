@@ -28,18 +28,16 @@ _NOTHING = Cell(DASH, Grade.NONE)
 
 def sections(table: pd.DataFrame) -> list[Section]:
     """Return the sections of hard cases and of stability, of those studies that the report has."""
-    words = (
+    text = (
         "Every registered scene over the first part of its motion, at its own step, with two verdicts: the motion by its "
         f"largest attitude error (✓ up to {tolerance(RIGHT)} rad, ≈ up to {USABLE:g} rad, ✗ more), and the invariants by "
         f"the largest relative drift (✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more). ✗ in both: the "
         f"run failed; {DASH}: not supported, or nothing to grade."
     )
     cases, steps = hard_cases(table), stability(table)
-    graded = (
-        Section("Hard cases", [Paragraph(words), cases], "hard-cases", source={"study": HARD_CASES.name}) if cases else None
-    )
+    graded = Section("Hard cases", [Paragraph(text), cases], "hard-cases", source={"study": HARD_CASES.name}) if cases else None
     longest = Section("Stability", [steps], "stability", source={"study": STABILITY.name}) if steps else None
-    return [each for each in (graded, longest) if each]
+    return [section for section in (graded, longest) if section]
 
 
 def hard_cases(table: pd.DataFrame) -> Table | None:
@@ -81,7 +79,7 @@ def grades(records: list[Record]) -> Cell:
             return _halves(cell, cell)
     errors = _values(records, Measure.ATTITUDE_MAX)
     motion = grade(max(errors), f"{angle(max(errors))} rad", (RIGHT, USABLE)) if errors else _NOTHING
-    drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
+    drifts = [row for row in records if row["measure"] == Measure.DRIFT_MAX.text and not math.isnan(row["value"])]
     if not drifts:
         return _halves(motion, _NOTHING)
     worst = max(drifts, key=lambda drift: drift["value"])

@@ -39,12 +39,12 @@ def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
 
 def why_early(lines: pd.DataFrame, table: pd.DataFrame) -> str:
     """Return why lines end before the others of their scene; empty if none does."""
-    here, found = table[(table["study"] == STUDY.name) & (table["outcome"] != OutcomeKind.OK)], list[str]()
+    here, ends = table[(table["study"] == STUDY.name) & (table["outcome"] != OutcomeKind.OK)], list[str]()
     for scene, part in lines.groupby("scene", sort=False):
         failed = here[here["scene"] == scene].groupby("name")["reason"].first()
         for name, end in early_ends(part).items():
-            found.append(f"{name} on {scene} ({number(end)} turns: {failed.get(name, 'longer runs exceed the time budget')})")
-    return f" Lines that end early: {'; '.join(found)}." if found else ""
+            ends.append(f"{name} on {scene} ({number(end)} turns: {failed.get(name, 'longer runs exceed the time budget')})")
+    return f" Lines that end early: {'; '.join(ends)}." if ends else ""
 
 
 def as_table(table: pd.DataFrame) -> Table:
@@ -63,5 +63,5 @@ def as_table(table: pd.DataFrame) -> Table:
             cells.append(numeric(value[key], f"{bound(value[key])} ({growth})") if key in value else DASH)
         failed = members[members["outcome"] != OutcomeKind.OK]
         rows.append([str(scene), str(name), *cells, ", ".join(failed["outcome"] + ": " + failed["reason"])])
-    header = ["scene", "method", "turns", *(f"{each} (p)" for each in quantities), "how it ended"]
+    header = ["scene", "method", "turns", *(f"{quantity} (p)" for quantity in quantities), "how it ended"]
     return Table(header, rows, "Errors after long runs, and their growth", Style.FILTERED)

@@ -22,7 +22,7 @@ from ..rows.points import pooled
 TERMS = (
     "Heavy tops and free bodies all differ: asymmetric, in rotated frames, no point on an axis, drawn from a seed. One body "
     "is a heavy top with different initial states; numbers=compiled means that its numbers are constants of heyoka's code. "
-    "Each runs for 12 s, final state only; the time is that of a prepared run, and preparation is separate. A body whose "
+    "Each runs for 12 s, final state only; a time is the time of a prepared run, without its preparation. A body whose "
     "two reference solutions disagree is dropped. The error of "
     "a setting on a body is its largest attitude error at twelve instants; the table uses the median of the bodies, or "
     "the 95th percentile. Times between two settings of a line are interpolated, and isolated good results are ignored. "
@@ -123,7 +123,7 @@ def _largest(
         return SpeedRatio(kind, error, *(cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides))
 
     sizes = sorted(map(int, timed.unique()), reverse=True) or [1]
-    size = next((each for each in sizes if at(each).ours and at(each).theirs), sizes[-1])
+    size = next((size for size in sizes if at(size).ours and at(size).theirs), sizes[-1])
     return size, at(size)
 
 
@@ -148,7 +148,9 @@ def cost_table(rows: pd.DataFrame, reached: pd.DataFrame) -> Table:
     header += [f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS]
     body = []
     for (kind, name, _, _, _, group), members in rows.groupby(LINE, sort=False):
-        rate, prepare = (members[members["measure"] == each.text]["value"] for each in (Measure.BODY_STEPS, Measure.PREPARE))
+        rate, prepare = (
+            members[members["measure"] == measure.text]["value"] for measure in (Measure.BODY_STEPS, Measure.PREPARE)
+        )
         mine = reached[(reached["scene"] == kind) & (reached["name"] == name) & (reached["statistic"] == MEDIAN)]
         values = (float(rate.max()) / 1e6, float(prepare.min()) * 1e6)
         cells: list[str | Cell] = [numeric(value, digits=3) for value in values]

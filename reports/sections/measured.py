@@ -47,18 +47,18 @@ class Measured:
     @cached_property
     def together(self) -> pd.DataFrame:
         """The rows of the studies that compare methods on scenes, without those that have a section of their own."""
-        names = [name for name, each in STUDIES.items() if not each.apart]
+        names = [name for name, study in STUDIES.items() if not study.apart]
         return self.rows[self.rows["study"].isin(names)].reset_index(drop=True)
 
     @cached_property
     def scene_rows(self) -> pd.DataFrame:
-        """These rows without the engines that the report compares in the section of engines only."""
+        """The rows of `together` without the engines that only the section of engines compares."""
         engines = {method.name for method in self.plan.engines} - {method.name for method in self.plan.methods}
         return self.together[~self.together["method"].isin(engines)].reset_index(drop=True)
 
     @cached_property
     def engine_rows(self) -> pd.DataFrame:
-        """The rows of the engines that the report names."""
+        """The rows of `together` of the engines that the report names."""
         return self.together[self.together["method"].isin([method.name for method in self.plan.engines])]
 
     @cached_property

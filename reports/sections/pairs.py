@@ -29,16 +29,18 @@ HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", 
 def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
     """Return what differs, its reduced descriptions and scripts, and a table by pair and body for each engine."""
     some = [finding for finding in findings if isinstance(finding, PairFinding)]
-    engines = dict.fromkeys(each.subject for each in some)
-    groups = _grouped([each for each in some if each.verdict is Verdict.WRONG])
+    engines = dict.fromkeys(finding.subject for finding in some)
+    groups = _grouped([finding for finding in some if finding.verdict is Verdict.WRONG])
     reduced = [_reduced(group[0]) for group in groups]
-    other = {f"{each.subject}: {each.case}": each.detail for each in some if each.relation not in (*NOT_RUN, *PLAIN)}
+    other = {
+        f"{finding.subject}: {finding.case}": finding.detail for finding in some if finding.relation not in (*NOT_RUN, *PLAIN)
+    }
     return filled(
         Items([Item(group[0].detail, _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
-        *(_table(engine, [each for each in some if each.subject == engine]) for engine in engines),
+        *(_table(engine, [finding for finding in some if finding.subject == engine]) for engine in engines),
         Items([Item(text, what) for what, text in other.items()]),
-        Paragraph(SCRIPTS) if any(each.script for each in some) else None,
+        Paragraph(SCRIPTS) if any(finding.script for finding in some) else None,
         Paragraph(TERMS) if some else None,
     )
 
@@ -50,14 +52,14 @@ PLAIN = (Relation.SAME_BITS, Relation.EQUAL, Relation.DIFFERS, Relation.CRASHES)
 def _grouped(wrong: Sequence[PairFinding]) -> list[list[PairFinding]]:
     """Return the pairs of one engine and body that differ in the same way, together."""
     groups: dict[tuple[str, str, str], list[PairFinding]] = {}
-    for each in wrong:
-        kind = each.detail if each.scale is None else each.quantity
-        groups.setdefault((each.subject, each.body, kind), []).append(each)
+    for finding in wrong:
+        kind = finding.detail if finding.scale is None else finding.quantity
+        groups.setdefault((finding.subject, finding.body, kind), []).append(finding)
     return list(groups.values())
 
 
 def _names(group: Sequence[PairFinding]) -> str:
-    return f"{group[0].subject}: {group[0].body}, {', '.join(dict.fromkeys(each.pair for each in group))}"
+    return f"{group[0].subject}: {group[0].body}, {', '.join(dict.fromkeys(finding.pair for finding in group))}"
 
 
 def command(finding: PairFinding) -> str:
@@ -84,10 +86,10 @@ def _cell(finding: PairFinding) -> Cell:
 
 
 def _reduced(finding: PairFinding) -> list[str]:
-    one = finding.first
-    assert one is not None  # of a pair that differs
-    moments, com, rates = (", ".join(map(number, values)) for values in (np.diag(one.inertia), one.com, one.w0))
-    field = f"{com}; {number(one.gravity)}" if one.gravity else DASH
+    body = finding.first
+    assert body is not None  # of a pair that differs
+    moments, com, rates = (", ".join(map(number, values)) for values in (np.diag(body.inertia), body.com, body.w0))
+    field = f"{com}; {number(body.gravity)}" if body.gravity else DASH
     scale = number(finding.scale) if finding.scale else DASH
-    steps = f"{one.n_steps} x {number(one.dt)}"
-    return [finding.subject, finding.pair, moments, number(one.mass), field, rates, steps, scale, command(finding)]
+    steps = f"{body.n_steps} x {number(body.dt)}"
+    return [finding.subject, finding.pair, moments, number(body.mass), field, rates, steps, scale, command(finding)]

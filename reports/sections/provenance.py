@@ -21,19 +21,19 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     kind = "A quick report has fewer steps and fewer rounds of timing. " if plan.quick else ""
     timing = f"{processes} processes in turn" if processes > 1 else "one process, so ratios are rough"
     resumed = " It was interrupted and resumed: compare times only within one study." if source.resumed else ""
-    words = (
-        f"{kind}A time is that of the fastest of several rounds, in which methods take turns: of the method's own loop, final "
-        f"state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one confirms. "
-        "All tables are below, behind a click."
+    text = (
+        f"{kind}A time is the shortest of several rounds, in which methods take turns. The method's own loop is timed, "
+        f"final state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one "
+        "confirms. All tables are below, behind a click."
     )
     facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
     facts += [("versions", ", ".join(f"{name} {version}" for name, version in source.compared.items()))]
     versions = Facts([*facts, *(("resumed", part) for part in source.resumed)])
     ours = [method for method in plan.methods if method.role not in (Role.ENGINE, Role.TRUTH)]
-    about = {each.family: (type(each).__doc__ or "").partition("\n")[0] for each in ours}
+    about = {method.family: (type(method).__doc__ or "").partition("\n")[0] for method in ours}
     methods = Section("Methods of this package", [Facts(list(about.items()))] if about else [], folded=True)
-    blocks = filled(Paragraph(words), versions, *details, methods, others, locks)
+    blocks = filled(Paragraph(text), versions, *details, methods, others, locks)
     return Section("How it was measured", blocks, "made", "Measured")
 
 

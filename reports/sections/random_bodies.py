@@ -34,9 +34,9 @@ ROUGH = "All times are of one process, so ratios are rough: two identical progra
 TERMS = (
     "Each body is drawn from a seed: asymmetric, from long and thin to flat, in a rotated frame, with no point and no rate on "
     "an axis, from slow pendulums to fast tops, in uniform gravity, on a spring, attracted to a point, or in a gravity "
-    "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by that of our fastest "
-    "general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, final "
-    "state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
+    "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by the time of our "
+    "fastest general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, "
+    "final state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
     "processes, of a mean over bodies and processes. A body is won or lost if 1 is outside of its interval, or if a side is "
     "alone in reaching the error; otherwise it is open. The error is the largest of twelve instants. The error of a setting "
     "is the largest of its own and of all finer settings, so isolated good results are ignored. An engine is compared on "
@@ -47,7 +47,7 @@ TERMS = (
 
 @dataclass(frozen=True)
 class RandomRatios(Ratios):
-    """The ratios of an engine's time to ours at an error in one field; `indices` are those of the bodies, by scene."""
+    """The ratios of an engine's time to ours at an error in one field; `indices` are the numbers of the bodies, by scene."""
 
     field: str
     engine: str
@@ -106,12 +106,12 @@ def figure(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Figure | N
     if not len(points):
         return None
     picture = figures.random_ratios(points, bodies, seed)
-    words = (
+    text = (
         f"Bodies in each field: {bodies}. Line: geometric mean; band: from the worst body to the best; above the dashed "
         "line ours is faster."
     )
     title = "Random bodies: the fastest engine's time divided by ours"
-    return Figure("random_bodies", title, words, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
+    return Figure("random_bodies", title, text, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
 
 
 def as_table(ratios: Iterable[RandomRatios]) -> Table:

@@ -14,7 +14,7 @@ from .random_bodies import ANY, RandomRatios
 from .scene_ratios import sides
 
 _RATIOS = (
-    "The time of the fastest engine or ODE solver divided by that of our fastest method, at each decade of the largest "
+    "The time of the fastest engine or ODE solver divided by our fastest method's time, at each decade of the largest "
     "attitude error. ✓: ours is faster. ✗: the other is faster. ≈: open, 1 is within the interval, or 5 % from a ratio that "
     "one process measured. In parentheses is the interval of 95 % over processes, if several measured the times. Random "
     "bodies have the geometric mean, its interval over bodies and processes, and the number of bodies on which an engine is "
@@ -26,7 +26,7 @@ _RATIOS = (
 
 def section(measured: Measured) -> Section:
     """Return the section."""
-    source = {"study": tuple(each.STUDY.name for each in (random, work_precision, each_step))}
+    source = {"study": tuple(module.STUDY.name for module in (random, work_precision, each_step))}
     blocks: list[Block] = [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]
     return Section("Where an engine is faster", blocks, "ratios", source=source)
 
@@ -53,7 +53,7 @@ def ratio_table(measured: Measured) -> Table:
                         for speed_ratio in speed_ratios
                         if speed_ratio.theirs and cells[speed_ratio.error].grade is Grade.BAD
                     )
-                    names = dict.fromkeys(each.name for each in faster)
+                    names = dict.fromkeys(cost.name for cost in faster)
                     rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]
     body: list[Row] = [

@@ -145,7 +145,7 @@ def notes(recommendation: Recommendation) -> list[str]:
     truth, amplified = conditions.reference, conditions.amplification
     after = ", and by any angle after that" if amplified.is_lost else ""
     kinds = {"cheapest": "of all", "cheapest_general": "of our general integrators", "cheapest_engine": "of the engines"}
-    winners = ((kinds[kind], method_text(each) if each else "none") for kind, each in recommendation.winners.items())
+    winners = ((kinds[kind], method_text(winner) if winner else "none") for kind, winner in recommendation.winners.items())
     fastest = ", ".join(map(" ".join, winners))
     growth = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
     return [

@@ -26,21 +26,22 @@ def recording_blocks(verification: Verification) -> list[Block]:
             sentence += ", so its start is fitted"
         sentences.append(f"{sentence}.")
     proven, candidates = details.explaining, details.candidates
+    # A single mistake is in the sentence of the verdict already.
     left = [
-        f"{each.sentence}: leaves {details.show(each.left)} of {details.show(each.plain)}"
-        for each in (proven if len(proven) > 1 else candidates)
+        f"{explanation.sentence}: leaves {details.show(explanation.left)} of {details.show(explanation.plain)}"
+        for explanation in (proven if len(proven) > 1 else candidates)
     ]
     heading = "These explain the file equally well:" if len(proven) > 1 else ""
     if verification.verdict is Verdict.WRONG and not proven:
         heading = "No known mistake explains the error" + (": none of these candidates is proven." if candidates else ".")
     compared = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in details.used.items())
     used = [f"Compared: {compared} ({details.compared:,} of {details.in_file:,} rows)."] if compared else []
-    reasons = sorted(set(details.unused.values()), key=list(details.unused.values()).index)
-    unused = [
-        f"Not used: {', '.join(name for name, why in details.unused.items() if why == reason)}: {reason}." for reason in reasons
-    ]
+    by_reason: dict[str, list[str]] = {}
+    for column, reason in details.unused.items():
+        by_reason.setdefault(reason, []).append(column)
+    unused = [f"Not used: {', '.join(columns)}: {reason}." for reason, columns in by_reason.items()]
     quantities = [[quantity.name, bound(quantity.largest), bound(quantity.final)] for quantity in details.quantities]
-    tried = [] if proven else [[each.name, details.show(each.left)] for each in details.tried[:LISTED]]
+    tried = [] if proven else [[explanation.name, details.show(explanation.left)] for explanation in details.tried[:LISTED]]
     return filled(
         Paragraph(" ".join(sentences)) if sentences else None,
         Paragraph(heading) if heading else None,
@@ -52,7 +53,10 @@ def recording_blocks(verification: Verification) -> list[Block]:
 
 
 def two_blocks(verification: Verification) -> list[Block]:
-    """Return the blocks on two recordings: those of each, in a section of its own."""
+    """Return a section for each of two recordings, with its blocks."""
     details = verification.details
     assert isinstance(details, Two)
-    return [Section(f"{each.subject}: {each.verdict}", recording_blocks(each)) for each in (details.first, details.second)]
+    return [
+        Section(f"{recording.subject}: {recording.verdict}", recording_blocks(recording))
+        for recording in (details.first, details.second)
+    ]

@@ -38,7 +38,7 @@ from . import (
 from .measured import Measured, of_scene
 
 T = TypeVar("T")
-SECTIONS: dict[str, Any] = {each.STUDY.name: each for each in (many_bodies, long_time)}
+SECTIONS: dict[str, Any] = {module.STUDY.name: module for module in (many_bodies, long_time)}
 """Sections of the rows and samples of one study, by its name."""
 
 
@@ -48,7 +48,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     A section that cannot be made is a sentence (see `attempt`), and a failure of the document.
     """
     measured = Measured(plan, measurements, source)
-    found = cache(lambda: tumbling.results(measured))
+    results = cache(lambda: tumbling.results(measured))
     points = {scene.name: of_scene(measured.points, scene.name) for scene in plan.scenes}
     summaries = cache(lambda: {scene.name: summary.of_scene(points[scene.name], scene.integrable) for scene in plan.scenes})
     rows = measured.scene_rows
@@ -76,9 +76,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         details.append(linked)
     if verified := measurements.verified:
         details.append(part("verification", lambda: verified_engines.section(verified)))
-    for name, each in SECTIONS.items():
+    for name, module in SECTIONS.items():
         if name in plan.names:
-            section = part(name, partial(each.section, measured.rows, measured.samples))
+            section = part(name, partial(module.section, measured.rows, measured.samples))
             details.append(replace(section, source={"study": name}) if isinstance(section, Section) else section)
     cases = part("hard cases", lambda: hard_cases.sections(measured.rows))
     details += [cases] if isinstance(cases, Paragraph) else cases
@@ -89,9 +89,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         paper = None
     folded = [replace(detail, folded=True) if isinstance(detail, Section) else detail for detail in details]
     blocks: list[Block] = [
-        part("motion", lambda: tumbling.section(measured, found())),
+        part("motion", lambda: tumbling.section(measured, results())),
         part("speed", lambda: speed.section(measured, summaries())),
-        part("drift", lambda: drift.section(measured, found())),
+        part("drift", lambda: drift.section(measured, results())),
         part("advice", lambda: advice.section(measured)),
     ]
     origin = part("provenance", lambda: provenance.section(measured, folded))
@@ -120,5 +120,5 @@ def brief(
     yield from [tables] if isinstance(tables, Paragraph) else tables
     if measured.ratios:
         yield attempt("The sentence on random bodies", lambda: Paragraph(random_bodies.sentence(measured.ratios)))
-    found = attempt("The summary", lambda: [Paragraph(each.sentence) for each in summaries().values()])
-    yield from [found] if isinstance(found, Paragraph) else found
+    sentences = attempt("The summary", lambda: [Paragraph(scene_summary.sentence) for scene_summary in summaries().values()])
+    yield from [sentences] if isinstance(sentences, Paragraph) else sentences

@@ -15,14 +15,18 @@ from ..run.single_run import is_right, status_of
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:
     """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
-    first = next(each for each in summaries if each["outcome"].kind is not OutcomeKind.UNSUPPORTED)
+    first = next(summary for summary in summaries if summary["outcome"].kind is not OutcomeKind.UNSUPPORTED)
     title = f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s"
     data = [summary | {"status": str(status_of(summary))} for summary in summaries]
     blocks: list[Block] = [Facts(list(_facts(first)))]
     if len(summaries) > 1:
-        advice = dict.fromkeys(f"More accurate: {_advice(each['error'])}" for each in summaries if "better" in each["error"])
+        advice = dict.fromkeys(
+            f"More accurate: {_advice(summary['error'])}" for summary in summaries if "better" in summary["error"]
+        )
         blocks = [_table(summaries, title), *([Items.of(list(advice))] if advice else [])]
-    failed = [f"{each['label']} on {each['scene']}: {status_of(each)}" for each in summaries if not is_right(each)]
+    failed = [
+        f"{summary['label']} on {summary['scene']}: {status_of(summary)}" for summary in summaries if not is_right(summary)
+    ]
     return Document("conservative run", title, blocks, data=data[0] if len(data) == 1 else data, failures=failed)
 
 
@@ -62,7 +66,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
-    drifts = list(next(each["drift"] for each in summaries if "drift" in each))
+    drifts = list(next(summary["drift"] for summary in summaries if "drift" in summary))
     header = [
         "method",
         "outcome",

@@ -63,16 +63,16 @@ def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DE
     ]
 
 
-def as_table(points: pd.DataFrame, interval: float, each: EachStep | None = None) -> Table:
+def as_table(points: pd.DataFrame, interval: float, each_step: EachStep | None = None) -> Table:
     """Return the fastest method of each class of ours and of the engines at each decade of the error, and the ratios.
 
-    `points` are those of one scene (see `rows.points`), whose samples are `interval` s apart. `each` adds the last rows.
+    `points` belong to one scene (see `rows.points`), whose samples are `interval` s apart. `each_step` adds the last rows.
     """
     decades = _rows(costs(points, DECADES), interval, DECADES)
     rows: list[Row] = [[numeric(error, tolerance(error)), *row] for error, row in decades]
-    if each:
-        for label, reached in each.runs.items():
-            rows += [[f"{tolerance(ERROR)}, {label}", *row] for _, row in _rows(reached, each.interval, (ERROR,))]
+    if each_step:
+        for label, reached in each_step.runs.items():
+            rows += [[f"{tolerance(ERROR)}, {label}", *row] for _, row in _rows(reached, each_step.interval, (ERROR,))]
     return Table(HEADER, rows)
 
 

@@ -57,7 +57,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     if decades.rows:
         source = {"study": (work_precision.STUDY.name, each_step.STUDY.name)}
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True, source=source))
-    errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
+    errors, rate_errors = (of_scene(lines.errors(rows, measure), name) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     fits = lines.fits(errors)
     orders = filled(order(fits, lines.fits(rate_errors), name), accuracy(rows, name))
     curves = attempt(f"The curves of {name}", lambda: spheres_figure(measured, scene))

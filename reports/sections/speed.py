@@ -29,7 +29,7 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
         study = next(study for study in measured.plan.studies if study.drawn)
-        fields = list(dict.fromkeys(each.field for each in study.drawn))
+        fields = list(dict.fromkeys(body.field for body in study.drawn))
         title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
         pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
         sentence += " " + _sentence(f"{len(study.scenes)} random bodies", pictures[title])
@@ -51,11 +51,11 @@ def _sentence(subject: str, points: pd.DataFrame) -> str:
     at_middle = points[points["error"] == MIDDLE].sort_values("time")
     first: dict[MethodClass, Any] = {kind: next(of_classes(at_middle, kind).itertuples(), None) for kind in MethodClass}
     ours, parts = first[MethodClass.GENERAL], []
-    for kind, words in ((MethodClass.SOLVER, "ODE solver"), (MethodClass.ENGINE, "physics engine")):
+    for kind, side in ((MethodClass.SOLVER, "ODE solver"), (MethodClass.ENGINE, "physics engine")):
         if ours and (theirs := first[kind]):
             ratio = theirs.time / ours.time
             more = f"{factor(ratio)} times as fast as" if ratio >= 1 else f"{factor(1 / ratio)} times as slow as"
-            parts.append(f"{more} {theirs.name}, the fastest {words}")
+            parts.append(f"{more} {theirs.name}, the fastest {side}")
     if not (ours and parts):
         return ""
     return f"At an attitude error of {tolerance(MIDDLE)} rad on {subject}, {ours.name} is {', and '.join(parts)}."

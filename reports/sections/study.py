@@ -25,9 +25,9 @@ from .report import SECTIONS
 
 
 def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:
-    """Return the document of a study, measured as `made` says: ratios of random bodies, costs of many bodies, or its rows.
+    """Return the document of a study: its own section if it has one, such as ratios of random bodies, and otherwise its rows.
 
-    If what is special to the study cannot be made, its rows are shown.
+    `made` has the facts of the run. If the section cannot be made, the document has a sentence about that, and the rows.
     """
     data: dict[str, Any] = {"study": name, **made}
     named = with_names(measured.table)
@@ -43,14 +43,14 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
         part = SECTIONS[name].section(named, with_names(measured.samples))
         return [block for block in part.blocks if isinstance(block, Table | Section | Figure)]
 
-    own: list[Block] | Paragraph
+    own: list[Block] | Paragraph  # a paragraph if it failed: see `attempt`
     if name == random.STUDY.name:
         own, terms = attempt("The ratios", of_random_bodies), random_bodies.TERMS
     elif name in SECTIONS:
         own, terms = attempt("The section", of_section), SECTIONS[name].TERMS
     else:
-        drawn = attempt("The charts", lambda: pictures(name, named))
-        own, terms = [*([drawn] if isinstance(drawn, Paragraph) else drawn), rows_table(name, named)], ""
+        charts = attempt("The charts", lambda: pictures(name, named))
+        own, terms = [*([charts] if isinstance(charts, Paragraph) else charts), rows_table(name, named)], ""
     shown: list[Block] = [own, rows_table(name, named)] if isinstance(own, Paragraph) else own
     data |= {"rows": records(measured.table), "samples": records(measured.samples)}
     origin = Section("How this was made", [Facts(list(made.items()))])
@@ -60,14 +60,14 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
 
 def pictures(name: str, table: pd.DataFrame) -> list[Figure]:
     """Return the figures of named rows of a study, one for each scene; none for studies without a chart of their own."""
-    found = [str(scene) for scene in table["scene"].dropna().unique()]
+    names = [str(scene) for scene in table["scene"].dropna().unique()]
     if name == work_precision.STUDY.name:
         measured = points(table)
-        return [scenes.work_figure(of_scene(measured, scene), scene) for scene in found if scene in set(measured["scene"])]
+        return [scenes.work_figure(of_scene(measured, scene), scene) for scene in names if scene in set(measured["scene"])]
     if name == convergence.STUDY.name:
         errors = lines.errors(table, Measure.ATTITUDE_MAX)
-        each = {scene: of_scene(errors, scene) for scene in found}
-        return [scenes.convergence_figure(rows, lines.fits(rows), scene) for scene, rows in each.items() if len(rows)]
+        by_scene = {scene: of_scene(errors, scene) for scene in names}
+        return [scenes.convergence_figure(rows, lines.fits(rows), scene) for scene, rows in by_scene.items() if len(rows)]
     return []
 
 

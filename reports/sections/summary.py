@@ -30,8 +30,8 @@ SAMPLE_TERMS = (
 """Explanation of samples and their cost."""
 CAVEAT = (
     "MuJoCo and Pinocchio are made for trees of many bodies. Most of the time of Pinocchio's RK4 is our loop in Python around "
-    "it, and most of that of SciPy's compiled loops are calls of the equations through Python. The numbers show the cost of a "
-    "single rotation and do not rank these engines. heyoka integrates the equations that it is given: `body` has the usual "
+    "it, and most of the time of SciPy's compiled loops is calls of the equations through Python. The numbers show the cost of "
+    "a single rotation and do not rank these engines. heyoka integrates the equations that it is given: `body` has the usual "
     "ones, `lean` the fastest that we found."
 )
 """Limits of the comparison."""

@@ -17,8 +17,8 @@ def build(summary: dict[str, Any]) -> Document:
     failures = []
     if summary["failures"]:
         failed, first = summary["bodies"] - summary["outcomes"]["ok"], summary["failures"][0]
-        words = f"{failed:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
-        failures.append(f"{summary['label']} on {summary['scene']}: {words}")
+        text = f"{failed:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
+        failures.append(f"{summary['label']} on {summary['scene']}: {text}")
     estimate = summary["error"]["estimate"]
     if estimate is not None and estimate > LARGE:
         failures.append(f"{summary['label']} on {summary['scene']}: inaccurate: the attitude error is {angle(estimate)} rad")

@@ -46,7 +46,7 @@ def build(
     lost_last = [transition for transition in transitions if transition.lost and transition.now.version == names[-1]]
     failures = []
     if gated:
-        failures = [changes_text(each) for each in lost_last]
+        failures = [changes_text(transition) for transition in lost_last]
         if not any(line.results[-1] and line.results[-1].outcome.ok for line in comparison.lines):
             failures.append(f"{names[-1]}: {NO_END}")
     sentences = [text for transition in transitions if (text := changes_text(transition))]
@@ -76,7 +76,7 @@ def build(
         "versions": [
             {name: getattr(environment, name) for name in ("version", "runtime", "packages")} for environment in environments
         ],
-        "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
+        "rows": [_record(line, seen) for line in comparison.lines for seen in _seen(line)],
         "changes": [
             {
                 **{
@@ -145,10 +145,10 @@ def _unfinished(line: EngineLine) -> Iterator[str]:
 
 
 def _table(scene: str, lines: list[EngineLine]) -> Table:
-    names = list(dict.fromkeys(name for line in lines for each in _seen(line) for name in each.drifts))
+    names = list(dict.fromkeys(name for line in lines for seen in _seen(line) for name in seen.drifts))
     header = ("setting", "version", "order", "order of rates", *(f"{name} drift" for name in names))
     times = ("attitude error, rad", "outcome", "time ratio", "µs a step")
-    rows = [_row(line, each, names) for line in lines for each in _seen(line)]
+    rows = [_row(line, seen, names) for line in lines for seen in _seen(line)]
     return Table((*header, *times), rows, f"{scene}, dt = {_seen(lines[0])[0].dt:g} s", Style.FILTERED)
 
 
@@ -172,7 +172,7 @@ def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
 def _ratio(line: EngineLine, seen: Observation) -> Ratio | None:
     """Return the time of a step divided by that in the first version that has one."""
     times = line.times or {}
-    first = next((times[each.version] for each in _seen(line) if each.version in times), None)
+    first = next((times[other.version] for other in _seen(line) if other.version in times), None)
     return ratio(first, times[seen.version]) if first and seen.version in times else None
 
 

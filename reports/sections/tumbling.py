@@ -26,7 +26,7 @@ from .hard_cases import RIGHT, USABLE
 from .measured import Measured, of_scene
 from .summary import MIDDLE
 
-STUDIES = tuple(each.STUDY.name for each in (motion, convergence, speed))
+STUDIES = tuple(module.STUDY.name for module in (motion, convergence, speed))
 """Studies of the section."""
 PAPER_MAP = "reduced"
 MOST = 8
@@ -57,7 +57,7 @@ class Result:
 def results(measured: Measured) -> list[Result]:
     """Return the results on the main scene: engines, the largest error first, then ours.
 
-    If methods are named, they are all. Otherwise they are those in the charts: engines, the paper's map and our fastest method.
+    If methods are named, they are all. Otherwise the charts have them: engines, the paper's map and our fastest method.
     """
     plan, scene = measured.plan, measured.main_scene
     rows, here = of_study(measured.rows, motion.STUDY.name, scene.name), measured.rows[measured.rows["scene"] == scene.name]
@@ -67,44 +67,44 @@ def results(measured: Measured) -> list[Result]:
     orders, times = lines.orders(here), of_measure(here, Measure.TIME_PER_STEP).groupby("method")["value"].last()
     charts = {method.name for method in motion.select_methods((*plan.methods, *plan.engines))}
     few = rows["method"].isin(charts) & ((rows["role"] == Role.ENGINE) | rows["family"].isin(families))
-    found = []
-    for method, run in rows[few | rows["method"].isin([each.name for each in plan.named])].groupby("method", sort=False):
+    results = []
+    for method, run in rows[few | rows["method"].isin([method.name for method in plan.named])].groupby("method", sort=False):
         family, name, line, role, dt = run[["family", "name", "line", "role", "dt"]].iloc[0]
         values = [of_measure(run, Measure.ATTITUDE_MAX)["value"].max()]
-        values += [known.get(method, math.nan) for known in (orders, times)]
+        values += [column.get(method, math.nan) for column in (orders, times)]
         pictured, drifts = bool(few[run.index[0]]), largest_drifts(run, scene)
         numbers = map(float, values)
-        found.append(
+        results.append(
             Result(str(method), family, name, line, role != Role.ENGINE, pictured, dt, outcomes(run)[0], drifts, *numbers)
         )
-    return sorted(found, key=lambda each: (each.ours, math.isnan(each.error), -each.error))
+    return sorted(results, key=lambda result: (result.ours, math.isnan(result.error), -result.error))
 
 
-def drawn(found: Sequence[Result]) -> list[str]:
+def drawn(results: Sequence[Result]) -> list[str]:
     """Return the methods that the first screens draw: those that ran, without the most accurate engines if there are many."""
-    shown = [each for each in found if each.outcome.ok and each.pictured]
-    engines, ours = ([each.method for each in shown if each.ours is side] for side in (False, True))
+    shown = [result for result in results if result.outcome.ok and result.pictured]
+    engines, ours = ([result.method for result in shown if result.ours is side] for side in (False, True))
     return [*engines[: MOST - 1 - len(ours)], *ours]
 
 
-def section(measured: Measured, found: Sequence[Result]) -> Section:
+def section(measured: Measured, results: Sequence[Result]) -> Section:
     """Return the section, from the `results`."""
     scene = measured.main_scene
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
-    moving = attempt(f"The animation of {scene.name}", lambda: animation(measured, scene, found))
-    lead = Paragraph(_sentence(found, scene), Emphasis.LEAD)
-    blocks = filled(lead, *([moving] if isinstance(moving, Paragraph) else moving), table(found, scene))
+    moving = attempt(f"The animation of {scene.name}", lambda: animation(measured, scene, results))
+    lead = Paragraph(_sentence(results, scene), Emphasis.LEAD)
+    blocks = filled(lead, *([moving] if isinstance(moving, Paragraph) else moving), table(results, scene))
     source = {"study": STUDIES, "scene": scene.name}
     return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
 
 
-def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list[Block]:
+def animation(measured: Measured, scene: Scene, results: Sequence[Result]) -> list[Block]:
     """Return the animation of the exact motion and of the `drawn` results, and its legend; nothing without samples."""
     motions = lines.trajectories(measured.samples, scene)
-    names, values = {each.method: each.line for each in found}, lines.largest_values(measured.samples, scene)
+    names, values = {result.method: result.line for result in results}, lines.largest_values(measured.samples, scene)
     truth = set(measured.samples[measured.samples["role"] == Role.TRUTH]["method"])
     exact = [method for method in motions if method in truth]
-    shown = [*exact, *(method for method in drawn(found) if method in motions)]
+    shown = [*exact, *(method for method in drawn(results) if method in motions)]
     if not shown:
         return []
     signs = "Grey: exact. Arrow: angular momentum. Line: a body axis. Numbers: largest so far."
@@ -115,15 +115,15 @@ def animation(measured: Measured, scene: Scene, found: Sequence[Result]) -> list
     return [motion, Paragraph(signs, Emphasis.NOTE)]
 
 
-def _sentence(found: Sequence[Result], scene: Scene) -> str:
+def _sentence(results: Sequence[Result], scene: Scene) -> str:
     """Return the largest error and change of energy, and the errors at both ends of what is compared.
 
-    They are those of this engine, of the most accurate engine, and of our methods, each at its worst and at its best setting.
+    They belong to this engine, to the most accurate engine, and to our methods, each at its worst and at its best setting.
     """
-    known = [each for each in found if each.outcome.ok and not math.isnan(each.error)]
-    if not known and any(each.outcome.ok for each in found):
+    compared = [result for result in results if result.outcome.ok and not math.isnan(result.error)]
+    if not compared and any(result.outcome.ok for result in results):
         return f"The attitude errors on {scene.name} are not known: no reference solution is confirmed by another one."
-    engines, ours = ([each for each in known if each.ours is side] for side in (False, True))
+    engines, ours = ([result for result in compared if result.ours is side] for side in (False, True))
     parts, others = [], dict[str, float]()
     if engines:
         worst, best = engines[0], engines[-1]
@@ -135,32 +135,32 @@ def _sentence(found: Sequence[Result], scene: Scene) -> str:
         parts.append(f"In {scene.t_end:.3g} s, the attitude of {worst.line} {wrong}{changes}.")
         for family in dict.fromkeys((worst.family, best.family)):
             settings = [engine for engine in engines if engine.family == family]
-            others |= {each.line: each.error for each in (settings[0], settings[-1]) if each is not worst}
-    ours = sorted(ours, key=lambda each: each.error)
-    for each, name in zip((*ours[:1], *ours[1:][-1:]), (" of the Python package `conservative`", ""), strict=False):
-        others[f"`{each.method}`{name}"] = each.error
+            others |= {result.line: result.error for result in (settings[0], settings[-1]) if result is not worst}
+    ours = sorted(ours, key=lambda result: result.error)
+    for result, name in zip((*ours[:1], *ours[1:][-1:]), (" of the Python package `conservative`", ""), strict=False):
+        others[f"`{result.method}`{name}"] = result.error
     if others:
         first, *rest = (f"{name} {{}}by {angle(error)} rad" for name, error in others.items())
-        parts.append(", ".join([first.format("is wrong "), *(each.format("") for each in rest)]) + ".")
+        parts.append(", ".join([first.format("is wrong "), *(part.format("") for part in rest)]) + ".")
     return " ".join(parts)
 
 
-def table(found: Sequence[Result], scene: Scene) -> Table:
+def table(results: Sequence[Result], scene: Scene) -> Table:
     """Return the results as a table with grades."""
     header = ["method", "step, s", *(f"drift of {invariant.name}" for invariant in scene.invariants)]
     header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
     rows: list[Row] = []
     failed: dict[tuple[str, str], list[Result]] = {}
-    for each in found:
-        step = numeric(each.dt) if each.name == each.line else Cell("adaptive", value=math.nan)
-        if not each.outcome.ok:
-            failed.setdefault((each.family, str(each.outcome)), []).append(each)
+    for result in results:
+        step = numeric(result.dt) if result.name == result.line else Cell("adaptive", value=math.nan)
+        if not result.outcome.ok:
+            failed.setdefault((result.family, str(result.outcome)), []).append(result)
             continue
-        order = numeric(each.order, DASH if math.isnan(each.order) else f"{each.order:.1f}")
-        error = grade(each.error, angle(each.error), (RIGHT, USABLE))
-        rows.append([each.name, step, *map(grade, each.drifts.values()), error, order, numeric(1e6 * each.time)])
+        order = numeric(result.order, DASH if math.isnan(result.order) else f"{result.order:.1f}")
+        error = grade(result.error, angle(result.error), (RIGHT, USABLE))
+        rows.append([result.name, step, *map(grade, result.drifts.values()), error, order, numeric(1e6 * result.time)])
     for alike in failed.values():  # settings that failed in the same way share a row
-        names, reason = ", ".join(each.name for each in alike), outcome_cell(alike[0].outcome, reason=True)
+        names, reason = ", ".join(result.name for result in alike), outcome_cell(alike[0].outcome, reason=True)
         rows.append([names, DASH, reason, *[DASH] * (len(header) - 3)])
     moments, rate = ", ".join(f"{moment:.3g}" for moment in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
     caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
@@ -168,10 +168,10 @@ def table(found: Sequence[Result], scene: Scene) -> Table:
     caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
     if scene.loaded:
         caption += " A balance counts work and impulse as the method sums them, or as the reference solution does."
-    if ours := list(dict.fromkeys(each.family for each in found if each.ours)):
+    if ours := list(dict.fromkeys(result.family for result in results if result.ours)):
         caption += f" Ours: {listed(ours)}."
-    kept = [each for each in found if each.drifts and all(drift <= CONSERVED for drift in each.drifts.values())]
-    if still := [each.line for each in kept if each.error > RIGHT]:
+    kept = [result for result in results if result.drifts and all(drift <= CONSERVED for drift in result.drifts.values())]
+    if still := [result.line for result in kept if result.error > RIGHT]:
         names = listed([invariant.name for invariant in scene.invariants])
         caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."
     caption += f" Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit)."

@@ -47,21 +47,30 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
     """
     order = sorted(verifications, key=lambda verification: DECIDING.index(verification.verdict))
-    models, others = ([each for each in order if (each.kind == MODEL) is is_model] for is_model in (True, False))
+    models, others = (
+        [verification for verification in order if (verification.kind == MODEL) is is_model] for is_model in (True, False)
+    )
     listed_alone = [*others, *(models if len(models) == 1 else ())]
     sentences = [
-        Item(f"{each.sentence}.", each.subject * (each.kind == "recordings"), each.verdict is Verdict.WRONG)
-        for each in listed_alone
+        Item(
+            f"{verification.sentence}.",
+            verification.subject * (verification.kind == "recordings"),
+            verification.verdict is Verdict.WRONG,
+        )
+        for verification in listed_alone
     ]
     lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
-        parts = [*([("Model files", body_blocks(models))] if models else []), *((each.subject, make(each)) for each in shown)]
+        parts = [
+            *([("Model files", body_blocks(models))] if models else []),
+            *((verification.subject, make(verification)) for verification in shown),
+        ]
         return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
 
     return Document(
         "conservative verify",
-        f"Verified: {', '.join(each.subject for each in verifications)}",
+        f"Verified: {', '.join(verification.subject for verification in verifications)}",
         [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
         brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT]),
         data={
@@ -71,7 +80,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
             "subjects": [content(verification) for verification in verifications],
         },
         checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
-        failures=[f"{each.sentence}." for each in order if each.verdict is Verdict.WRONG],
+        failures=[f"{verification.sentence}." for verification in order if verification.verdict is Verdict.WRONG],
     )
 
 
@@ -119,7 +128,7 @@ def details(verification: Verification) -> list[Block]:
     if verification.kind in OWN:
         return summary(verification)
     pairs, others = _pairs(verification)
-    tables = [_cases(check, some) for check, some in grouped(others, lambda each: each.check)]
+    tables = [_cases(check, some) for check, some in grouped(others, lambda finding: finding.check)]
     right = _pair_blocks(pairs) if all(pair.verdict is not Verdict.WRONG for pair in pairs) else []
     return filled(*summary(verification), *tables, *right)
 
@@ -141,7 +150,7 @@ def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
 def mistakes(findings: Iterable[Finding]) -> Items:
     """Return the wrong cases by what explains them, the explanation of the most cases first."""
     wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
-    groups = sorted(grouped(wrong, lambda each: (each.check, named_by(each))), key=lambda group: -len(group[1]))
+    groups = sorted(grouped(wrong, lambda finding: (finding.check, named_by(finding))), key=lambda group: -len(group[1]))
     items = [Item(explanation(some[0]), _named(check, _cases_of(some)), True) for (check, _), some in groups]
     return Items(items)
 
@@ -176,8 +185,8 @@ def _sentence(verifications: Sequence[Verification]) -> str:
     counts = Counter(verification.verdict for verification in verifications)
     if len(counts) == 1:
         return f"All {len(verifications)} subjects are {verifications[0].verdict}."
-    words = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
-    return f"Of {len(verifications)} subjects, {listed(words)}."
+    counted = [f"{counts[verdict]} {'is' if counts[verdict] == 1 else 'are'} {verdict}" for verdict in SIGNS if counts[verdict]]
+    return f"Of {len(verifications)} subjects, {listed(counted)}."
 
 
 def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[tuple[Key, list[Finding]]]:
@@ -201,9 +210,11 @@ def _cases_of(findings: Sequence[Finding]) -> str:
 
 def _remarks(findings: Sequence[Finding]) -> Items:
     """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
-    told = (finding for finding in findings if finding.verdict is Verdict.RIGHT and finding.detail and finding.check != "order")
+    remarkable = (
+        finding for finding in findings if finding.verdict is Verdict.RIGHT and finding.detail and finding.check != "order"
+    )
     undecided = (finding for finding in findings if finding.verdict is Verdict.UNDECIDED)
-    groups = grouped((*undecided, *told), lambda each: (each.check, explanation(each)))
+    groups = grouped((*undecided, *remarkable), lambda finding: (finding.check, explanation(finding)))
     return Items([Item(text, _named(check, _cases_of(some))) for (check, text), some in groups])
 
 
@@ -214,7 +225,7 @@ def numbers(findings: Sequence[Finding]) -> list[str]:
 
 def _counts(verification: Verification) -> Table | None:
     """Return the number of cases by check and verdict; None of a subject with one case."""
-    body = [[check, *numbers(some)] for check, some in grouped(verification.findings, lambda each: each.check)]
+    body = [[check, *numbers(some)] for check, some in grouped(verification.findings, lambda finding: finding.check)]
     return Table(["check", *SIGNS], body, "Cases") if len(verification.findings) > 1 else None
 
 

@@ -18,9 +18,9 @@ from .verification import SIGNS, TERMS, explanation, grouped, numbers
 def section(verified: Sequence[Verified]) -> Section:
     """Return the section of a report or of the page of an engine: a row for each setting and check."""
     body = list[Row]()
-    for each in verified:
-        name = display_name(each.names["family"], each.names["version"], each.names["setting"])
-        for check, findings in grouped(each.findings, lambda finding: finding.check):
+    for setting in verified:
+        name = display_name(setting.names["family"], setting.names["version"], setting.names["setting"])
+        for check, findings in grouped(setting.findings, lambda finding: finding.check):
             body.append([name, check, *numbers(findings), _mistakes(findings)])
     table = Table(["engine", "check", *SIGNS, "mistakes, with the cases that each explains"], body, "Cases of each check")
     return Section("Verification", [Paragraph(TERMS), table], "verification")
@@ -28,8 +28,8 @@ def section(verified: Sequence[Verified]) -> Section:
 
 def _mistakes(findings: Sequence[Finding]) -> str:
     """Return the three mistakes that explain the most of some findings, with their numbers of cases."""
-    found = Counter(finding.mistake for finding in findings if finding.verdict is Verdict.WRONG and finding.mistake)
-    return ", ".join(f"{key} ({count})" for key, count in found.most_common(3)) or DASH
+    counts = Counter(finding.mistake for finding in findings if finding.verdict is Verdict.WRONG and finding.mistake)
+    return ", ".join(f"{key} ({count})" for key, count in counts.most_common(3)) or DASH
 
 
 def changes(versions: Sequence[tuple[str, Sequence[Verified]]]) -> list[str]:

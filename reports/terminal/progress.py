@@ -32,17 +32,17 @@ def announce(what: str) -> None:
 def progress(title: str = "") -> Iterator[Step]:
     """Yield the function to call before each step. Without a terminal, the title is a line after `DELAY`."""
     if not has_terminal() or find_spec("rich") is None:  # the gate runs without the extra `report`, which has rich
-        said = start = monotonic()
+        written = start = monotonic()
         timer = Timer(DELAY, announce, [title])
         timer.daemon = True
 
         def step(share: float, what: str) -> None:
-            nonlocal said
-            if (now := monotonic()) - said >= SILENCE:
+            nonlocal written
+            if (now := monotonic()) - written >= SILENCE:
                 # The first steps compile, so an estimate from them would be many times too long.
                 left = f", about {(now - start) * (1 - share) / share:.0f} s left" if share > 0.1 else ""
                 print(f"{share:.0%}{left}: {what}", file=sys.stderr, flush=True)
-                said = now
+                written = now
 
         if title:
             timer.start()

@@ -10,7 +10,7 @@ from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, Value
 from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import studies
-from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
+from conservative.benchmarks.studies.paper import APPROXIMATE, PROPERTIES, agreement_row
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study, remember_truths

@@ -194,7 +194,7 @@ def test_a_symplectic_method_whose_energy_is_lost_has_diverged() -> None:
     run = cv.integrate(cv.scenes.asymmetric_top(), 0.8, "splitting:order=2", 32000, 80, on_failure="return")
     assert run.outcome.kind is OutcomeKind.DIVERGED, run.outcome
     assert np.abs(run.drift("energy")).max() <= 1 < len(run)
-    assert run.t[-1] < 1000  # 896 s
+    assert run.t[-1] < 4000  # 896 and 1,216 s of 25,600 s: the motion is chaotic, and compilers round differently
 
 
 @kinds

@@ -245,12 +245,12 @@ def test_a_store_of_a_table_with_many_corners_is_resumed_to_the_same(method, tmp
     for i, w0 in enumerate(options["w_WB_B0"]):
         right = motion(replace(case, w0=w0), stored.t)[0]
         assert angle_between(np.asarray(stored[i].R_WB), right).max() < LARGEST[method]
-    before = {each: each.read_bytes() for each in place.rglob("*") if each.is_file()}
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
     for part in place.glob("R_WB/c/**/*"):
         if part.is_file():
             part.unlink()
     cv.integrate_many(case.scene(), **options, path=place, resume=True)
-    assert {each: each.read_bytes() for each in place.rglob("*") if each.is_file()} == before
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.parametrize("method", [cv.Reduced(), cv.Reduced(4)], ids=lambda each: each.name)
@@ -351,7 +351,7 @@ def test_a_search_beside_break_points_compares_runs_that_differ(seed):
             list_pieces(cv.Grid(1.0 / n, n), scene.breaks) for n in (int(1 / first.dt) // 2 * 2, int(1 / first.dt) // 2)
         )
         assert max(each.h for each in once) < max(each.h for each in twice)
-        shortest = [min(each.h for each in pieces if not each.whole) for pieces in (once, twice)]
+        shortest = [min(piece.h for piece in pieces if not piece.whole) for pieces in (once, twice)]
         assert shortest[0] < 0.9 * shortest[1]
     for error in (1e-2, 1e-6):
         found = cv.integrate(scene, error=error, t_eval=5)

@@ -84,7 +84,7 @@ def test_random_flights_agree_with_newton_euler_at_the_origin(second_truth, coun
         body, scene = random_flight(random)
         found = registry.method("exact").solve(scene, Grid(0.5, 4))
         states = second_truth(body, scene, found.t)
-        R = np.array([cv.attitude.from_quaternion(each / np.linalg.norm(each)) for each in states[:, :4]])
+        R = np.array([cv.attitude.from_quaternion(state / np.linalg.norm(state)) for state in states[:, :4]])
         v_WB = np.einsum("nij,nj->ni", R, states[:, 10:])
         for values, other in ((found.p_WB, states[:, 7:10]), (found.v_WB, v_WB), (found.w_WB_B, states[:, 4:7])):
             worst = max(worst, np.abs(values - other).max() / np.abs(other).max())
@@ -129,7 +129,7 @@ def test_invariants_are_those_of_the_textbook():
     _, scene = random_flight(np.random.default_rng(5))
     flight, mass = scene.flight, scene.flight.mass
     found = cv.integrate(scene, method="exact", dt=0.1)
-    rng, values = np.random.default_rng(7), {each.name: each for each in scene.invariants}
+    rng, values = np.random.default_rng(7), {invariant.name: invariant for invariant in scene.invariants}
     # Off the motion, so that no term can be missing: any state, at any time.
     R, w, t = rotation_about(rng.normal(size=3), 1.0), rng.normal(size=3), 0.7
     p, v = rng.normal(size=(2, 3))

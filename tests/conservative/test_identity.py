@@ -106,10 +106,10 @@ def test_a_function_is_another_one_when_what_it_reads_changes(kind, gains):
 def test_globals_are_read_in_nested_functions_and_comprehensions():
     makers = (lambda: lambda t: K * t, lambda: lambda t: (lambda: K)() * t, lambda: lambda t: sum(K * each for each in (t,)))
     functions = [make() for make in makers]
-    before = [digest(each) for each in functions]
+    before = [digest(function) for function in functions]
     assert [digest(make()) for make in makers] == before
     globals()["K"] = 2.0
-    assert not {*before} & {digest(each) for each in functions}
+    assert not {*before} & {digest(function) for function in functions}
 
 
 def closure(k):
@@ -625,5 +625,5 @@ def test_a_change_of_any_number_or_function_changes_the_key(feature):
         assert other.key not in keys.values(), path
         keys[path] = other.key
     assert {path.partition(" ")[0] for path in keys} - {""} == {f"Scene.{name}" for name in fields_of_motion(cv.Scene)}
-    assert {each.name for each in fields(cv.Scene)} - {*fields_of_motion(cv.Scene)} == {"name", "dt", "group", "source"}
+    assert {field.name for field in fields(cv.Scene)} - {*fields_of_motion(cv.Scene)} == {"name", "dt", "group", "source"}
     assert built.rename("other", group="x", source="y", dt=0.3).key == built.key

@@ -46,7 +46,7 @@ SCENES = {
 def test_reduced_keeps_the_balances_to_round_off(name, order):
     scene = SCENES[name]
     trajectory = cv.integrate(scene, 0.05, cv.Reduced(order=order))
-    assert [each.name.split()[-1] for each in scene.invariants] == ["balance"] * 2
+    assert [invariant.name.split()[-1] for invariant in scene.invariants] == ["balance"] * 2
     for balance in scene.invariants:
         assert sizes(trajectory.drift(balance)).max() < 2e-14  # measured: at most 2.6e-15
         without = balance.evaluate(trajectory.R_WB, trajectory.w_WB_B) - balance.evaluate(

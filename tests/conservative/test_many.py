@@ -107,7 +107,7 @@ def test_numbers_are_those_of_one_at_a_time(way, field):
     assert len(found) == N
     assert found.R_WB.shape == (N, 5, 3, 3)
     assert max(values.max() for values in found.drifts.values()) < 1e-14  # 2e-15
-    assert set(found.drifts) == {"orthonormality", *(each.name for each in scene(potential).invariants)}
+    assert set(found.drifts) == {"orthonormality", *(invariant.name for invariant in scene(potential).invariants)}
 
 
 def test_missing_arguments_are_those_of_the_scene():

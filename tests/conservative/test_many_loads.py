@@ -142,7 +142,7 @@ def test_a_store_has_what_was_supplied_and_is_resumed_to_the_same(name, tmp_path
         require_same(one, other)
         require_same(cv.integrate(one.scene, 0.05, RUNS[name][1], sample_every=4), other)  # loads are restored
     memory.to_zarr(tmp_path / "b.zarr")
-    for file in (each.relative_to(place) for each in place.rglob("*") if each.is_file()):
+    for file in (path.relative_to(place) for path in place.rglob("*") if path.is_file()):
         assert (place / file).read_bytes() == (tmp_path / "b.zarr" / file).read_bytes()
 
 

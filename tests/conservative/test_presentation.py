@@ -85,11 +85,11 @@ def test_a_fast_motion_is_a_band_and_a_long_one_has_hours(turn, t_end):
     run = cv.Trajectory(brick_flip(), t, np.broadcast_to(np.eye(3), (len(t), 3, 3)), w_WB_B, "made")
     specification = run.plot().to_dict()
     rates = specification["vconcat"][0]
-    assert [each["mark"]["type"] for each in rates["layer"]] == ["area", "line", "line"]
+    assert [rate["mark"]["type"] for rate in rates["layer"]] == ["area", "line", "line"]
     rows = [row for row in specification["datasets"][rates["data"]["name"]] if row["of"] == "about axis 1"]
     widths = [row["value"] - row["low"] for row in rows]
     assert width[0] <= min(widths) <= max(widths) <= width[1]  # measured 1.74 to 2.00, and 0 to 0.011
-    assert {each["encoding"]["x"]["title"] for each in rates["layer"]} == {f"time, {unit}"}
+    assert {rate["encoding"]["x"]["title"] for rate in rates["layer"]} == {f"time, {unit}"}
     assert rows[-1]["t"] == pytest.approx(t_end / {"s": 1, "h": 3600, "days": 86400}[unit], rel=0.01)
 
 

@@ -45,9 +45,9 @@ AXIS = "momentum along the field's axis"
     ids=lambda value: getattr(value, "name", ""),
 )
 def test_order_and_invariants(method, name, order, conserves):
-    kept = {each for each in method.conserves if not each.endswith(" balance")}
+    kept = {invariant for invariant in method.conserves if not invariant.endswith(" balance")}
     assert (method.name, method.order, kept, method.role) == (name, order, conserves, cv.Role.OURS)
-    balances = {each.removesuffix(" balance") for each in method.conserves - kept}
+    balances = {invariant.removesuffix(" balance") for invariant in method.conserves - kept}
     assert balances == (kept if Feature.TORQUE in method.supports else set())
 
 

@@ -62,10 +62,10 @@ def test_frames_are_chosen_and_refused() -> None:
 
 def test_what_it_conserves_and_what_it_does_not() -> None:
     top, brick = cv.scenes.lagrange_top(), cv.scenes.brick_flip()
-    drifts = {each.name: np.abs(cv.integrate(top, 0.01).drift(each)).max() for each in top.invariants}
+    drifts = {invariant.name: np.abs(cv.integrate(top, 0.01).drift(invariant)).max() for invariant in top.invariants}
     assert drifts["energy"] < 5e-15  # measured 4.5e-16
     assert drifts["vertical momentum"] < 5e-15  # measured 5.0e-16
     axial = top.invariants[2].scale * drifts["axial momentum"] / abs(top.initial_value(top.invariants[2])[0])
     assert axial == pytest.approx(0.0119, rel=0.01)  # measured 0.01190
-    for each in brick.invariants:
-        assert np.abs(cv.integrate(brick, 0.01).drift(each)).max() < 5e-15  # measured 4.6e-16 and 7.2e-16
+    for invariant in brick.invariants:
+        assert np.abs(cv.integrate(brick, 0.01).drift(invariant)).max() < 5e-15  # measured 4.6e-16 and 7.2e-16

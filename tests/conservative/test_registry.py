@@ -86,7 +86,7 @@ def test_the_core_names_no_room_above_it():
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     ]
     assert len(files) > 80
-    assert [each for each in texts if re.match(rf"(conservative)?\.({'|'.join(packages)})\b", each[1])] == []
+    assert [text for text in texts if re.match(rf"(conservative)?\.({'|'.join(packages)})\b", text[1])] == []
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def errors(method: str, kind: str, index: int, n: int) -> tuple[float, float]:
     scene, chosen = gyrostat(kind, index), registry.method(method)
     found = chosen.solve(scene, Grid(scene.t_end / n, n))
     assert found.ok, found.outcome
-    kept = [each for each in scene.invariants if each.name in chosen.conserves]
+    kept = [invariant for invariant in scene.invariants if invariant.name in chosen.conserves]
     drift = max((float(np.linalg.norm(np.atleast_2d(found.drift(each)), axis=0).max()) for each in kept), default=0.0)
     return float(angle_between(found.R_WB[:: n // 10], truth(kind, index)).max()), drift
 
@@ -221,3 +221,11 @@ def test_reduced_has_no_linear_drift_in_a_million_steps() -> None:
     found = cv.integrate(scene, dt, "reduced", t_end=1e6 * dt, sample_every=10_000)
     assert np.abs(found.drift("energy")).max() < 5e-14  # measured 2e-15
     assert np.linalg.norm(found.drift("momentum"), axis=1).max() < 5e-14  # measured 5e-15
+
+
+@pytest.mark.parametrize("size", [9e2, 1.1e3, 1e6])
+def test_a_rotor_momentum_that_jumps_is_refused_at_any_size(size):
+    """A jump above 1,000 kg m^2/s was taken for a corner."""
+    body = cv.RigidBody((1.0, 2.0, 2.5), rotor_momentum=lambda t: (0.0, 0.0, size * (t >= 0.3)))
+    with pytest.raises(cv.BadInput, match=r"a function that jumps at t = 0\.3 s"):
+        cv.integrate(cv.Scene("jump", body, np.eye(3), (0.1, 0.2, 0.3), 1.0), 0.01, "projected")

@@ -391,7 +391,7 @@ def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
     gone, other = family("gone", MethodInfo(rank=0), missing=True), family("other", MethodInfo(rank=0), supported=False)
 
     def names(*families):
-        monkeypatch.setattr(search.registry, "list_families", lambda: {each.family: each for each in families})
+        monkeypatch.setattr(search.registry, "list_families", lambda: {family.family: family for family in families})
         return [method.family for method in search.candidates(SCENE)]
 
     assert names(second, none, first, third, gone, other) == ["third", "first"]
@@ -666,7 +666,7 @@ def test_a_function_is_never_asked_beyond_the_end(kind, how):
         "t_eval": {"dt": 0.1, "t_eval": 4, "method": method},
     }.get(how, {"dt": 0.1, "method": method})
     found = cv.integrate(scene, **arguments)
-    _ = found.energy, found.momentum_W, [found.drift(each.name) for each in scene.invariants]
+    _ = found.energy, found.momentum_W, [found.drift(invariant.name) for invariant in scene.invariants]
     assert max(asked) <= end
     assert max(asked) > end * (1 - 1e-12) or how == "scipy"
 

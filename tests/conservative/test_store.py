@@ -430,7 +430,7 @@ def test_every_row_of_the_inputs_is_compared():
     scene, other = cv.scenes.brick_flip(), w.copy()
     other[-1, 2] *= 1 + 1e-15
     bodies = [read_bodies(scene, None, each, None, None) for each in (w, w.copy(), other)]
-    one, same, changed = (store.describe_run("a method", each, cv.Grid(0.1, 5)) for each in bodies)
+    one, same, changed = (store.describe_run("a method", body, cv.Grid(0.1, 5)) for body in bodies)
     assert one == same
     assert one["digests"] != changed["digests"]
 

@@ -198,7 +198,7 @@ def discrete_lagrangian(scene, h):
     def slopes(of):
         weights, width = ((1, 75.0), (2, -15.0), (3, 5 / 3)), 0.01  # divided by the width
         turns = [[(c, exponential(k * e)) for k, c in weights] for e in width * np.eye(3)]
-        return np.array([sum(c * (of(R) - of(R.T)) for c, R in each) for each in turns])
+        return np.array([sum(c * (of(R) - of(R.T)) for c, R in turn) for turn in turns])
 
     R0, L0 = scene.R_WB0, J @ scene.w_WB_B0
     v = solve_equations(lambda v: L0 + slopes(lambda d: action(R0 @ d, R0 @ exponential(v))), h * scene.w_WB_B0)

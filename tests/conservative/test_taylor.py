@@ -97,7 +97,7 @@ def test_samples_are_corrected_to_round_off_and_do_not_change_the_motion(field: 
 
 def test_rounding_does_not_add_up() -> None:
     trajectory = cv.integrate(scene("gravity"), 0.05, cv.Taylor(12), t_end=5e4, sample_every=1000)
-    energy, _ = (np.abs(trajectory.drift(each)) for each in trajectory.scene.invariants)
+    energy, _ = (np.abs(trajectory.drift(invariant)) for invariant in trajectory.scene.invariants)
     assert drift(trajectory) < 1e-14
     assert energy[500:].mean() < 3 * energy[:500].mean() + 1e-16
 
@@ -107,7 +107,7 @@ def test_conserves_the_momentum_about_an_axis_of_symmetry(potential: cv.Potentia
     held = cv.Scene("top", SYMMETRIC, rotation_about((0.3, -0.5, 0.8), 0.7), (1.2, -2.0, 0.7), 2.0, potential)
     for order, dt in ((5, 0.05), (14, 0.1)):
         trajectory = cv.integrate(held, dt, cv.Taylor(order), t_end=500.0)
-        assert "axial momentum" in [each.name for each in held.invariants]
+        assert "axial momentum" in [invariant.name for invariant in held.invariants]
         assert drift(trajectory) < 2e-14  # measured 6e-15
 
 

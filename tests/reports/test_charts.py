@@ -33,7 +33,7 @@ def axes(spec):
 
 
 def drawn(spec, field):
-    return sorted({each[field] for rows in spec["datasets"].values() for each in rows if field in each})
+    return sorted({row[field] for rows in spec["datasets"].values() for row in rows if field in row})
 
 
 def test_time_against_error_is_in_microseconds_and_radians():
@@ -64,7 +64,7 @@ def test_lines_have_the_colour_of_their_family_and_the_mark_of_their_place():
     families = {"reduced": "reduced", "gauss 2": "gauss", "gauss 3": "gauss"}
     channels = look(families, "shape")
     scales = [channels[name].to_dict()["scale"] for name in ("color", "shape")]
-    found = [dict(zip(each["domain"], each["range"], strict=True)) for each in scales]
+    found = [dict(zip(scale["domain"], scale["range"], strict=True)) for scale in scales]
     assert found == [colours(families), {"reduced": SHAPES[0], "gauss 2": SHAPES[0], "gauss 3": SHAPES[1]}]
 
 
@@ -121,7 +121,7 @@ def test_guides_have_the_slopes_of_the_fitted_orders():
     for ends, texts in ((fits, 1), (fits.iloc[:0], 0)):
         spec = figures.convergence(errors.assign(family=errors["name"]), ends, "s").to_dict()
         # In one list: the page removes the legend of each layer, and adds the filter of its buttons.
-        assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == texts
+        assert [layer["mark"]["type"] for layer in spec["layer"]].count("text") == 2 * texts  # a white halo and the text
 
 
 def test_guides_of_growth_stay_within_the_axes_and_have_their_slopes():
@@ -164,7 +164,8 @@ def test_an_uncertain_fit_has_neither_a_bold_stretch_nor_a_guide():
 
 
 def labels_of_guides(spec):
-    (text,) = [layer for layer in spec["layer"] if layer["mark"]["type"] == "text"]
+    halo, text = [layer for layer in spec["layer"] if layer["mark"]["type"] == "text"]
+    assert halo["data"] == text["data"]
     return spec["datasets"][text["data"]["name"]]
 
 

@@ -83,7 +83,7 @@ def test_methods_are_shown_as_they_were_typed_and_the_others_beside_one_that_doe
     assert "symmetric about one axis" in done.stderr
     watched = conservative("watch", "brick_flip", "-m", "lame,mujoco:RK4", "--out", tmp_path / "motion.html", "--json")
     runs = json.loads(watched.stdout)["runs"]
-    assert (watched.exit_code, [each["typed"] for each in runs]) == (0, ["lame", "mujoco:RK4"])
+    assert (watched.exit_code, [run["typed"] for run in runs]) == (0, ["lame", "mujoco:RK4"])
     alone = conservative("run", "brick_flip", "-m", "lame")
     assert (alone.exit_code, one_line(alone.stderr)) == (2, True)
 

@@ -167,7 +167,7 @@ def test_options_of_two_versions_need_two(gate, options):
 
 def test_junit_has_violations_that_belong_to_no_row():
     nothing = answer(was=None)  # no row of the earlier version has passed: everything would
-    assert [each.row.measure for each in decide(nothing).violations] == ["rows"]
+    assert [violation.row.measure for violation in decide(nothing).violations] == ["rows"]
     suite = ElementTree.fromstring(text_of(build(nothing), "junit")).find("testsuite")
     assert suite.get("failures") == "1"
     assert "rows" in suite.find(".//failure").get("message")

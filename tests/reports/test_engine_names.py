@@ -111,8 +111,8 @@ def methods_in(value):
     if isinstance(value, Method):
         yield value
     elif is_dataclass(value) and not isinstance(value, type):
-        for each in fields(value):
-            yield from methods_in(getattr(value, each.name))
+        for field in fields(value):
+            yield from methods_in(getattr(value, field.name))
     elif isinstance(value, Mapping | tuple | list):
         for each in value.values() if isinstance(value, Mapping) else value:
             yield from methods_in(each)
@@ -138,7 +138,7 @@ def ask(monkeypatch, name, command, parameter, text):
     monkeypatch.setattr(
         "conservative.benchmarks.verification.bodies.loaded.read_files", lambda *_: [SimpleNamespace(kind="", label="")]
     )
-    others = [each for each in command.params if each is not parameter and (each.required or each.name == NEEDS.get(name))]
+    others = [param for param in command.params if param is not parameter and (param.required or param.name == NEEDS.get(name))]
     words = name.split()
     for each in sorted([parameter, *others], key=command.params.index):
         value = text if each is parameter else GIVEN[each.name]
@@ -155,7 +155,7 @@ def ask(monkeypatch, name, command, parameter, text):
 
 
 def test_every_command_with_an_engine_is_known():
-    assert {each.values[0] for each in CELLS} == set(CAPTURED)
+    assert {cell.values[0] for cell in CELLS} == set(CAPTURED)
 
 
 @pytest.mark.parametrize(("name", "command", "parameter", "engine"), crossed(["double@1.0", "mujoco@0.1"], len(CELLS)))

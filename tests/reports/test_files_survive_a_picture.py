@@ -78,9 +78,7 @@ def rows_of(monkeypatch):
 
     def take(name):
         rows = (
-            made_up.convergence("reduced", 2)
-            if name == "convergence"
-            else [each for rows in (*TWICE, *SLOWER) for each in rows]
+            made_up.convergence("reduced", 2) if name == "convergence" else [row for rows in (*TWICE, *SLOWER) for row in rows]
         )
         table = measurement.frame(rows)
         monkeypatch.setattr(single_study, "measure_study", lambda *_: Measurements(table, pd.DataFrame()))

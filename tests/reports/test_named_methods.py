@@ -21,7 +21,7 @@ NAMED = ["mujoco", "drake:discrete", "reduced", "moser_veselov:order=4"]
 def shown():
     """The page of a report of named methods, and its table on the terminal; of two studies only."""
     plan = plan_report([SCENE], NAMED, quick=True, skip_missing=True)
-    found = [row for each in plan.studies if each.name in ("motion", "paper") for row in studies.findings(each)]
+    found = [row for study in plan.studies if study.name in ("motion", "paper") for row in studies.findings(study)]
     document = build(plan, Measurements.of(found), provenance([]))
     first = next(block for block in walk(document.blocks) if isinstance(block, Table))
     return document, first, document.brief[0]
@@ -32,7 +32,7 @@ def test_each_named_setting_has_its_row_with_the_reason_if_it_failed(shown, whic
     rows = {row[0].partition(":")[0].replace(" 4.0.0", ""): " ".join(row) for row in texts(shown[which])}
     settings = [f"mujoco {each}" for each in ("Euler", "RK4", "implicit", "implicitfast", "discrete")]
     settings += ["reduced", *(f"reduced order={order}" for order in (4, 6, 8, 10))]
-    assert {*settings, "drake discrete", "moser_veselov order=4"} <= {each for names in rows for each in names.split(", ")}
+    assert {*settings, "drake discrete", "moser_veselov order=4"} <= {name for names in rows for name in names.split(", ")}
     assert "conservative engines install drake" in rows["drake discrete"]
     assert "it does not support uniform gravity" in rows["moser_veselov order=4"]
 
@@ -40,7 +40,7 @@ def test_each_named_setting_has_its_row_with_the_reason_if_it_failed(shown, whic
 @pytest.mark.parametrize("which", [1, 2], ids=["page", "terminal"])
 def test_each_invariant_has_its_column(shown, which):
     """The energy and the vertical momentum of the paper's map are conserved, the axial momentum is not."""
-    names = [each.name for each in registry.scene(SCENE).invariants]
+    names = [invariant.name for invariant in registry.scene(SCENE).invariants]
     assert names == ["energy", "vertical momentum", "axial momentum"]
     columns = [next(i for i, head in enumerate(shown[which].header) if head.endswith(name)) for name in names]
     (row,) = [row for row in texts(shown[which]) if row[0] == "reduced"]

@@ -57,7 +57,7 @@ def said(request, tmp_path_factory):
     off = angle_between(motion(replace(case, t_end=float(run.t[-1])), run.t)[0], run.R_WB)
     plan = plan_report([str(path)], [method], quick=True)
     planned = tuple(each for each in plan.studies if each.name in ("motion", "paper"))
-    found = Measurements.of(each for study in planned for each in studies.findings(study))
+    found = Measurements.of(finding for study in planned for finding in studies.findings(study))
     return path, scene, run, float(off.max()), Measured(replace(plan, studies=planned), found, provenance([]))
 
 
@@ -74,14 +74,14 @@ def shown(text, error):
 
 def test_the_first_screen(said):
     _, scene, run, error, measured = said
-    (found,) = [each for each in tumbling.results(measured) if each.dt == DT and each.method == run_name(measured, run)]
+    (found,) = [result for result in tumbling.results(measured) if result.dt == DT and result.method == run_name(measured, run)]
     assert close(found.error, error)
     section = tumbling.section(measured, [found])
     (drawing,) = [block for block in walk(section.blocks) if isinstance(block, Motion)]
     _, panels = make_panels(drawing.trajectories, drawing.labels, drawing.truth, drawing.values)
     assert panels[1].sizes[ERROR][-1] == found.error  # the page shows one digit
     drifts = {name: float(values[-1]) for name, values in panels[1].sizes.items() if name != ERROR}
-    expected = {f"{each.name} drift": np.abs(run.drift(each)) for each in scene.invariants}
+    expected = {f"{invariant.name} drift": np.abs(run.drift(invariant)) for invariant in scene.invariants}
     for name, drift in drifts.items():
         size = np.linalg.norm(run.drift(name.removesuffix(" drift")), axis=-1) if expected[name].ndim > 1 else expected[name]
         assert drift == pytest.approx(size.max(), rel=1e-6, abs=1e-15)
@@ -95,7 +95,7 @@ def test_the_first_screen(said):
 
 
 def run_name(measured, run):
-    return next(each.name for each in measured.plan.methods if each.label == run.label)
+    return next(method.name for method in measured.plan.methods if method.label == run.label)
 
 
 def test_tables_of_the_scene_and_of_the_terminal(said):
@@ -118,7 +118,7 @@ def test_run_watch_and_notebook(said, tmp_path, monkeypatch):
     (summary,), _ = run_methods(str(path), [name], DT, None, True, lambda *_: None)
     assert close(summary["error"]["attitude"], error)
     for name_of_drift, drift in summary["drift"].items():
-        (here,) = [each.drifts for each in tumbling.results(measured) if each.dt == DT and each.method == name]
+        (here,) = [result.drifts for result in tumbling.results(measured) if result.dt == DT and result.method == name]
         assert np.isnan(drift) or drift == pytest.approx(here[name_of_drift], rel=1e-6, abs=1e-15)
     drawn = []
     monkeypatch.setattr(animation.Animation, "render", lambda self, *_: drawn.append(self) or b"page")

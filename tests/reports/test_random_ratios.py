@@ -47,7 +47,7 @@ def flat(time, least=1e-13):
 
 
 def found(*lines):
-    return ratios(frame([each for rows in lines for each in rows]))
+    return ratios(frame([row for rows in lines for row in rows]))
 
 
 def against(ratios_found, engine=ANY, error=1e-6):
@@ -115,7 +115,7 @@ def test_every_decade_and_every_field_has_its_row():
     other = [line(0, name, role, flat(1.0), field="gravity") for name, role in (("gauss", "ours"), ("heyoka", "engine"))]
     every = found(*TWICE, *other)
     rows = texts(random_bodies.as_table(every))
-    assert [each[:2] for each in rows] == [[field, tolerance(e)] for field in (FIELD, "gravity") for e in DECADES]
+    assert [row[:2] for row in rows] == [[field, tolerance(e)] for field in (FIELD, "gravity") for e in DECADES]
 
 
 def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
@@ -180,7 +180,7 @@ def test_a_ratio_has_an_interval_over_processes_and_is_open_around_1():
 def test_each_engine_has_a_row():
     table = random_bodies.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
     assert table.header == ["field", "engine", "1e-3", "1e-6", "1e-9", "1e-12"]
-    assert [[each[1], each[2].split(" ")[0], each[5]] for each in texts(table)] == [
+    assert [[text[1], text[2].split(" ")[0], text[5]] for text in texts(table)] == [
         ["heyoka", "1.00", "1.00 (0.500 to 2.00)"],
         ["scipy", "30.0", "–, 0 of 1 bodies"],
     ]

@@ -61,7 +61,7 @@ def made(name, named, folder, names=("motion",)):
     """The document of some studies of a scene, drawn into a folder; pictures in files are left out, because they are slow."""
     plan = plan_report([name], named, quick=True, time_limit=0.01)
     plan = replace(plan, studies=tuple(each for each in plan.studies if each.name in names))
-    found = Measurements.of(each for study in plan.studies for each in studies.findings(study))
+    found = Measurements.of(finding for study in plan.studies for finding in studies.findings(study))
     document = build(plan, found, provenance([]))
     return report.render(document, folder, png=False), plan.scenes[0]
 
@@ -75,7 +75,7 @@ def check(document, scene, folder):
     assert failed_parts(document.blocks) == []
     drawings = [block for block in walk(document.blocks) if isinstance(block, Motion)]
     assert len(drawings) == 1
-    assert all(each.t[-1] >= scene.t_end * (1 - 1e-9) for each in drawings[0].trajectories)
+    assert all(trajectory.t[-1] >= scene.t_end * (1 - 1e-9) for trajectory in drawings[0].trajectories)
     assert (folder / "index.html").stat().st_size > 1e5
 
 

@@ -37,7 +37,7 @@ def conservative(*arguments):
 @pytest.fixture
 def made_up(monkeypatch):
     """Measure nothing: two bodies of a field, on one of which ours is slower."""
-    table = measurement.frame([each for lines in (*TWICE, *SLOWER) for each in lines])
+    table = measurement.frame([line for lines in (*TWICE, *SLOWER) for line in lines])
     monkeypatch.setattr(single_study, "measure_study", lambda study, progress, scheduler: Measurements(table, pd.DataFrame()))
     return table
 
@@ -168,7 +168,7 @@ def test_a_study_that_is_not_timed_has_no_times(name):
     planned = plan_study(name, () if studies.STUDIES[name].scenes else ("brick_flip",), ("reduced:order=4",), quick=True)
     found = studies.findings(replace(planned, scenes=planned.scenes[:1]))
     measures = {each.measure for each in found if isinstance(each, Measurement)}
-    assert not {each for each in measures if each.unit in ("s", "s/s") or each is Measure.BODY_STEPS}
+    assert not {measure for measure in measures if measure.unit in ("s", "s/s") or measure is Measure.BODY_STEPS}
 
 
 @pytest.mark.parametrize(("name", "words"), [("speed", "got one for the study 'speed'"), ("long_runs", "got 'nowhere'")])

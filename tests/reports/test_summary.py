@@ -117,7 +117,7 @@ def test_the_first_eight_families_are_of_both_sides():
 
 
 def random(*lines):
-    table = with_names(measurement.frame([each for rows in lines for each in rows]))
+    table = with_names(measurement.frame([row for rows in lines for row in rows]))
     return random_bodies.summary(table, random_bodies.ratios(table))
 
 
@@ -176,7 +176,9 @@ def test_an_advised_method_is_not_said_to_take_a_scene_that_it_refuses():
     brick = registry.scene("brick_flip")
     loaded = brick.rename("thruster", torque=Torque((0, 0, 1)))
     for scenes, refused in (((brick,), False), ((brick, loaded), True)):
-        plan = SimpleNamespace(scenes=scenes, methods=(Taylor(), Gauss()), arguments={each.name: each.name for each in scenes})
+        plan = SimpleNamespace(
+            scenes=scenes, methods=(Taylor(), Gauss()), arguments={scene.name: scene.name for scene in scenes}
+        )
         lead = advice.section(SimpleNamespace(plan=plan, points=points(frame(lines)), ratios=())).blocks[0].text
         assert "`taylor`" in lead
         assert ("thruster" in lead) is refused

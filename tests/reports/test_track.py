@@ -139,7 +139,7 @@ def test_a_file_of_somebody_else_is_not_replaced_and_its_own_are_recognized(tmp_
         done = CliRunner().invoke(main, arguments)
         assert (done.exit_code, "--force" in done.stderr, mine.read_text()) == (2, True, "mine")
         command = main.commands["track"]
-        kind = next(each.type for each in command.params if option in each.opts)
+        kind = next(param.type for param in command.params if option in param.opts)
         assert kind.marks[name if option == "--out" else ""] in text[:HEAD]
         mine.unlink()
 

@@ -35,8 +35,8 @@ def test_methods_of_a_report_are_verified_and_a_missing_one_is_not_tested():
     missing = Missing("exudyn", error=MissingEngine("exudyn", "exudyn"))
     methods = (registry.method("reduced"), missing)
     right, absent = verify_methods(methods, lambda share, what: None, checks=["repeatability"])
-    assert {each.verdict for each in right.findings} == {Verdict.RIGHT}
-    assert [each.verdict for each in absent.findings] == [Verdict.NOT_TESTED]
+    assert {finding.verdict for finding in right.findings} == {Verdict.RIGHT}
+    assert [finding.verdict for finding in absent.findings] == [Verdict.NOT_TESTED]
     assert "exudyn" in absent.findings[0].detail
 
 

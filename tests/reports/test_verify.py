@@ -48,8 +48,8 @@ def invoke(*words):
 def verify(monkeypatch):
     """Return the command with subjects `a` to `d`, which have the findings above."""
     module = sys.modules[cv.verification.verify.__module__]
-    monkeypatch.setattr(module, "expand", lambda texts: [module.Subject(each, module.Kind.PROGRAM) for each in texts])
-    monkeypatch.setattr(module, "verify", lambda subjects, **_: [MADE[each] for each in subjects])
+    monkeypatch.setattr(module, "expand", lambda texts: [module.Subject(text, module.Kind.PROGRAM) for text in texts])
+    monkeypatch.setattr(module, "verify", lambda subjects, **_: [MADE[subject] for subject in subjects])
     return lambda *words: invoke("verify", *words)
 
 
@@ -68,8 +68,8 @@ def verify(monkeypatch):
 def test_the_verdict_is_the_first_line_and_the_exit_code(subjects, code, first, verify):
     done = verify(*subjects)
     assert (done.exit_code, done.stdout.splitlines()[0]) == (code, first)
-    sentences = [f"{MADE[each].sentence}." for each in subjects]
-    assert all(each in done.stdout for each in sentences)
+    sentences = [f"{MADE[subject].sentence}." for subject in subjects]
+    assert all(sentence in done.stdout for sentence in sentences)
     assert json.loads(verify(*subjects, "--json").stdout)["verdict"] == ("wrong" if code == 1 else MADE[subjects[-1]].verdict)
 
 
@@ -89,7 +89,7 @@ def test_all_formats_have_the_same_findings(verify, tmp_path):
     assert done.exit_code == 1
     subjects = json.loads(done.stdout)["subjects"]
     expected = [(each.subject, each.check, each.case, str(each.verdict)) for name in "ab" for each in MADE[name].findings]
-    found = [finding for each in subjects for finding in each["findings"]]
+    found = [finding for subject in subjects for finding in subject["findings"]]
     assert [(each["subject"], each["check"], each["case"], each["verdict"]) for each in found] == expected
     assert subjects[1]["findings"][0]["causes"][0]["numbers"] == {"share": 1.0}
     rows = list(csv.reader(io.StringIO((tmp_path / "v.csv").read_text())))
@@ -160,7 +160,7 @@ WHERE["study twins"] = WHERE["study motions"]
 
 
 def test_no_option_of_an_earlier_command_is_lost_without_a_reason():
-    options = {each.name for each in main.commands["verify"].params}
+    options = {param.name for param in main.commands["verify"].params}
     assert set(WHERE) == {name for name, new in OLD_NAMES.items() if new.startswith("verify")}
     assert {place for places in WHERE.values() for place in places.values()} - {""} <= options
     removed = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").partition("### Removed")[2].partition("\n## ")[0]

@@ -112,7 +112,7 @@ def test_our_own_samples_of_a_top_are_right_and_an_unnamed_order_is_found(tmp_pa
     done = CliRunner().invoke(main, ["verify", str(tmp_path / "run.csv"), "--body", "lagrange_top", "--json"])
     assert done.exit_code == 0
     quantities = json.loads(done.stdout)["subjects"][0]["details"]["quantities"]
-    assert [each["name"] for each in quantities][:3] == ["attitude error, rad", "rate error, rad/s", "drift of energy"]
+    assert [quantity["name"] for quantity in quantities][:3] == ["attitude error, rad", "rate error, rad/s", "drift of energy"]
     table = pd.read_csv(tmp_path / "run.csv")
     R = table[[f"R_WB_{i}{j}" for i in "123" for j in "123"]].to_numpy().reshape(-1, 3, 3)
     q = cv.attitude.to_quaternion(R)[:, [1, 2, 3, 0]]

@@ -27,7 +27,7 @@ GIVEN = {"spread": "attitude=5deg", "body": "brick_flip", "out": "somewhere"}
 """Values of options that are required."""
 LISTS = {"methods": ("gauss:stages=2,tol=1e-9", "mujoco:RK4"), "engines": ("mujoco", "exudyn@1.9"), "scenes": ("a:b=1", "c")}
 VALUES = {"t_end": "3.5", "dt": "0.25", "error": "1e-4", "out": "place", "picture": "picture.svg"} | LISTS
-OPTIONS = [(name, each) for name, command in COMMANDS.items() for each in command.params if isinstance(each, click.Option)]
+OPTIONS = [(name, param) for name, command in COMMANDS.items() for param in command.params if isinstance(param, click.Option)]
 CELLS = [(name, option) for name, option in OPTIONS if option.name in VOCABULARY]
 cells = pytest.mark.parametrize(("name", "option"), CELLS, ids=[f"{name} {option.opts[0]}" for name, option in CELLS])
 
@@ -35,7 +35,7 @@ cells = pytest.mark.parametrize(("name", "option"), CELLS, ids=[f"{name} {option
 def parse(name, *arguments):
     """Return the parameters of a command from its arguments, with those that are required, and what it writes to stderr."""
     command = COMMANDS[name]
-    required = [each for each in command.params if each.required and not {*each.opts} & {*arguments}]
+    required = [param for param in command.params if param.required and not {*param.opts} & {*arguments}]
     options = [text for each in required if isinstance(each, click.Option) for text in (each.opts[0], GIVEN[each.name])]
     words = ["somewhere" for each in required if isinstance(each, click.Argument)]
     said = StringIO()
@@ -75,7 +75,7 @@ def test_every_name_means_the_same_and_old_ones_say_so(name, option):
             assert bool(said) is (word in old)
 
 
-@pytest.mark.parametrize(("name", "option"), [each for each in CELLS if each[1].name in LISTS])
+@pytest.mark.parametrize(("name", "option"), [cell for cell in CELLS if cell[1].name in LISTS])
 def test_a_list_and_a_repeated_option_are_the_same(name, option):
     values, word = LISTS[option.name], option.opts[0]
     together, apart = (

@@ -145,7 +145,7 @@ def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
 
 def test_the_verdict_has_a_row_for_each_motion_and_class_and_names_the_faster_engine():
     scene = SimpleNamespace(name="made_up", t_end=1.0)
-    random = random_bodies.ratios(frame([each for rows in (*TWICE, *SLOWER) for each in rows]))
+    random = random_bodies.ratios(frame([row for rows in (*TWICE, *SLOWER) for row in rows]))
     measured = SimpleNamespace(
         plan=SimpleNamespace(scenes=[scene]), ratios=random, points=points(TABLE), every_step={"made_up": FOUND}
     )

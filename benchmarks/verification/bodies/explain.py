@@ -26,14 +26,14 @@ def find_causes(links: list[Link], seen: Piece, tolerance: float) -> tuple[Cause
     """
     wanted = join_links(links)
     for count in (1, 2):
-        found = [
+        explanations = [
             cause
             for mistakes in combinations(LOADED, count)
             if (cause := _try(links, mistakes, seen, tolerance)) and cause.left < tolerance
         ]
-        if found:
-            allowed = max(EQUAL * min(each.left for each in found), ROUND_OFF)
-            return tuple(each for each in found if each.left <= allowed)
+        if explanations:
+            allowed = max(EQUAL * min(explanation.left for explanation in explanations), ROUND_OFF)
+            return tuple(explanation for explanation in explanations if explanation.left <= allowed)
     for mistake in FITTED:
         numbers, part = mistake.fit(wanted, seen)
         cause = _compare((mistake.key,), mistake.sentence.format(**numbers), wanted, part, seen)
@@ -50,8 +50,8 @@ def _try(links: list[Link], mistakes: tuple[BodyMistake, ...], seen: Piece, tole
     wanted, part = join_links(links), join_links(changed)
     if not part.mass or distance(wanted, part) <= tolerance:
         return None
-    sentences = ". ".join(each.sentence for each in mistakes)
-    return _compare(tuple(each.key for each in mistakes), sentences, wanted, part, seen)
+    sentences = ". ".join(mistake.sentence for mistake in mistakes)
+    return _compare(tuple(mistake.key for mistake in mistakes), sentences, wanted, part, seen)
 
 
 def _compare(keys: tuple[str, ...], sentence: str, wanted: Piece, part: Piece, seen: Piece) -> Cause:

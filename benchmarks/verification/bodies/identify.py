@@ -43,9 +43,9 @@ def identify(cases: Array, measured: Array, near: Piece) -> Piece:
     rows, right = [], []
     size = np.sqrt(abs(np.trace(near.inertia) / near.mass)) or 1.0
     units = near.mass, near.mass * size, near.mass * size**2
-    for (_, w, force, torque), given in zip(np.reshape(cases, (-1, 4, 3)), measured, strict=True):
-        turn, P = given[3:], near.com
-        a = given[:3] + np.cross(turn, P) + np.cross(w, np.cross(w, P))
+    for (_, w, force, torque), acceleration in zip(np.reshape(cases, (-1, 4, 3)), measured, strict=True):
+        turn, P = acceleration[3:], near.com
+        a = acceleration[:3] + np.cross(turn, P) + np.cross(w, np.cross(w, P))
         W = hat(w)
         A = np.zeros((6, 13))
         A[:3, 0], A[:3, 1:4] = a * units[0] / units[1], hat(turn) + W @ W

@@ -135,28 +135,28 @@ def verify_files(
         for program in programs:
             stack.callback(program.worker.close)
         if any(model.kind == "sdf" for model in models) and "drake" in installed:
-            reader = next((each for each in programs if each.engine == "drake"), None) or Program("drake")
+            reader = next((program for program in programs if program.engine == "drake"), None) or Program("drake")
             stack.callback(reader.worker.close)
             for model in models:
                 if model.kind == "sdf" and model.own:
                     model.reader = f"libsdformat in {reader.label}"
                     model.reference, model.reference_refuses = reader.read(model)
-        found: dict[str, list[tuple[Finding, LoadedBody]]] = {model.label: [] for model in models}
+        loaded: dict[str, list[tuple[Finding, LoadedBody]]] = {model.label: [] for model in models}
         for number, program in enumerate(programs):
             for done, model in enumerate(models):
                 tell((number + done / len(models)) / len(programs), f"{program.label}: {model.label}")
-                found[model.label].append(program.check(model))
-    return [_join(file, list(same), found) for file, same in groupby(models, key=lambda model: model.file)]
+                loaded[model.label].append(program.check(model))
+    return [_join(file, list(same), loaded) for file, same in groupby(models, key=lambda model: model.file)]
 
 
-def _join(file: str, models: list[Model], found: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
+def _join(file: str, models: list[Model], loaded: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
     """Return the verification of a file from those of its bodies."""
-    pairs = [pair for model in models for pair in found[model.label]]
+    pairs = [pair for model in models for pair in loaded[model.label]]
     notes = [note if len(models) == 1 else f"{model.body.name}: {note}" for model in models for note in model.notes]
     findings = [finding for finding, _ in pairs]
-    tested = [each for each in findings if each.verdict is not Verdict.NOT_TESTED]
-    right = sum(each.verdict is Verdict.RIGHT for each in tested)
-    wrong = dict.fromkeys(each.subject for each in tested if each.verdict is Verdict.WRONG)
+    tested = [finding for finding in findings if finding.verdict is not Verdict.NOT_TESTED]
+    right = sum(finding.verdict is Verdict.RIGHT for finding in tested)
+    wrong = dict.fromkeys(finding.subject for finding in tested if finding.verdict is Verdict.WRONG)
     reason = f"{right} of {len(tested)} answers of engines are right" if tested else "no engine loads files of this format"
     reason += f"; wrong in {', '.join(wrong)}" * bool(wrong)
     details = tuple(body for _, body in pairs)
@@ -181,7 +181,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     far = errors(wanted, body) if body else dict.fromkeys(QUANTITIES, np.inf)
     if wanted.excess and not flaw:  # within the rounding of its moments
         far["inertia"] -= wanted.rounding / np.abs(wanted.inertia).max()
-    differs = [name for name, each in far.items() if not each < tolerance]
+    differs = [name for name, distance in far.items() if not distance < tolerance]
     error = max(0.0, *far.values())
     doubt = model.doubt(engine, differs) or (DIGITS if wanted.excess and prints and not flaw else "")
     has = seen.value if isinstance(seen, NoBody) else f"it has {describe(seen)}"
@@ -196,7 +196,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
     if flaw:
         impossible = body and body.flaw
         text = f"{flaw}, and it changes the body; {changes}" if body and not impossible else f"{flaw}; {has}"
-        if prints and not (differs and impossible):
+        if prints and not (differs and impossible):  # a warning is enough, unless another impossible body follows it
             return Opinion(Verdict.RIGHT, f"{text}{printed}")
         warning = "" if prints else " without a warning"
         return Opinion(Verdict.WRONG, f"it accepts an impossible body{warning}: {text}{printed}")
@@ -282,6 +282,10 @@ class Program:
         return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen)
 
     def _verify(self, model: Model) -> tuple[Loaded, Opinion]:
+        """Return the answer of the engine and the verdict. After a wrong one, a copy that has nothing but the mass is tried.
+
+        What the engine does not accept may be a visual, a sensor or a floor of the file, which say nothing about its loader.
+        """
         loaded = self._measure(model)
         opinion = self._decide(model, loaded)
         if opinion.verdict is Verdict.WRONG and model.body.bare and loaded.answer is not Answer.CRASHED:
@@ -292,8 +296,9 @@ class Program:
                     return again
                 copy = "it loads a copy without visuals, sensors and all else beside the mass"
                 return loaded, Opinion(Verdict.UNDECIDED, f"{copy}, and refuses the file: {loaded.text}")
-            if isinstance(loaded.seen, NoBody):  # the file may have a floor that the body touches
+            if isinstance(loaded.seen, NoBody):  # the body may touch a floor of the file
                 return self._verify(bare)
+        # Rounding to single precision can hide a body with very different moments.
         if opinion.verdict is Verdict.WRONG and loaded.seen is NoBody.NOT_RIGID and self.single:
             return loaded, Opinion(Verdict.UNDECIDED, f"{opinion.detail}, in single precision")
         return loaded, opinion
@@ -333,7 +338,8 @@ class Program:
     def _identify(self, model: Model, cases: Array, measured: Array, near: Piece) -> Piece | None:
         """Return the body that explains the accelerations, or None if no body does.
 
-        Forces that suit the body of the file may be lost in the round-off of another one, so others are tried as well.
+        The forces suit the body of the file. In an engine with a very different body, their effect is lost in round-off. Then
+        the forces for a unit body are tried, and each result gives the forces for the next load.
         """
         unit = Piece(1.0, np.zeros(3), np.eye(3))
         for start in (near, unit):
@@ -357,7 +363,10 @@ class Program:
         return None
 
     def _load(self, model: Model, cases: Array) -> dict[str, Any]:
-        """Return the answer of `loaders.probe`, or that of a program to `load` in the same form. Raise as `Worker.ask`."""
+        """Return the answer of `loaders.probe`, or a program's answer to `load` in the same form. Raise as `Worker.ask`.
+
+        The folder of the file is removed from its texts: findings do not depend on where a file is.
+        """
         with time_limit(LIMIT):
             result = self._ask(str(model.path.resolve()), model.kind, cases)
         for name in ("refused", "output"):
@@ -369,11 +378,11 @@ class Program:
     def _ask(self, path: str, kind: str, cases: Array) -> dict[str, Any]:
         if self.formats and kind not in self.formats:
             raise NotImplementedError(f"no loader for {kind.upper()}")
-        given = {"adapter": self._adapter, "path": path, "kind": kind}
+        request = {"adapter": self._adapter, "path": path, "kind": kind}
         try:
             if not self.formats:
-                return self.worker.ask("call", **given, engine=self.engine, function="probe", cases=cases)
-            result = self.worker.ask("load", **given, velocities=cases[:, 0], forces=cases[:, 1])
+                return self.worker.ask("call", **request, engine=self.engine, function="probe", cases=cases)
+            result = self.worker.ask("load", **request, velocities=cases[:, 0], forces=cases[:, 1])
         except EngineError as error:  # also at the first step
             return {"refused": error.reason}
         try:

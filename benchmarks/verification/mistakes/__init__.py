@@ -43,6 +43,6 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 BY_KEY = table_of([
     *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES,
     *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *FITTED,
-    *(each for each in LOADED if each.key not in {other.key for other in SCENES}),
+    *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
 ])  # fmt: skip
-"""All mistakes by key. Dropped products of inertia are one mistake with two effects, on a scene and on the links of a file."""
+"""All mistakes by key. Dropped products of inertia are in `SCENES` and in `LOADED`: one mistake with an effect on each kind."""

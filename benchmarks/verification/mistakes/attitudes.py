@@ -31,8 +31,9 @@ class Rule(Mistake):
 def _linear(w: Array, h: Array) -> Array:
     """Return the matrices (n, 4, 4) of q + h/2 q w."""
     x, y, z = (w * h[:, None] / 2).T
-    one = np.ones_like(x)
-    return np.stack([np.stack(row, -1) for row in ((one, -x, -y, -z), (x, one, z, -y), (y, -z, one, x), (z, y, -x, one))], 1)
+    ones = np.ones_like(x)
+    rows = (ones, -x, -y, -z), (x, ones, z, -y), (y, -z, ones, x), (z, y, -x, ones)
+    return np.stack([np.stack(row, -1) for row in rows], 1)
 
 
 def _map(w: Array, h: Array) -> Array:

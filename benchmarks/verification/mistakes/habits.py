@@ -25,8 +25,8 @@ class Habit(Mistake):
     holds
         From rates and numbers to True where the body stands still from then on, its attitude included.
     guess
-        From rates (n, 3) of a recording and rates before the change to the numbers, () if no row shows it. The rates before are
-        those of exact motions that start in the row before, or of the whole exact motion.
+        From rates (n, 3) of a recording and rates before the change to the numbers, () if no row shows it. The rates before
+        come from exact motions that start in the row before, or from the whole exact motion.
     """
 
     kind: ClassVar[str] = "habits"

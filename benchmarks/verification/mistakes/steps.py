@@ -1,4 +1,4 @@
-"""Steps: the motion is the one of an integrator with a step that is too long."""
+"""Steps: an integrator makes the motion, with a step that is too long."""
 
 from __future__ import annotations
 
@@ -120,9 +120,10 @@ def _trapezoid(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> A
 
 def _adams(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], weights: Sequence[float]) -> Array:
     """Return the state of Adams and Bashforth's method; steps without enough history are of lower order."""
-    known = [y, *past][: len(weights)]
-    lower = {1: (1.0,), 2: (1.5, -0.5), 3: weights}[len(known)]
-    return y + h * sum((a * f(t - i * h, each) for i, (a, each) in enumerate(zip(lower, known, strict=True))), np.zeros_like(y))
+    states = [y, *past][: len(weights)]
+    lower = {1: (1.0,), 2: (1.5, -0.5), 3: weights}[len(states)]
+    slopes = (f(t - i * h, state) for i, state in enumerate(states))
+    return y + h * sum((a * slope for a, slope in zip(lower, slopes, strict=True)), np.zeros_like(y))
 
 
 def _leapfrog(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:

@@ -1,4 +1,4 @@
-"""Times: right states at other times than those of the rows."""
+"""Times: right states at times that are not the times of the rows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .mistake import Mistake, Number
 
 @dataclass(frozen=True)
 class Time(Mistake):
-    """Other times: `at` returns those of attitudes and those of rates.
+    """Other times: `at` returns the times of attitudes and the times of rates.
 
     They are functions of times after the start (n,), of the step of the program, and of the numbers, all s.
 

@@ -15,7 +15,7 @@ from conservative.files import make_folder, write_text
 
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
 from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
-from .signatures import Found, signatures
+from .signatures import Samples, signatures
 
 FACTOR = 2.0
 """Smallest error of a mistake that is listed, over the tolerance of order 2 at the smallest step."""
@@ -23,7 +23,7 @@ ROUND_OFF = 1e-11
 """Errors that depend on the machine."""
 
 
-def describe(motion: Motion, measured: Measured, found: dict[str, Found]) -> dict[str, Any]:
+def describe(motion: Motion, measured: Measured, signature: dict[str, Samples]) -> dict[str, Any]:
     """Return a motion as the keys and values of its JSON file; README.md of references/motions explains them."""
     exact = motion.exact
     parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
@@ -45,18 +45,18 @@ def describe(motion: Motion, measured: Measured, found: dict[str, Found]) -> dic
             for at, ((order, angle), values) in enumerate(measured.tolerances.items())
         ],
         "single": _short(single(motion)),
-        "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], found),
+        "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], signature),
     }
 
 
-def catches(motion: Motion, allowed: Array, found: dict[str, Found]) -> list[dict[str, Any]]:
+def catches(motion: Motion, allowed: Array, signature: dict[str, Samples]) -> list[dict[str, Any]]:
     """Return the mistakes that the tolerances of order 2 show, with their errors, first the one with the largest error."""
     (scale,) = sizes([motion])
-    made = {name: error(motion, scale, samples) for name, samples in found.items()}
-    made = {name: np.where(each < ROUND_OFF, 0.0, each) for name, each in made.items() if (each / allowed).max() >= FACTOR}
+    made = {name: error(motion, scale, samples) for name, samples in signature.items()}
+    made = {name: np.where(size < ROUND_OFF, 0.0, size) for name, size in made.items() if (size / allowed).max() >= FACTOR}
     return [
-        {"mistake": name, **_named(each)}
-        for name, each in sorted(made.items(), key=lambda item: -float(f"{item[1].max():.1e}"))
+        {"mistake": name, **_named(sizes)}
+        for name, sizes in sorted(made.items(), key=lambda item: -float(f"{item[1].max():.1e}"))
     ]
 
 
@@ -75,7 +75,7 @@ def as_csv(keys: dict[str, Any]) -> str:
         if key == "t":
             lines += [_line("sample", t, [keys[name][i] for name in SAMPLE]) for i, t in enumerate(value)]
         elif key in ("tolerance", "catches"):
-            lines += [_line(key, each) for each in value]
+            lines += [_line(key, row) for row in value]
         elif key not in SAMPLE:
             lines.append(_line(key, value))
     return "\n".join([*lines, ""])
@@ -103,8 +103,8 @@ def as_json(keys: dict[str, Any]) -> str:
 def contents() -> Iterator[tuple[str, str]]:
     """Yield the names and texts of the files of all motions."""
     motions = load()
-    for motion, measured, found in zip(motions, measure(motions), signatures(motions), strict=True):
-        keys = describe(motion, measured, found)
+    for motion, measured, signature in zip(motions, measure(motions), signatures(motions), strict=True):
+        keys = describe(motion, measured, signature)
         yield f"{motion.name}.json", as_json(keys)
         yield f"{motion.name}.csv", as_csv(keys)
 
@@ -121,7 +121,7 @@ def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[
     Order 3 and a program that chooses its steps (None) have the tolerances of order 2.
     """
     kept = read(motion.name)
-    (row,) = (each for each in kept["tolerance"] if (each["order"], each["angle"]) == (tested_order(order), ANGLES[-1]))
+    (row,) = (row for row in kept["tolerance"] if (row["order"], row["angle"]) == (tested_order(order), ANGLES[-1]))
     more = kept["single"] if single else 0.0
     return row["attitude"] + more, row["rates"] + more
 

@@ -108,7 +108,7 @@ class Bodies:
         return matrix(y[:4]) if self.n == 4 else y[:9].reshape(3, 3, -1)
 
     def momentum(self, w: Array) -> Array:
-        """Return the momentum in body axes, with that of the rotor."""
+        """Return the momentum in body axes, with the rotor's momentum."""
         return apply(self.J, w) + self.rotor
 
     def of_momentum(self, R: Array, M: Array) -> Array:
@@ -358,8 +358,8 @@ class Design:
     @property
     def name(self) -> str:
         """The design in words."""
-        words = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
-        return ", ".join([*words, *["single"] * self.single])
+        parts = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
+        return ", ".join([*parts, *["single"] * self.single])
 
     def run(
         self, motions: Sequence[Motion], parts: int, after: Callable[[Array], Array] | None = None

@@ -158,8 +158,8 @@ def _advance(motion: Motion, inverse: Any, t: Any, state: list[Any], h: Any) -> 
 
 
 def _append(series: Any, new: Any, more: Any = None) -> None:
-    for i, each in enumerate(series):
-        each.append(new[i] + more[i] if more else new[i])
+    for i, coefficients in enumerate(series):
+        coefficients.append(new[i] + more[i] if more else new[i])
 
 
 def _solve(motion: Motion) -> dict[str, Array]:

@@ -46,7 +46,7 @@ def measure(motions: Sequence[Motion], parts: Sequence[int] = PARTS) -> list[Mea
             largest = np.max([*runs, *(_errors_of(name, motions, scales, n) for name in OURS[order])], axis=0)
             margin = MARGIN * np.where(held & (order == 1), HELD, 1.0)[:, None]
             tolerances[order, ANGLES[PARTS.index(n)]] = _round_up(margin * largest + LEAST[order])
-    return [Measured(scales[i], {key: each[i] for key, each in tolerances.items()}) for i in range(len(motions))]
+    return [Measured(scales[i], {key: tolerance[i] for key, tolerance in tolerances.items()}) for i in range(len(motions))]
 
 
 def single(motion: Motion) -> float:
@@ -62,7 +62,7 @@ def single(motion: Motion) -> float:
 def _round_up(x: Array) -> Array:
     """Return numbers rounded up to two digits."""
     size = 10.0 ** (np.floor(np.log10(x)) - 1)
-    return np.array([float(f"{each:.1e}") for each in (np.ceil(x / size) * size).ravel()]).reshape(x.shape)
+    return np.array([float(f"{number:.1e}") for number in (np.ceil(x / size) * size).ravel()]).reshape(x.shape)
 
 
 def sizes(motions: Sequence[Motion]) -> Array:
@@ -73,15 +73,15 @@ def sizes(motions: Sequence[Motion]) -> Array:
     ])  # fmt: skip
 
 
-def errors(motions: Sequence[Motion], scales: Array, found: Any) -> Array:
+def errors(motions: Sequence[Motion], scales: Array, samples: Any) -> Array:
     """Return the largest errors (n, 4) of the attitudes and rates of motions."""
-    return np.array([error(*each) for each in zip(motions, scales, found, strict=True)])
+    return np.array([error(*arguments) for arguments in zip(motions, scales, samples, strict=True)])
 
 
-def error(motion: Motion, scale: Array, found: tuple[Array, Array]) -> Array:
+def error(motion: Motion, scale: Array, samples: tuple[Array, Array]) -> Array:
     """Return the largest errors (4,) of the attitudes and rates at the samples of a motion."""
-    body, exact = motion.scene.body, {name: each[1:] for name, each in motion.exact.items()}
-    return compare(body.inertia, body.rotor_momentum, motion.arm, exact, scale, *found)
+    body, exact = motion.scene.body, {name: values[1:] for name, values in motion.exact.items()}
+    return compare(body.inertia, body.rotor_momentum, motion.arm, exact, scale, *samples)
 
 
 def _errors_of(name: str, motions: Sequence[Motion], scales: Array, parts: int) -> Array:
@@ -90,8 +90,8 @@ def _errors_of(name: str, motions: Sequence[Motion], scales: Array, parts: int) 
     for i, motion in enumerate(motions):
         every = motion.steps * parts
         with suppress(Unsupported):
-            found = method.solve(motion.scene, Grid(motion.step / parts, every * motion.samples, every))
-            out[i] = error(motion, scales[i], (found.R_WB[1:], found.w_WB_B[1:]))
+            trajectory = method.solve(motion.scene, Grid(motion.step / parts, every * motion.samples, every))
+            out[i] = error(motion, scales[i], (trajectory.R_WB[1:], trajectory.w_WB_B[1:]))
     return out
 
 
@@ -101,6 +101,6 @@ def compare(J: Any, rotor: Any, arm: Any, exact: Any, scale: Any, R: Any, w: Any
         L = w @ np.array(J)
         energy = (w * L).sum(axis=1) / 2 + R[:, 2] @ np.array(arm)
         momentum = (R @ (L if rotor is None else L + rotor)[..., None])[..., 0]
-        found = (w, exact["w_WB_B"]), (energy[:, None], np.array(exact["energy"])[:, None]), (momentum, exact["momentum_W"])
-        sizes = [np.linalg.norm(a - b, axis=1).max() / size for (a, b), size in zip(found, scale, strict=True)]
+        compared = (w, exact["w_WB_B"]), (energy[:, None], np.array(exact["energy"])[:, None]), (momentum, exact["momentum_W"])
+        sizes = [np.linalg.norm(a - b, axis=1).max() / size for (a, b), size in zip(compared, scale, strict=True)]
         return np.nan_to_num([angle_between(R, np.array(exact["R_WB"])).max(), *sizes], nan=1e6, posinf=1e6)

@@ -41,16 +41,16 @@ EXACT = Design(4, "RK4", "quaternion", "rates", True)
 BOTH = ("no gyroscopic term", "damping", 0.05)
 """Two mistakes that many engines have at once, as installed."""
 _BOTH = f"{BOTH[0]} + {BOTH[1]} {BOTH[2]:g}"
-Found = tuple[Array, Array]
+Samples = tuple[Array, Array]
 
 
 def names() -> dict[str, str]:
     """Return the sentences of mistakes by the names in the files: a key, and a number if the signature depends on it."""
-    found = {
+    sentences = {
         name: mistake.sentence.format(**{number.name: value for number, value in zip(mistake.numbers, numbers, strict=True)})
         for name, mistake, numbers in _all()
     }
-    return found | {_BOTH: f"{found[BOTH[0]]}. {found[f'{BOTH[1]} {BOTH[2]:g}']}"}
+    return sentences | {_BOTH: f"{sentences[BOTH[0]]}. {sentences[f'{BOTH[1]} {BOTH[2]:g}']}"}
 
 
 def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
@@ -64,17 +64,17 @@ def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
             yield f"{key} {value:g}", mistake, (value,)
 
 
-def signatures(motions: Sequence[Motion]) -> list[dict[str, Found]]:
+def signatures(motions: Sequence[Motion]) -> list[dict[str, Samples]]:
     """Return, for each motion, the attitudes and rates at the samples by the names of mistakes that change it."""
-    out: list[dict[str, Found]] = [{} for _ in motions]
+    out: list[dict[str, Samples]] = [{} for _ in motions]
     for name, mistake, numbers in _all():
         if isinstance(mistake, Habit):
-            for made, found in zip(out, EXACT.run(motions, PARTS[-1], _keep(mistake, numbers)), strict=True):
-                made[name] = found
+            for made, samples in zip(out, EXACT.run(motions, PARTS[-1], _keep(mistake, numbers)), strict=True):
+                made[name] = samples
             continue
         for motion, made in zip(motions, out, strict=True):
-            if (one := _with(motion, mistake, numbers)) is not None:
-                made[name] = one
+            if (changed := _with(motion, mistake, numbers)) is not None:
+                made[name] = changed
     for motion, made in zip(motions, out, strict=True):
         made[_BOTH] = _solve(Equations(motion.scene, gyroscopic=0.0, damping=BOTH[2]), motion.t)
     return out
@@ -84,7 +84,7 @@ def _keep(habit: Habit, numbers: Sequence[float]) -> Callable[[Array], Array]:
     return lambda w: habit.after(w.T, *numbers).T
 
 
-def _with(motion: Motion, mistake: Mistake, numbers: tuple[float, ...]) -> Found | None:
+def _with(motion: Motion, mistake: Mistake, numbers: tuple[float, ...]) -> Samples | None:
     """Return the samples of a motion with a mistake; None if it has no effect."""
     scene, t, exact = motion.scene, np.array(motion.t), (motion.exact["R_WB"][1:], motion.exact["w_WB_B"][1:])
     h = motion.step / PARTS[-1]
@@ -109,7 +109,7 @@ def _with(motion: Motion, mistake: Mistake, numbers: tuple[float, ...]) -> Found
     return None
 
 
-def _solve(equations: Equations, t: Any) -> Found:
+def _solve(equations: Equations, t: Any) -> Samples:
     scene = equations.scene
     R, w = equations.solve(0.0, scene.R_WB0[None], scene.w_WB_B0[None], np.array(t))
     return R[0], w[0]

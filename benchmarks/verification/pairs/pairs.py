@@ -140,7 +140,7 @@ class Pair:
     """
 
     name: str
-    second: Callable[..., Description] = lambda one: one
+    second: Callable[..., Description] = lambda d: d
     back: Callable[..., Samples] = lambda samples, *_: samples
     run: str = ""
     place: tuple[int, int] = (1, 1)
@@ -164,23 +164,23 @@ MIRROR = np.diag((1.0, -1.0, 1.0))
 OFFSET = np.array((0.3, -0.2, 0.5))
 
 
-def reframe(one: Description, R_FG: Array, shift: Array | float = 0.0) -> Description:
-    """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from that of F."""
-    turned: dict[str, Any] = {"com": R_FG.T @ (one.com - shift), "inertia": _symmetric(R_FG.T @ one.inertia @ R_FG)}
-    return replace(one, R0=one.R0 @ R_FG, w0=R_FG.T @ one.w0, **turned)
+def reframe(body: Description, R_FG: Array, shift: Array | float = 0.0) -> Description:
+    """Return the body in axes G, whose origin is `shift` (3,), m, axes F, away from the origin of F."""
+    turned: dict[str, Any] = {"com": R_FG.T @ (body.com - shift), "inertia": _symmetric(R_FG.T @ body.inertia @ R_FG)}
+    return replace(body, R0=body.R0 @ R_FG, w0=R_FG.T @ body.w0, **turned)
 
 
 def _symmetric(J: Array) -> Array:
     return (J + J.T) / 2
 
 
-def to_principal(one: Description) -> tuple[Description, Array]:
+def to_principal(body: Description) -> tuple[Description, Array]:
     """Return the description in axes G in which `joint_inertia` is diagonal, and the rotation (3, 3), G to F."""
-    J = one.joint_inertia
+    J = body.joint_inertia
     if np.abs(J - np.diag(np.diag(J))).max() <= 1e-12 * np.abs(J).max():  # the axes already are: measured up to 4e-16
-        return one, np.eye(3)
+        return body, np.eye(3)
     R_FG = RigidBody(J).R_BP
-    turned = reframe(one, R_FG)
+    turned = reframe(body, R_FG)
     round_off = np.abs(turned.com) < 1e-15 * np.linalg.norm(turned.com)
     return replace(turned, com=np.where(round_off, 0.0, turned.com)), R_FG
 
@@ -190,30 +190,30 @@ def frame_back(R_FG: Array) -> Callable[..., Samples]:
     return lambda samples, *_: (samples[0] @ R_FG.T, samples[1] @ R_FG.T)
 
 
-def _mirrored(one: Description) -> Description:
+def _mirrored(body: Description) -> Description:
     # Rates are axial vectors: a mirror turns them by -M.
-    mirrored: dict[str, Any] = {"inertia": MIRROR @ one.inertia @ MIRROR, "com": MIRROR @ one.com}
-    return replace(one, R0=MIRROR @ one.R0 @ MIRROR, w0=-MIRROR @ one.w0, **mirrored)
+    mirrored: dict[str, Any] = {"inertia": MIRROR @ body.inertia @ MIRROR, "com": MIRROR @ body.com}
+    return replace(body, R0=MIRROR @ body.R0 @ MIRROR, w0=-MIRROR @ body.w0, **mirrored)
 
 
-def _lengths(one: Description, scale: float) -> Description:
-    return replace(one, com=scale * one.com, inertia=scale**2 * one.inertia, gravity=scale * one.gravity)
+def _lengths(body: Description, scale: float) -> Description:
+    return replace(body, com=scale * body.com, inertia=scale**2 * body.inertia, gravity=scale * body.gravity)
 
 
-def _masses(one: Description, scale: float) -> Description:
-    return replace(one, mass=scale * one.mass, inertia=scale * one.inertia)
+def _masses(body: Description, scale: float) -> Description:
+    return replace(body, mass=scale * body.mass, inertia=scale * body.inertia)
 
 
-def _times(one: Description, scale: float) -> Description:
-    return replace(one, w0=one.w0 / scale, gravity=one.gravity / scale**2, dt=one.dt * scale)
+def _times(body: Description, scale: float) -> Description:
+    return replace(body, w0=body.w0 / scale, gravity=body.gravity / scale**2, dt=body.dt * scale)
 
 
 def _same_times(samples: Samples, scale: float) -> Samples:
     return samples[0], samples[1] * scale
 
 
-def _without_moment(one: Description) -> Description:
-    return replace(one, inertia=one.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(one.w0))), variant="zero")
+def _without_moment(body: Description) -> Description:
+    return replace(body, inertia=body.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(body.w0))), variant="zero")
 
 
 OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved")
@@ -229,17 +229,17 @@ PAIRS = (
     Pair("in a new process", run="process", exact=True),
     Pair("reset after another motion", run="reset", exact=True),
     Pair("saved and continued", run="continued"),
-    Pair("n calls of one step", lambda one: replace(one, every=1), run="thinned"),
+    Pair("n calls of one step", lambda d: replace(d, every=1), run="thinned"),
     Pair("body 3 of 7", run="beside", place=(3, 7)),
     Pair("body 40 of 64", run="beside", place=(40, 64)),
-    Pair("q and -q", lambda one: replace(one, sign=-one.sign), exact=True, variant="quaternion"),
+    Pair("q and -q", lambda d: replace(d, sign=-d.sign), exact=True, variant="quaternion"),
     Pair(
         "turned world",
-        lambda one: replace(one, R0=TURN @ one.R0),
+        lambda d: replace(d, R0=TURN @ d.R0),
         lambda samples, *_: (TURN.T @ samples[0], samples[1]),
         relation="The second attitude is the first one turned by 2.1 rad about the vertical; rates in the body are equal.",
     ),
-    Pair("permuted axes", lambda one: reframe(one, CYCLE), frame_back(CYCLE), relation="The axes 1, 2, 3 are now 3, 1, 2."),
+    Pair("permuted axes", lambda d: reframe(d, CYCLE), frame_back(CYCLE), relation="The axes 1, 2, 3 are now 3, 1, 2."),
     Pair(
         "mirrored",
         _mirrored,
@@ -254,18 +254,18 @@ PAIRS = (
     Pair("time x 10^k", _times, _same_times, scales=(1e-4, 1e4), quantity="time", relation=SCALED),
     Pair(
         "another body frame",
-        lambda one: replace(reframe(one, OTHER), variant="frame"),
+        lambda d: replace(reframe(d, OTHER), variant="frame"),
         frame_back(OTHER),
         variant="frame",
         bodies=(*FREE, "top"),
         relation="The body is the same in other axes, turned by 1.3 rad about (0.3, -0.5, 0.8).",
     ),
-    Pair("offset frame", lambda one: replace(reframe(one, np.eye(3), OFFSET), variant="offset"), variant="offset", bodies=FREE),
+    Pair("offset frame", lambda d: replace(reframe(d, np.eye(3), OFFSET), variant="offset"), variant="offset", bodies=FREE),
     Pair("moment of 0 about the axis of rotation", _without_moment, variant="zero", bodies=("rod about its axis",)),
     *(
         Pair(
             name,
-            lambda one, variant=variant: replace(one, variant=variant),
+            lambda d, variant=variant: replace(d, variant=variant),
             variant=variant,
             bodies=(*FREE, "top") if variant in OF_INERTIA else USUAL,
         )

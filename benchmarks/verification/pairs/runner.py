@@ -70,17 +70,17 @@ class Runner:
         """Return whether the engine has a variant of descriptions."""
         return variant in ("frame", "zero")
 
-    def unsupported(self, one: Description) -> str | None:
+    def unsupported(self, description: Description) -> str | None:
         """Return why a description is not supported; None if it is."""
         try:
-            return self.method.unsupported(one.scene)
+            return self.method.unsupported(description.scene)
         except BadInput as error:
             return str(error)
 
-    def model(self, one: Description) -> Callable[[], Samples]:
+    def model(self, description: Description) -> Callable[[], Samples]:
         """Return a function that runs a description from its start, each time."""
         try:
-            run = self.method.prepare(one.scene, one.grid)
+            run = self.method.prepare(description.scene, description.grid)
         except BadInput as error:
             raise NotAvailable(str(error)) from None
 
@@ -100,11 +100,11 @@ class Runner:
         ensemble = integrate_many(bodies[number].scene, R, w, inertia=inertia, **options)  # its field is the one that counts
         return ensemble[number].R_WB, ensemble[number].w_WB_B
 
-    def apart(self, one: Description) -> Samples:
+    def apart(self, description: Description) -> Samples:
         """Return the samples of a run in a new process."""
         worker, method = python_worker(show_output=False), self.method
         try:
-            return run_within(START_LIMIT, lambda: runner_of(method).model(one)(), process=worker)
+            return run_within(START_LIMIT, lambda: runner_of(method).model(description)(), process=worker)
         except EngineTimeout as error:
             raise NotAvailable(str(error)) from None
         finally:
@@ -165,9 +165,9 @@ class EngineRunner(Runner):
 
         return samples
 
-    def model(self, one: Description, worker: Worker | None = None) -> Callable[[], Samples]:
-        run = self._ask(one.numbers, (one.grid.n_samples,), worker or self._worker)
-        return lambda: tuple(each[0] for each in run())
+    def model(self, description: Description, worker: Worker | None = None) -> Callable[[], Samples]:
+        run = self._ask(description.numbers, (description.grid.n_samples,), worker or self._worker)
+        return lambda: tuple(samples[0] for samples in run())
 
     def many(self, bodies: Sequence[Description], number: int) -> Samples:
         if self.method not in self.method.settings_for("many"):
@@ -177,10 +177,10 @@ class EngineRunner(Runner):
         )()
         return R[number], w[number]
 
-    def apart(self, one: Description) -> Samples:
+    def apart(self, description: Description) -> Samples:
         worker = self._start()
         try:
-            return self.model(one, worker)()
+            return self.model(description, worker)()
         finally:
             worker.close()
 
@@ -233,13 +233,13 @@ def runner_of(method: Method) -> Runner:
     return EngineRunner(method) if isinstance(method, AdapterMethod) else Runner(method)
 
 
-def _others(one: Description, n: int) -> list[Description]:
+def _others(body: Description, n: int) -> list[Description]:
     """Return n bodies unlike the given one, with the same axes and steps."""
     factors = np.random.default_rng(7).uniform(0.8, 1.2, (n, 4))
-    return [replace(one, w0=one.w0 * f[:3], mass=one.mass * f[3], inertia=one.inertia * f[3]) for f in factors]
+    return [replace(body, w0=body.w0 * f[:3], mass=body.mass * f[3], inertia=body.inertia * f[3]) for f in factors]
 
 
-def run(runner: Runner, first: Description, one: Description, pair: Pair, model: Callable[[], Samples]) -> Samples:
+def run(runner: Runner, first: Description, second: Description, pair: Pair, model: Callable[[], Samples]) -> Samples:
     """Return the samples of a second description, run as a pair asks for it (`Pair.run`); `model` is the model of the first.
 
     Raise `NotAvailable` if the engine cannot.
@@ -247,29 +247,29 @@ def run(runner: Runner, first: Description, one: Description, pair: Pair, model:
     if pair.run == "again":
         return model()
     if pair.run == "process":
-        return runner.apart(one)
+        return runner.apart(second)
     if pair.run == "reset":
         with suppress(IntegrationFailed):
-            runner.model(_others(one, 1)[0])()
+            runner.model(_others(second, 1)[0])()
         return model()
     if pair.run == "thinned":
-        (R, w), kept = runner.model(one)(), first.grid.steps.astype(int)
+        (R, w), kept = runner.model(second)(), first.grid.steps.astype(int)
         return R[kept], w[kept]
     if pair.run == "continued":
-        steps = one.n_steps // 2
+        steps = second.n_steps // 2
         if not steps:
             raise NotAvailable("half a step")
-        R, w = runner.model(replace(one, n_steps=steps, every=steps))()
+        R, w = runner.model(replace(second, n_steps=steps, every=steps))()
         if not (np.isfinite(R).all() and np.isfinite(w).all()):
             return R, w
         # An engine may return attitudes that are not rotations to rounding; a request has a rotation.
         U, _, V = np.linalg.svd(R[-1])
-        rest = one.n_steps - steps
-        end = runner.model(replace(one, R0=U @ V, w0=w[-1], n_steps=rest, every=rest))()
+        rest = second.n_steps - steps
+        end = runner.model(replace(second, R0=U @ V, w0=w[-1], n_steps=rest, every=rest))()
         return np.stack([R[0], end[0][-1]]), np.stack([w[0], end[1][-1]])
     if pair.run == "beside":
         place, count = pair.place
-        bodies = _others(one, count)
-        bodies[place - 1] = one
+        bodies = _others(second, count)
+        bodies[place - 1] = second
         return runner.many(bodies, place - 1)
-    return runner.model(one)()
+    return runner.model(second)()

@@ -1,4 +1,8 @@
-"""The pair that differs as a short script in the engine's own language, which needs the engine only."""
+"""A pair that differs, as a short script in the engine's own language.
+
+The authors of an engine can run it without this package. It is a template of `scripts/`, filled with the numbers of both
+descriptions.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +23,14 @@ from .pairs import Description, Pair
 MARK = "conservative pairs: "
 """Text in the first line of every script, by which an earlier one is recognized."""
 SCRIPTS_OF_NODE = ("rapier_js", "jolt")
+"""Templates in JavaScript; the others are in Python."""
 FOLDER = Path(__file__).with_name("scripts")
 SAME = {"rapier_deterministic": "rapier_js"}
 """Engines that have the script of another one."""
 IN_THE_NUMBERS = ("", "quaternion", "frame", "zero")
-"""Variants that only change the numbers that a script has."""
+"""Variants that change numbers only, so that every template has them."""
 ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping"), "rapier_js": ("setter",)}
-"""Further variants of the scripts."""
+"""Further variants that a template has, by its name."""
 
 
 def script_of(method: Method, pair: Pair, first: Description, scale: float | None) -> str:
@@ -33,23 +38,26 @@ def script_of(method: Method, pair: Pair, first: Description, scale: float | Non
     family = read_name(method.family).base
     file = FOLDER / f"{SAME.get(family, family)}.txt"
     variants = IN_THE_NUMBERS + ALSO.get(file.stem, ())
+    # A template makes one run of each description, from its start.
     if not isinstance(method, AdapterMethod) or not file.is_file() or pair.run or pair.variant not in variants:
         return ""
+    # Only MuJoCo's template has weight and a fixed point. All switch off sleep and damping, which `as_installed` keeps.
     if (first.gravity and file.stem != "mujoco") or method.settings.get("as_installed"):
         return ""
     second = pair.second(first) if scale is None else pair.second(first, scale)
-    words: dict[str, Any] = {"n_steps": first.n_steps, "package": method.data.package}
-    for name, one in (("first", first), ("second", second)):
-        numbers = _numbers(one)
+    texts: dict[str, Any] = {"n_steps": first.n_steps, "package": method.data.package}
+    for name, description in (("first", first), ("second", second)):
+        numbers = _numbers(description)
         text = json.dumps(numbers) if file.stem in SCRIPTS_OF_NODE else repr(numbers)
-        words |= {name: text, f"{name}_q": numbers["q"], f"{name}_w": numbers["w"], f"{name}_dt": one.dt}
+        texts |= {name: text, f"{name}_q": numbers["q"], f"{name}_w": numbers["w"], f"{name}_dt": description.dt}
         if file.stem == "mujoco":
-            words[f"{name}_mjcf"] = _mjcf(method, one)
+            texts[f"{name}_mjcf"] = _mjcf(method, description)
+    # Newton's settings are names of its solvers; MuJoCo_rk4 is its solver MuJoCo with an option.
     solver, _, integrator = str(method.settings.get("solver", "")).partition("_")
     options = f', integrator="{integrator}", disable_contacts=True' if integrator else ", angular_damping=0.0"
-    words |= {"solver": solver, "options": options if integrator or solver in ("SemiImplicit", "Featherstone") else ""}
+    texts |= {"solver": solver, "options": options if integrator or solver in ("SemiImplicit", "Featherstone") else ""}
     title = f"{'//' if file.stem in SCRIPTS_OF_NODE else '#'} {MARK}{method.label}: {pair.name}. {pair.relation}\n"
-    return title + Template(file.read_text(encoding="utf-8")).substitute(words)
+    return title + Template(file.read_text(encoding="utf-8")).substitute(texts)
 
 
 def script_name(method: Method, pair: str) -> str:
@@ -58,16 +66,18 @@ def script_name(method: Method, pair: str) -> str:
     return re.sub(r"\W+", "_", f"{method.name} {pair}") + (".mjs" if SAME.get(family, family) in SCRIPTS_OF_NODE else ".py")
 
 
-def _numbers(one: Description) -> dict[str, Any]:
-    given = one.numbers
+def _numbers(description: Description) -> dict[str, Any]:
+    """Return the numbers of a description by their names in the templates, as plain lists."""
     names = {"mass": "mass", "com": "com", "moments": "moments_com", "axes": "q_com", "inertia": "inertia_com", "q": "q0"}
     names |= {"R": "R0", "w": "w0", "w_W": "w0_W", "dt": "dt"}
-    plain = {name: getattr(given[key], "tolist", lambda key=key: given[key])() for name, key in names.items()}
-    return plain | ({"description": one.variant} if one.variant else {})
+    numbers = description.numbers
+    values = {name: numbers[key] for name, key in names.items()}
+    plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
+    return plain | ({"description": description.variant} if description.variant else {})
 
 
-def _mjcf(method: AdapterMethod, one: Description) -> str:
-    option = f'<option gravity="0 0 {-one.gravity!r}" integrator="{method.settings["integrator"]}" timestep="{one.dt!r}"/>'
+def _mjcf(method: AdapterMethod, body: Description) -> str:
+    option = f'<option gravity="0 0 {-body.gravity!r}" integrator="{method.settings["integrator"]}" timestep="{body.dt!r}"/>'
     write: Any = shared.write_mjcf  # it runs in environments too, without types
-    lines = write(SimpleNamespace(**one.numbers), option).splitlines()
+    lines = write(SimpleNamespace(**body.numbers), option).splitlines()
     return "\n".join(line.strip() for line in lines if line.strip())

@@ -130,11 +130,11 @@ class PairFinding(Finding):
         return self.error / self.allowed if self.allowed else math.inf
 
 
-def difference(one: Samples, other: Samples) -> float:
+def difference(first: Samples, second: Samples) -> float:
     """Return the largest difference of two motions; of their ends, if only these are the same times."""
-    if len(one[0]) != len(other[0]):
-        one, other = ((R[[0, -1]], w[[0, -1]]) for R, w in (one, other))
-    return largest_difference(one, other)
+    if len(first[0]) != len(second[0]):
+        first, second = ((R[[0, -1]], w[[0, -1]]) for R, w in (first, second))
+    return largest_difference(first, second)
 
 
 class FirstFailed(Exception):
@@ -155,47 +155,48 @@ class Engine:
 
     def __init__(self, runner: Runner) -> None:
         self.runner = runner
-        self._known: dict[int, tuple[Description, FirstRun | FirstFailed]] = {}
+        self._runs: dict[int, tuple[Description, FirstRun | FirstFailed]] = {}
 
     def forget(self) -> None:
         """Forget all runs, before another body follows."""
-        self._known.clear()
+        self._runs.clear()
 
-    def first(self, one: Description) -> FirstRun:
+    def first(self, description: Description) -> FirstRun:
         """Return the run of a first description. Raise `FirstFailed`."""
-        if id(one) not in self._known:
-            for key in list(self._known)[1:]:  # the body's own, which came first, stays
-                del self._known[key]
-            self._known[id(one)] = one, self._run(one)
-        found = self._known[id(one)][1]
-        if isinstance(found, FirstFailed):
-            raise found
-        return found
+        if id(description) not in self._runs:
+            for key in list(self._runs)[1:]:  # the body's own, which came first, stays
+                del self._runs[key]
+            self._runs[id(description)] = description, self._run(description)
+        run = self._runs[id(description)][1]
+        if isinstance(run, FirstFailed):
+            raise run
+        return run
 
-    def _run(self, one: Description) -> FirstRun | FirstFailed:
+    def _run(self, description: Description) -> FirstRun | FirstFailed:
         try:
-            model = self.runner.model(one)
+            model = self.runner.model(description)
             samples = model()
         except NotAvailable as error:
             return FirstFailed(str(error))
         except IntegrationFailed as failure:
             return FirstFailed(getattr(failure, "reason", str(failure)))
-        return FirstRun(model, samples, self.rounding(one, samples))
+        return FirstRun(model, samples, self.rounding(description, samples))
 
-    def rounding(self, one: Description, samples: Samples) -> float:
+    def rounding(self, body: Description, samples: Samples) -> float:
         """Return the largest difference of a run from its samples that errors of rounding explain."""
         random, eps = np.random.default_rng(5), self.runner.precision
         largest = eps
         for _ in range(PERTURBED):
             axis, factor, rough = random.standard_normal(3), *random.choice((-1.0, 1.0), (2, 3, 3))
-            J = one.inertia * (1 + eps * (rough + rough.T) / 2)
-            if one.com.any() or np.count_nonzero(J) > 3:  # what an engine computes from it has errors of its largest part
-                J = J + eps * (one.mass * (one.com @ one.com) + np.abs(J).max()) * (rough + rough.T) / 2
-            moved = replace(one, R0=rotation_about(axis, eps) @ one.R0, w0=one.w0 * (1 + eps * factor[0]), inertia=J)
-            moved, R_FG = (moved, np.eye(3)) if one.variant == "frame" else to_principal(moved)
+            J = body.inertia * (1 + eps * (rough + rough.T) / 2)
+            if body.com.any() or np.count_nonzero(J) > 3:
+                # An engine moves such an inertia to the centre or to principal axes, with rounding of its largest part.
+                J = J + eps * (body.mass * (body.com @ body.com) + np.abs(J).max()) * (rough + rough.T) / 2
+            moved = replace(body, R0=rotation_about(axis, eps) @ body.R0, w0=body.w0 * (1 + eps * factor[0]), inertia=J)
+            moved, R_FG = (moved, np.eye(3)) if body.variant == "frame" else to_principal(moved)
             with suppress(NotAvailable, IntegrationFailed):
                 largest = max(largest, difference(samples, frame_back(R_FG)(self.runner.model(moved)())))
-        steps = math.sqrt(one.n_steps) if self.runner.adaptive else one.n_steps
+        steps = math.sqrt(body.n_steps) if self.runner.adaptive else body.n_steps
         return ROUNDING * largest * steps
 
 
@@ -222,33 +223,33 @@ GAIN = 0.5
 """Share of its energy that a motion may gain; otherwise the step is too long, and a lost second motion shows nothing."""
 
 
-def _kept(one: Description, samples: Samples) -> bool:
+def _kept(description: Description, samples: Samples) -> bool:
     with np.errstate(invalid="ignore"):
-        bounded = np.abs(samples[1]).max() < WILD * np.abs(one.w0).max()  # False for nan
+        bounded = np.abs(samples[1]).max() < WILD * np.abs(description.w0).max()  # False for nan
     return bool(bounded) and bool(np.isfinite(samples[0]).all())
 
 
-def _stable(one: Description, samples: Samples) -> bool:
+def _stable(description: Description, samples: Samples) -> bool:
     """Whether a motion that is kept gains little energy, so that the step is not too long for the scheme."""
     R, w = samples
-    kinetic = np.einsum("ni,ij,nj->n", w, one.joint_inertia, w) / 2
-    weight = one.mass * one.gravity
-    energy = kinetic + weight * (R @ one.com)[:, 2]
-    return bool(energy.max() - energy[0] <= GAIN * (kinetic[0] + weight * np.linalg.norm(one.com)))
+    kinetic = np.einsum("ni,ij,nj->n", w, description.joint_inertia, w) / 2
+    weight = description.mass * description.gravity
+    energy = kinetic + weight * (R @ description.com)[:, 2]
+    return bool(energy.max() - energy[0] <= GAIN * (kinetic[0] + weight * np.linalg.norm(description.com)))
 
 
 def _scaled(scale: float | None) -> tuple[float, ...]:
     return () if scale is None else (scale,)
 
 
-def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) -> Apart:
+def _apart(engine: Engine, pair: Pair, description: Description, scale: float | None) -> Apart:
     """Compare the motions of a pair. Raise `FirstFailed`, `NotAvailable`, or `EngineError` if the second one is refused."""
-    first = engine.first(one)
-    second = pair.second(one, *_scaled(scale))
+    first = engine.first(description)
+    second = pair.second(description, *_scaled(scale))
     samples, allowed = first.samples, first.allowed
-    lost = not _kept(one, samples) or not _stable(one, samples)
+    lost = not _kept(description, samples) or not _stable(description, samples)
     try:
-        raw = run(engine.runner, one, second, pair, first.model)
+        raw = run(engine.runner, description, second, pair, first.model)
     except EngineError:
         raise
     except IntegrationFailed as failure:
@@ -256,22 +257,22 @@ def _apart(engine: Engine, pair: Pair, one: Description, scale: float | None) ->
         return LOST if lost else Apart(math.inf, allowed, str(failure), scale, crashed)
     if pair.variant == "zero" and not lost and not np.isfinite(raw[1]).all():
         raise EngineError("numbers that are not finite")
-    if not _kept(one, samples) or not _kept(second, raw):
+    if not _kept(description, samples) or not _kept(second, raw):
         return LOST if lost else Apart(math.inf, allowed, "the second motion is lost", scale)
     apart = difference(samples, pair.back(raw, *_scaled(scale)))
     if pair.same_bits:
         return Apart(apart)
     if engine.runner.digits:
-        allowed += DIGITS * max(engine.runner.digits.resolution(each) for each in (samples, raw))
+        allowed += DIGITS * max(engine.runner.digits.resolution(motion) for motion in (samples, raw))
     if pair.variant == "time":  # which is rounded, and so is each step
-        allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(one.w0)) * one.n_steps
+        allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(description.w0)) * description.n_steps
     if allowed < 10 * apart and pair.variant in OF_INERTIA:
         allowed = max(allowed, engine.rounding(second, raw))
     return Apart(apart, allowed, "", scale)
 
 
-def _finer(one: Description, times: int) -> Description:
-    return replace(one, dt=one.dt / times, n_steps=one.n_steps * times, every=one.every * times)
+def _finer(description: Description, times: int) -> Description:
+    return replace(description, dt=description.dt / times, n_steps=description.n_steps * times, every=description.every * times)
 
 
 @dataclass(frozen=True)
@@ -283,7 +284,7 @@ class _Pair:
     subject: str
     body: str
     pair: Pair
-    one: Description
+    description: Description
 
     def finding(self, relation: Relation, apart: Apart = LOST, detail: str = "", **repeat: object) -> PairFinding:
         by = "bits" if self.pair.same_bits else "rounding"
@@ -308,10 +309,10 @@ class _Pair:
         runner, pair = self.engine.runner, self.pair
         if pair.variant and not runner.has(pair.variant):
             return self.finding(Relation.NOT_AVAILABLE, detail=f"the engine has no description {pair.variant!r}")
-        if reason := runner.unsupported(self.one):
+        if reason := runner.unsupported(self.description):
             return self.finding(Relation.UNSUPPORTED, detail=reason)
         try:
-            results = [_apart(self.engine, pair, self.one, scale) for scale in (pair.scales or (None,))]
+            results = [_apart(self.engine, pair, self.description, scale) for scale in (pair.scales or (None,))]
         except FirstFailed as failure:
             return self.finding(Relation.NOT_RUN, detail=f"the first description does not run: {failure}")
         except NotAvailable as error:
@@ -328,33 +329,33 @@ class _Pair:
 
     def explain(self, apart: Apart) -> PairFinding:
         """Return the finding on a pair that differs: from which size on, whether with shorter steps too, and the simplest."""
-        engine, pair, one, lost, scale = self.engine, self.pair, self.one, math.isinf(apart.value), apart.scale
+        engine, pair, description, lost, scale = self.engine, self.pair, self.description, math.isinf(apart.value), apart.scale
 
-        def wrong(each: Description, scale: float | None = scale) -> bool:
+        def wrong(candidate: Description, scale: float | None = scale) -> bool:
             with suppress(FirstFailed, NotAvailable, IntegrationFailed):
-                seen = _apart(engine, pair, each, scale)
+                seen = _apart(engine, pair, candidate, scale)
                 return math.isinf(seen.value) if lost else seen.wrong
             return False
 
-        def stays(each: Description) -> bool:  # with shorter steps
+        def stays(candidate: Description) -> bool:  # with shorter steps
             if lost or (pair.exact and not pair.scales):
                 return True
             with suppress(FirstFailed, NotAvailable, IntegrationFailed):
-                coarse, fine = (_apart(engine, pair, some, scale).value for some in (each, _finer(each, 4)))
+                coarse, fine = (_apart(engine, pair, some, scale).value for some in (candidate, _finer(candidate, 4)))
                 return not fine < coarse / 2
             return True
 
         adaptive = engine.runner.adaptive and not lost and not pair.same_bits
-        threshold = "" if scale is None or adaptive else _threshold(pair, one, scale, wrong)
-        if not stays(one):
+        threshold = "" if scale is None or adaptive else _threshold(pair, description, scale, wrong)
+        if not stays(description):
             detail = "the difference falls with the step"
             return self.finding(Relation.SAME_LIMIT, apart, detail, threshold=threshold)
         if adaptive:
             return self.with_tolerance(apart)
-        if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, one)):
+        if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, description)):
             detail = f"the difference of {apart.value:.2g} is a small share of the error of the step, {own:.2g}"
             return self.finding(Relation.NEGLIGIBLE, replace(apart, allowed=OWN_SHARE * own), detail, threshold=threshold)
-        first = _reduce(one, pair, scale, lambda each: wrong(each) and stays(each))
+        first = _reduce(description, pair, scale, lambda candidate: wrong(candidate) and stays(candidate))
         motion = apart.failure or _describe_motion(engine, pair, first, scale)
         return self.wrong(apart, first, motion, threshold)
 
@@ -370,55 +371,55 @@ class _Pair:
 
     def with_tolerance(self, apart: Apart) -> PairFinding:
         """Return the finding on a pair that differs in an engine that chooses its steps, which may be by its tolerance."""
-        engine, pair, one = self.engine, self.pair, self.one
+        engine, pair, description = self.engine, self.pair, self.description
         looser = engine.runner.looser()
         if looser is None:
             return self.finding(Relation.UNKNOWN, apart, "it chooses its steps by a tolerance that is not known here")
         with looser.closing(), suppress(FirstFailed, NotAvailable, IntegrationFailed):
-            if _apart(Engine(looser), pair, one, apart.scale).value > 2 * apart.value:
+            if _apart(Engine(looser), pair, description, apart.scale).value > 2 * apart.value:
                 return self.finding(Relation.SAME_LIMIT, apart, "the difference falls with the tolerance")
-        return self.wrong(apart, one, _describe_motion(engine, pair, one, apart.scale))
+        return self.wrong(apart, description, _describe_motion(engine, pair, description, apart.scale))
 
 
-def _plain(one: Description) -> Mapping[str, object]:
-    numbers = {name: value for name, value in one.numbers.items() if np.any(value)}
+def _plain(description: Description) -> Mapping[str, object]:
+    numbers = {name: value for name, value in description.numbers.items() if np.any(value)}
     return MappingProxyType(
         {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in numbers.items()}
     )
 
 
-def _own_error(engine: Engine, one: Description) -> float:
+def _own_error(engine: Engine, description: Description) -> float:
     """Return the change of the motion with a fourth of the step: about the error of the step."""
     with suppress(FirstFailed, NotAvailable, IntegrationFailed):
-        coarse, fine = (engine.first(each).samples for each in (one, _finer(one, 4)))
+        coarse, fine = (engine.first(some).samples for some in (description, _finer(description, 4)))
         own = difference(coarse, fine)
         return own if math.isfinite(own) else 0.0
     return 0.0
 
 
-def _describe_motion(engine: Engine, pair: Pair, one: Description, scale: float | None) -> str:
+def _describe_motion(engine: Engine, pair: Pair, description: Description, scale: float | None) -> str:
     """Return how the second description of a reduced pair moves."""
     with suppress(FirstFailed, NotAvailable, IntegrationFailed):
-        first, second = engine.first(one), pair.second(one, *_scaled(scale))
-        R, w = pair.back(run(engine.runner, one, second, pair, first.model), *_scaled(scale))
-        (R0, w0), after = first.samples, f"{one.n_steps} steps" if one.n_steps > 1 else "one step"
-        rates = [np.array2string(each[-1], precision=3, suppress_small=True) for each in (w0, w)]
+        first, second = engine.first(description), pair.second(description, *_scaled(scale))
+        R, w = pair.back(run(engine.runner, description, second, pair, first.model), *_scaled(scale))
+        (R0, w0), after = first.samples, f"{description.n_steps} steps" if description.n_steps > 1 else "one step"
+        rates = [np.array2string(rate[-1], precision=3, suppress_small=True) for rate in (w0, w)]
         if not angle_between(R[0], R[-1]) and angle_between(R0[0], R0[-1]):
             return f"after {after} the second body has not turned; its rates are {rates[1]}, not {rates[0]} rad/s"
         return f"after {after} {float(angle_between(R0[-1], R[-1])):.2g} rad apart, rates {rates[0]} and {rates[1]} rad/s"
     return "one of both motions is lost"
 
 
-def _threshold(pair: Pair, one: Description, scale: float, wrong: Callable[..., bool]) -> str:
+def _threshold(pair: Pair, description: Description, scale: float, wrong: Callable[..., bool]) -> str:
     """Return a phrase on the size from which on a scaled body moves differently, after `HALVINGS` trials."""
     good, bad = 0.0, math.log(scale)
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
-        good, bad = (good, middle) if wrong(one, scale=math.exp(middle)) else (middle, bad)
+        good, bad = (good, middle) if wrong(description, scale=math.exp(middle)) else (middle, bad)
     if abs(bad) < 2 * abs(math.log(scale)) / 2**HALVINGS:
         return "in all other units"
-    at, up = pair.second(one, math.exp(bad)), scale > 1
-    speed = f", a speed of {np.linalg.norm(np.cross(at.w0, at.com)):.2g} m/s" * bool(one.com.any())
+    at, up = pair.second(description, math.exp(bad)), scale > 1
+    speed = f", a speed of {np.linalg.norm(np.cross(at.w0, at.com)):.2g} m/s" * bool(description.com.any())
     if pair.quantity == "time":
         return f"{'below' if up else 'above'} {np.linalg.norm(at.w0):.2g} rad/s{speed}"
     moments = np.diag(at.inertia)
@@ -426,33 +427,33 @@ def _threshold(pair: Pair, one: Description, scale: float, wrong: Callable[..., 
 
 
 SIMPLER: tuple[Callable[[Description], Description], ...] = (
-    lambda one: replace(one, R0=np.eye(3)),
-    lambda one: replace(one, com=np.zeros(3), gravity=0.0),
-    lambda one: replace(one, inertia=np.diag((1.0, 2.0, 2.5))),
-    lambda one: replace(one, inertia=np.eye(3) * np.diag(one.inertia).max()),
-    lambda one: replace(one, mass=1.0),
-    *(lambda one, axis=axis: replace(one, w0=np.linalg.norm(one.w0) * np.eye(3)[axis]) for axis in range(3)),
-    lambda one: replace(one, w0=np.array([float(f"{value:.1g}") for value in one.w0])),
+    lambda d: replace(d, R0=np.eye(3)),
+    lambda d: replace(d, com=np.zeros(3), gravity=0.0),
+    lambda d: replace(d, inertia=np.diag((1.0, 2.0, 2.5))),
+    lambda d: replace(d, inertia=np.eye(3) * np.diag(d.inertia).max()),
+    lambda d: replace(d, mass=1.0),
+    *(lambda d, axis=axis: replace(d, w0=np.linalg.norm(d.w0) * np.eye(3)[axis]) for axis in range(3)),
+    lambda d: replace(d, w0=np.array([float(f"{value:.1g}") for value in d.w0])),
 )
 """Simplifications of a body and its start, each kept if the pair still differs and both bodies are possible."""
 
 
-def _reduce(one: Description, pair: Pair, scale: float | None, wrong: Callable[[Description], bool]) -> Description:
+def _reduce(description: Description, pair: Pair, scale: float | None, wrong: Callable[[Description], bool]) -> Description:
     """Return the simplest body with the fewest steps, to 1 %, that still differs."""
-    few, enough = 0, one.n_steps
+    few, enough = 0, description.n_steps
     while enough - few > max(1, few // 100):
         count = (few + enough) // 2 if few else max(1, enough // 8)
-        if wrong(replace(one, n_steps=count, every=count)):
+        if wrong(replace(description, n_steps=count, every=count)):
             enough = count
         else:
             few = count
-    if enough < one.n_steps:
-        one = replace(one, n_steps=enough, every=enough)
+    if enough < description.n_steps:
+        description = replace(description, n_steps=enough, every=enough)
     for simpler in SIMPLER:
-        candidate, _ = to_principal(simpler(one))
+        candidate, _ = to_principal(simpler(description))
         if candidate.possible and pair.second(candidate, *_scaled(scale)).possible and wrong(candidate):
-            one = candidate
-    return one
+            description = candidate
+    return description
 
 
 def select_pairs(names: Sequence[str]) -> tuple[Pair, ...]:
@@ -491,9 +492,9 @@ def verify_pairs(
     pairs = select_pairs(names)
     with runner_of(method).closing() as runner:
         engine = Engine(runner)
-        for body, one in BODIES.items():
+        for body, description in BODIES.items():
             for pair in pairs:
                 if body in pair.bodies:
                     tell(f"{body}, {pair.name}")
-                    yield _Pair(engine, method, subject or method.name, body, pair, one).compare()
+                    yield _Pair(engine, method, subject or method.name, body, pair, description).compare()
             engine.forget()

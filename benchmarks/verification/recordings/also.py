@@ -41,7 +41,7 @@ class Other:
 def compare_others(R: Array | None, values: Array, layout: Layout, options: Options) -> list[Other]:
     """Return the other attitudes of a file, which are in `values` (n, k), next to attitudes R (n, 3, 3).
 
-    Units, orders and sequences that no name has are those that fit best.
+    If no name has the unit, order or sequence, the one that fits best is used.
     """
     out, place = list[Other](), 0
     for kind, names in layout.also.items():
@@ -50,12 +50,12 @@ def compare_others(R: Array | None, values: Array, layout: Layout, options: Opti
             continue
         have = np.isfinite(x).all(axis=1)
         some = np.flatnonzero(have)[:: max(1, int(have.sum()) // TRIED)]
-        found = (math.inf, 1.0, x[have])
+        nearest = (math.inf, 1.0, x[have])
         for reading in _readings(kind, options) if len(some) else ():
             off = _largest(R[some], reading(x[some]))
-            if off < found[0]:
-                found = off, reading.unit, reading(x[have])
-        off, unit, matrices = found
+            if off < nearest[0]:
+                nearest = off, reading.unit, reading(x[have])
+        off, unit, matrices = nearest
         digits = TURNS.get(kind, 1.0) * unit * find_quantum(x[have]) if math.isfinite(off) else 0.0
         out.append(Other(names, _largest(R[have], matrices) if math.isfinite(off) else off, digits))
     return out

@@ -65,7 +65,7 @@ def choose(path: Path, layout: Layout, options: Options) -> Layout:
     names = layout.names
     if len(names) > MOST_COLUMNS:
         raise BadInput("run", f"{path} with {len(names)} columns", f"a table of at most {MOST_COLUMNS} columns")
-    chosen = _given(path, names, options.columns) if options.columns else _by_name(path, layout)
+    chosen = _by_option(path, names, options.columns) if options.columns else _by_name(path, layout)
     _leave_moving(layout, chosen, options)
     kinds = [kind for kind in ATTITUDES if kind in chosen]
     for kind in kinds[1:]:
@@ -115,7 +115,7 @@ def _find_sizes(path: Path, layout: Layout, kind: str, names: Sequence[str], opt
 
 def _find_looks(layout: Layout) -> list[str]:
     """Return the columns that are not used and look like parts of the motion."""
-    found, whole = list[str](), {name: split_name(name)[0] for name in layout.unused}
+    members, whole = list[str](), {name: split_name(name)[0] for name in layout.unused}
     sets = Counter(key[:-1] for key in whole.values() if re.fullmatch("q(?!pos|vel)[a-z]*[wxyz0-4]", key))
     for name, key in whole.items():
         last = split_name(re.split(r"[./:]", name)[-1])[0]
@@ -124,8 +124,8 @@ def _find_looks(layout: Layout) -> list[str]:
         if layout.unused[name] in (MOVES, HORIZON, SEQUENCE) or (
             looks and not _OTHERWISE.search(last) and not _SPREAD.search(key)
         ):
-            found.append(name)
-    return found
+            members.append(name)
+    return members
 
 
 def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options) -> None:
@@ -144,8 +144,8 @@ def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options
 
 def _moves(name: str) -> bool:
     """Return whether the name of an attitude names a frame that moves."""
-    words = re.split(r"[^a-z0-9]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower())
-    return bool(_MOVING.search(split_name(name)[0][:-1])) or any(_MOVING_WORD.fullmatch(word) for word in words)
+    parts = re.split(r"[^a-z0-9]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower())
+    return bool(_MOVING.search(split_name(name)[0][:-1])) or any(_MOVING_WORD.fullmatch(word) for word in parts)
 
 
 def _sort_angles(layout: Layout, chosen: dict[str, list[str]], kind: str, options: Options) -> None:
@@ -173,7 +173,7 @@ def _sort_angles(layout: Layout, chosen: dict[str, list[str]], kind: str, option
 
 
 def _choose_time(layout: Layout, split: Mapping[str, str], matches: Sequence[str]) -> list[str]:
-    """Return the column of the time, or those of seconds and their fractions; other times have it as their reason."""
+    """Return the column of the time, or the two of seconds and their fractions; other times are unused, with it as reason."""
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in layout.names if len(name) <= LONGEST_NAME}
     for key, name in plain.items():
         if (match := _FRACTIONS.fullmatch(key)) and (
@@ -220,9 +220,9 @@ def _by_name(path: Path, layout: Layout) -> dict[str, list[str]]:
             sets.setdefault(match[1], {}).setdefault(match[2], name)
         full: dict[str, list[str]] = {}
         for prefix, parts in sets.items():
-            for each in complete:
-                if parts.keys() >= set(each):
-                    full.setdefault(prefix, [parts[one] for one in each])
+            for keys in complete:
+                if parts.keys() >= set(keys):
+                    full.setdefault(prefix, [parts[key] for key in keys])
         if len(full) > 1:
             short = SHORT.get(kind, kind)
             offered = " or ".join(f"--columns {short}={':'.join(members)}" for members in full.values())
@@ -243,26 +243,27 @@ def _by_name(path: Path, layout: Layout) -> dict[str, list[str]]:
     return chosen
 
 
-def _given(path: Path, names: list[str], text: str) -> dict[str, list[str]]:
+def _by_option(path: Path, names: list[str], text: str) -> dict[str, list[str]]:
     """Return the columns that `--columns` names."""
     chosen, kinds = {}, {short: kind for kind, short in SHORT.items()}
     counts = {"time": 1, "rates": 3} | dict(ATTITUDES)
     for part in re.split(r",(?=[^=,]*=)", text):
         short, _, members = part.partition("=")
-        kind, found = kinds.get(short.strip()), [member.strip() for member in members.split(":")]
-        found = [
-            names[int(each) - 1]
-            if each not in names and re.fullmatch("[0-9]{1,9}", each) and 0 < int(each) <= len(names)
-            else each
-            for each in found
+        kind, columns = kinds.get(short.strip()), [member.strip() for member in members.split(":")]
+        columns = [
+            names[int(column) - 1]
+            if column not in names and re.fullmatch("[0-9]{1,9}", column) and 0 < int(column) <= len(names)
+            else column
+            for column in columns
         ]
-        if kind is None or any(each not in names for each in found) or len(found) != counts[kind]:
+        if kind is None or any(column not in names for column in columns) or len(columns) != counts[kind]:
             allowed = (
                 f"such as time=1,w=2:3:4 with {', '.join(SHORT.values())} and columns of {path.name}: {', '.join(names)[:300]}"
             )
             raise BadInput("columns", repr(part), allowed)
-        letters = {split_name(each)[0][-1:]: each for each in found}
-        chosen[kind] = [letters[each] for each in "wxyz"] if kind == "quaternion" and letters.keys() == set("wxyz") else found
+        letters = {split_name(column)[0][-1:]: column for column in columns}
+        by_letter = kind == "quaternion" and letters.keys() == set("wxyz")
+        chosen[kind] = [letters[letter] for letter in "wxyz"] if by_letter else columns
     return chosen
 
 
@@ -290,6 +291,6 @@ def _hint(names: Sequence[str], chosen: Mapping[str, Sequence[str]], layout: Lay
     if all(name.isdigit() for name in names):
         return "the columns by number, such as --columns time=1,w=2:3:4 --units rad, or time=1,q=2:3:4:5"
     w = [name for name in names if name in chosen.get("rates", ())] or [*(likely or [rest])[0], "X", "Y", "Z"][:3]
-    known = next((f",{SHORT[kind]}={':'.join(chosen[kind])}" for kind in ATTITUDES if kind in chosen and kind in SHORT), "")
-    rates = f",w={':'.join(w)}" if likely or not known or "X" not in w else ""
-    return f"the columns by name or number, such as --columns time={times[0]}{rates}{known} --units rad"
+    attitude = next((f",{SHORT[kind]}={':'.join(chosen[kind])}" for kind in ATTITUDES if kind in chosen and kind in SHORT), "")
+    rates = f",w={':'.join(w)}" if likely or not attitude or "X" not in w else ""
+    return f"the columns by name or number, such as --columns time={times[0]}{rates}{attitude} --units rad"

@@ -117,13 +117,13 @@ def _choose_order(scene: Scene, recording: Recording, t: Array, start: float) ->
     usual = allow()
     first = Compared(scene, t, (R, w), start, 1.0, usual.errors, usual.noise)
     other = first.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
-    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda each: float(each[0].error.mean()))
+    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda candidate: float(candidate[0].error.mean()))
     options = replace(recording.options, quaternion=order)
     return replace(recording, data=case.data, order_known=True, options=options), case.scene
 
 
 def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Array:
-    """Return the errors (2,) that the digits of a file make: those of attitudes, of rates, and of times along the motion."""
+    """Return the errors (2,) that the digits of a file make: digits of attitudes, of rates, and of times along the motion."""
     time, attitude, rate = recording.digits
     w, acceleration = recording.data[1], 0.0
     if w is not None:
@@ -157,9 +157,9 @@ def _find_noise(
             motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
             resolved &= (motion < 0.3 * noise) | (noise < TINY)
-            told = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
-            better = told & (~resolved | (other[0] < noise))
-            noise, resolved = np.where(better, other[0], noise), resolved | told
+            apart = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
+            better = apart & (~resolved | (other[0] < noise))
+            noise, resolved = np.where(better, other[0], noise), resolved | apart
     return np.where(resolved & (noise / sizes <= MOST_NOISE), noise / sizes, 0.0), resolved
 
 
@@ -170,7 +170,7 @@ class Comparison:
     `worst` has the largest errors of all rows in the file, `compared` their number, and `outliers` single rows that are off.
     `alone` are the largest errors (2,) from the first row of each stretch where a fitted start has smaller ones. `undecided`
     is what would decide, "" if nothing is open; `shape` is the largest departure from a rotation, and its time, s; `shift` is
-    added to times of the case for those of the file.
+    added to times of the case to get times of the file.
     """
 
     case: Compared
@@ -234,8 +234,8 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
                 if good < len(part.t) and whole and (reached := _reach(extended)[0]) <= good:
                     extended, part, end = extended.take(slice(0, reached)), part.take(slice(0, reached)), reached
                     fitted = extended
-                fitted = min(fitted, extended, key=lambda each: each.size(each.error))
-            part = min(part, fitted, key=lambda each: each.size(each.error))
+                fitted = min(fitted, extended, key=lambda part: part.size(part.error))
+            part = min(part, fitted, key=lambda candidate: candidate.size(candidate.error))
         parts.append(part)
         if end >= len(rest.t) or len(parts) > 200 or not part.passes(part.error):
             break
@@ -261,7 +261,7 @@ def _reach(rest: Compared) -> tuple[int, float]:
     first = 3 * (rest.data[0] is None)
     flow = linearise(thin)[2][:, first:, first:]
     back = np.nan_to_num(np.linalg.pinv(np.nan_to_num(flow)))
-    # Errors of the file's own steps grow from any row on: near a separatrix more than those of the first row.
+    # Errors of the file's own steps grow from any row on: near a separatrix more than errors of the first row.
     growth = np.array([np.linalg.norm(flow[k] @ back[: k + 1], axis=(1, 2)).max() for k in range(len(some))])
     over = np.flatnonzero(growth * ROUND_OFF > rest.allowed.min() / 10)
     end = max(2, int(some[over[0]])) if len(over) else len(rest.t)
@@ -307,7 +307,7 @@ def _compare_all(
 
 
 def _late(case: Compared) -> bool:
-    """Return whether errors that pass as noise lie along the motion, as those of times do: noise has all directions."""
+    """Return whether errors that pass as noise lie along the motion, as errors of times do: noise has all directions."""
     (R, w), n = case.exact, len(case.t)
     if n < 14 or (case.error.max(axis=1) <= np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))).all():
         return False

@@ -14,7 +14,7 @@ from .layout import Layout
 TURNS = {"quaternion": 2.0, "modified Rodrigues": 4.0, "Rodrigues": 4.0}
 """Angle, rad, for a change of 1 in a component, by the kind of attitude; 1 for others."""
 OUTLIER = 1e4
-"""Largest value relative to the median that digits are relative to: round-off of a value in error is not that of the others."""
+"""Largest value relative to the median that digits are relative to: a value in error has another round-off than the others."""
 
 
 def find_digits(raw: Array, layout: Layout) -> tuple[float, float, float]:

@@ -32,8 +32,8 @@ class Options:
     """How the columns are to be read; None where header and numbers decide.
 
     `quaternion`, "wxyz" or "xyzw", is the order of numbered columns. `euler`, such as zyx, is the sequence of angles about axes
-    that turn along. `world` is True for rates in world axes, and `units`, "deg" or "rad", are those of columns that name
-    none; "deg/s" or "rad/s" are those of rates only. `columns`, such as `time=1,w=2:3:4`, names columns by their names or
+    that turn along. `world` is True for rates in world axes, and `units`, "deg" or "rad", belong to columns that name
+    none; "deg/s" or "rad/s" belong to rates only. `columns`, such as `time=1,w=2:3:4`, names columns by their names or
     numbers from 1. Rows before `start_time` and after `end_time`, s, times of the file, are left out.
     """
 

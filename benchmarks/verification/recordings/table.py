@@ -31,7 +31,7 @@ ROWS = 2000  # rows that are kept for fits, evenly chosen: this to twice as many
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recorded motion at times t (n,), s, which are those of the file; it has `rows` rows, of which n are kept for fits.
+    """A recorded motion at times t (n,), s, of the file; it has `rows` rows, of which n are kept for fits.
 
     `shape` (n,) has what is measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
-from conservative.presentation import number
+from conservative.number_text import number
 from conservative.scene import Scene
 
 from ..compare import Compared, differ
@@ -22,17 +22,18 @@ from .table import Recording
 from .verdict import UNITS, verify_recording
 
 BODIES = {"another body", "other moments"}
-"""Keys of mistakes that are not in the recordings if both have them, but in the body that they are compared with."""
+"""Keys of mistakes of the body. If both recordings have one, `--body` names the wrong body, and the recordings may be right."""
 Named = tuple[str, Recording]
 """A recording and the name of its file."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The largest difference between two recordings: of attitudes, rad, and of rates, relative to the largest, or nan.
+    """The largest difference between two recordings, `error`: of attitudes in rad, and of rates relative to the largest rate.
 
-    `allowed` has what digits, noise and the interpolation between rows allow. `rows` is the number of rows that were compared,
-    `common` is True if both files have rows at these times, and `missing` says why nothing was compared.
+    A quantity that one of them does not have is nan. Digits, noise and the interpolation between rows decide what is `allowed`.
+    `rows` is the number of rows that were compared, `common` is True if both files have rows at these times, and `missing` is
+    the reason if nothing was compared.
     """
 
     error: tuple[float, float] = (math.nan, math.nan)
@@ -44,7 +45,7 @@ class Difference:
 
     @property
     def worse(self) -> int:
-        """0 if attitudes differ more beside what is allowed, 1 if rates do."""
+        """The quantity with the larger ratio of difference and allowed difference: 0 for attitudes, 1 for rates."""
         return int(np.nanargmax(np.divide(self.error, self.allowed)))
 
     @property
@@ -83,6 +84,7 @@ def verify_two(
     if first[0] == second[0]:
         first, second = (f"{first[0]} (first)", first[1]), (f"{second[0]} (second)", second[1])
     rows, made = dict[str, Rows](), dict[str, Verification]()
+    # First the recording with attitudes and rates: one without the other takes the missing part of its start from it.
     for name, recording in sorted((first, second), key=_missing):
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
         try:
@@ -90,63 +92,68 @@ def verify_two(
             made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
         except BadInput as refused:
             if refused.argument != "run" or name in str(refused.got):
-                raise
+                raise  # an option is wrong, or the message names the file already
             raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
     tell("difference")
     a, b = made[first[0]], made[second[0]]
-    found = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
+    difference = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
     names = f"{a.subject} and {b.subject}"
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
-    verdict = Verdict.NOT_TESTED if found.missing else Verdict.RIGHT if found.agrees else verdict
-    worse = 0 if found.missing else found.worse
+    verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else verdict
+    worse = 0 if difference.missing else difference.worse
     finding = Finding(
         names,
         "recording",
         "difference",
         verdict,
-        found.error[worse],
-        found.allowed[worse],
+        difference.error[worse],
+        difference.allowed[worse],
         UNITS[worse],
         rows[first[0]].allowed.by[worse],
-        detail=found.missing,
+        detail=difference.missing,
     )
-    notes = [f"{each.subject}: {note}" for each in (a, b) for note in each.notes]
-    return Verification(names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, found), notes, Two(a, b, found))
+    notes = [f"{verification.subject}: {note}" for verification in (a, b) for note in verification.notes]
+    return Verification(
+        names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, difference), notes, Two(a, b, difference)
+    )
 
 
-def _reason(a: Verification, b: Verification, found: Difference) -> str:
+def _reason(a: Verification, b: Verification, difference: Difference) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    size = "" if found.missing else f"{number(found.error[found.worse])} {UNITS[found.worse]}"
+    size = "" if difference.missing else f"{number(difference.error[difference.worse])} {UNITS[difference.worse]}"
     both = (a.verdict, b.verdict)
-    (one,), (other,) = a.findings, b.findings
+    (first,), (second,) = a.findings, b.findings
     if both == (Verdict.RIGHT, Verdict.RIGHT):
-        if found.missing:
-            return f"both are right; they are not compared with each other: {found.missing}"
-        if found.agrees:
+        if difference.missing:
+            return f"both are right; they are not compared with each other: {difference.missing}"
+        if difference.agrees:
             return f"both are right, and differ by at most {size}"
         return (
-            f"both are motions of this body, from different starts: they differ by {size} at {found.time:g} s. "
+            f"both are motions of this body, from different starts: they differ by {size} at {difference.time:g} s. "
             "--start scene decides"
         )
     if both == (Verdict.WRONG, Verdict.WRONG):
-        same = bool(one.mistake) and one.mistake == other.mistake
-        if found.agrees and (not same or one.mistake in BODIES):
+        same = bool(first.mistake) and first.mistake == second.mistake
+        if difference.agrees and (not same or first.mistake in BODIES):
             return (
                 f"both have the same motion (they differ by at most {size}), but not the motion of this body: check --body. "
                 f"{a.subject}: {a.reason}"
             )
         if same:
             numbers = (
-                "" if one.causes[0].sentence == other.causes[0].sentence else f" ({b.subject}: {other.causes[0].sentence})"
+                "" if first.causes[0].sentence == second.causes[0].sentence else f" ({b.subject}: {second.causes[0].sentence})"
             )
-            return f"both are wrong by the same mistake: {one.causes[0].sentence}{numbers}"
-    return ". ".join(f"{each.subject} is {each.verdict}: {each.reason}" for each in sorted((a, b), key=_order))
+            return f"both are wrong by the same mistake: {first.causes[0].sentence}{numbers}"
+    return ". ".join(
+        f"{verification.subject} is {verification.verdict}: {verification.reason}"
+        for verification in sorted((a, b), key=_order)
+    )
 
 
-def _order(each: Verification) -> bool:
-    """Sort the right one before the other one."""
-    return each.verdict is not Verdict.RIGHT
+def _order(verification: Verification) -> bool:
+    """Sort right recordings before others."""
+    return verification.verdict is not Verdict.RIGHT
 
 
 def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], object]:
@@ -154,18 +161,21 @@ def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], objec
 
 
 def _missing(named: Named) -> int:
-    """Return the number of quantities, of attitudes and rates, that a recording does not have."""
+    """Return how many of attitudes and rates a recording does not have."""
     return sum(x is None for x in named[1].data)
 
 
 def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verification]]) -> Scene:
-    """Return the scene with the start of a recording, as far as it does not have it, from another one that is right."""
+    """Return the scene whose start is the state of a right recording at the first time of this one, which lacks a part of it.
+
+    Without a right recording `before`, or if this one has attitudes and rates, the scene is returned as it is.
+    """
     for rows, verification in before:
         case, first = rows.case, float(recording.t[0])
-        at = first + float(case.t[0] - rows.recording.t[0])
+        at = first + float(case.t[0] - rows.recording.t[0])  # the case may count its times from the first row
         if verification.verdict is Verdict.RIGHT and any(x is None for x in recording.data) and case.t[0] <= at <= case.t[-1]:
             R, w = truth(case.scene, case.start, np.array([case.start, at]))
-            if not scene.loads:  # whose motion begins at t = 0
+            if not scene.loads:  # a scene with loads starts at t = 0, not in the first row
                 return scene.rename(scene.name, R_WB0=R[1], w_WB_B0=w[1])
     return scene
 
@@ -173,16 +183,16 @@ def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verifica
 def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
     """Return the largest difference between two recordings at common times.
 
-    Without common times, the departure of the second one from an exact motion is interpolated: it changes slowly where the rows
-    themselves do not. What linear interpolation misses in its own rows is allowed.
+    Without common times, the second one is interpolated: not its rows, which change quickly, but their departures from an
+    exact motion. An error of this interpolation is allowed.
     """
     a, b = (row.case for row in rows)
-    shift = float(a.t[0] - recordings[0].t[0])  # of the file's times to those of the exact motion
+    shift = float(a.t[0] - recordings[0].t[0])  # from times of the file to times of the exact motion
     times = recordings[1].t[0] + shift + (b.t - b.t[0])
     if times[0] > a.t[-1] or a.t[0] > times[-1]:
         if not from_row or b.start != 0:
             return Difference(missing="their times do not overlap")
-        times = a.t[0] + (b.t - b.t[0])
+        times = a.t[0] + (b.t - b.t[0])  # two clocks: each file starts with the same motion
     have = [x is not None and y is not None for x, y in zip(a.data, b.data, strict=True)]
     if not any(have):
         return Difference(missing="one has attitudes, the other one rates")
@@ -191,7 +201,7 @@ def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_
     nearest = np.where(np.abs(times[later] - a.t) < np.abs(times[later - 1] - a.t), later, later - 1)
     near = sum(recording.digits[0] for recording in recordings) + 4 * np.spacing(max(abs(a.t[-1]), abs(times[-1])))
     common = np.flatnonzero(np.abs(times[nearest] - a.t) <= near)
-    direct = len(common) >= max(2, 0.1 * min(len(inside), len(times)))
+    direct = len(common) >= max(2, 0.1 * min(len(inside), len(times)))  # a few coincidences are too small a sample
     picked, off = common if direct else inside, np.zeros(2)
     if not len(picked):
         return Difference(missing="no row of one is between rows of the other one")
@@ -199,7 +209,7 @@ def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_
     if direct:
         theirs = theirs[nearest[picked]]
     else:
-        if len(times) > 2:
+        if len(times) > 2:  # what interpolation from both neighbours misses in each row, over a gap that is twice as long
             share = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
             missed = theirs[1:-1] - (1 - share) * theirs[:-2] - share * theirs[2:]
             off = np.array([np.linalg.norm(missed[:, part], axis=1).max() for part in (slice(3), slice(3, 6))])

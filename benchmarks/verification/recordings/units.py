@@ -47,10 +47,10 @@ def find_units(path: Path, values: Array, layout: Layout, options: Options) -> N
     turns = some[:, 1 + len(parts["rates"]) :]
     short = layout.attitude == "rotation vector" and np.linalg.norm(turns, axis=1).max() < 2.1 * math.pi
     usual = [1.0 if short and kind == layout.attitude else _usual(parts[kind]) for kind in open_]
-    known = (parts["time"][time], *usual)
-    whole = split_name(time)[1] is None and known[0] == 1.0 and bool((some[:, 0] == np.rint(some[:, 0])).all())
-    choices = [(1.0, 1e-3, 1e-6, 1e-9) if whole else known[:1], *[(1.0, math.pi / 180)] * len(open_)]
-    found: list[tuple[float, Any]] = []
+    expected = (parts["time"][time], *usual)
+    whole = split_name(time)[1] is None and expected[0] == 1.0 and bool((some[:, 0] == np.rint(some[:, 0])).all())
+    choices = [(1.0, 1e-3, 1e-6, 1e-9) if whole else expected[:1], *[(1.0, math.pi / 180)] * len(open_)]
+    ranked: list[tuple[float, Any]] = []
 
     def choose(sizes: Sequence[Any]) -> None:
         for kind, size in zip(("time", *open_), sizes, strict=True):
@@ -61,17 +61,17 @@ def find_units(path: Path, values: Array, layout: Layout, options: Options) -> N
         choose(sizes)
         orders = (options.quaternion,) if options.quaternion or not layout.numbered else ("wxyz", "xyzw")
         off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
-        found.append((min(off), sizes))
-    found.sort()
-    if len(found) > 1 and found[0][0] < 0.1 and found[1][0] > 0.5:
-        for kind, size, expected in zip(("time", *open_), found[0][1], known, strict=True):
-            if size != expected:
+        ranked.append((min(off), sizes))
+    ranked.sort()
+    if len(ranked) > 1 and ranked[0][0] < 0.1 and ranked[1][0] > 0.5:
+        for kind, size, usual_size in zip(("time", *open_), ranked[0][1], expected, strict=True):
+            if size != usual_size:
                 unit = f"{size:g} s" if kind == "time" else "rad" if size == 1.0 else "deg"
                 layout.notes.append(f"{', '.join(parts[kind])}: read in {unit}, because only so do attitudes and rates agree.")
-        known = found[0][1]
-    if None in known:
+        expected = ranked[0][1]
+    if None in expected:
         raise no_unit(path, [*parts[open_[0]]])
-    choose(known)
+    choose(expected)
 
 
 def _disagreement(values: Array, layout: Layout, options: Options) -> float:

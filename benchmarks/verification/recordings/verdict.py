@@ -13,7 +13,7 @@ from conservative.attitude import Array
 from conservative.check import describe, real_number
 from conservative.errors import BadInput, shorten
 from conservative.invariants import find_energy, kinetic_energy, sizes
-from conservative.presentation import number
+from conservative.number_text import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -116,7 +116,7 @@ class Details:
 
     @property
     def worse(self) -> int:
-        """0 if errors of attitudes are larger beside what is allowed, 1 if those of rates are."""
+        """The quantity with the larger ratio of error and allowed error: 0 for attitudes, 1 for rates."""
         return int(np.argmax([e / a * bool(u.size) for e, a, u in zip(self.error, self.allowed, self.units, strict=True)]))
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -164,52 +164,52 @@ def verify_recording(
     rows = prepare(scene.rotation_only, recording, from_row, error)
     recording, notes = rows.recording, rows.notes
     tell("compare")
-    found = compare(rows.case, recording, from_row)
+    comparison = compare(rows.case, recording, from_row)
     shape_allowed = max(SHAPE, UNITS_OF_DIGITS * recording.digits[1], SIGMAS * rows.noise[0]) if error is None else error
-    shaped, explained = found.shape[0] <= shape_allowed, Diagnosis()
-    if found.outliers and not found.passed:
-        explained = Diagnosis([_single_rows(found)])
-    elif not found.passed:
+    shaped, explained = comparison.shape[0] <= shape_allowed, Diagnosis()
+    if comparison.outliers and not comparison.passed:
+        explained = Diagnosis([_single_rows(comparison)])
+    elif not comparison.passed:
         tell("explain")
-        whole = replace(found.case, growth=found.parts[0].growth)
+        whole = replace(comparison.case, growth=comparison.parts[0].growth)
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
-    hidden = not (found.passed or found.outliers) and error is None and found.case.hidden()
-    proven = [each for each in explained.named if each.explains and not (hidden and each.numbers)]
+    hidden = not (comparison.passed or comparison.outliers) and error is None and comparison.case.hidden()
+    proven = [explanation for explanation in explained.named if explanation.explains and not (hidden and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
-    if found.passed and shaped:
-        verdict, doubt = Verdict.RIGHT, found.undecided or recording.doubt(error)
+    if comparison.passed and shaped:
+        verdict, doubt = Verdict.RIGHT, comparison.undecided or recording.doubt(error)
     elif error is None and shaped and not proven:
-        doubt = HIDDEN if hidden else _doubt(found.case, found.errors, rows.resolved, recording)
+        doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
-    case = found.case
+    case = comparison.case
     if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
         tell("moments")
         fit = fit_moments(case)
         notes += [f"{fit.sentence}."] * bool((np.array(fit.left) <= case.allowed).all())
     notes += explained.notes
-    if len(found.parts) > 1:
+    if len(comparison.parts) > 1:
         notes.append(
-            f"The exact motion starts again in {len(found.parts) - 1} rows: it multiplies the rounding of a row too much."
+            f"The exact motion starts again in {len(comparison.parts) - 1} rows: it multiplies the rounding of a row too much."
         )
-    if found.compared < recording.rows:
-        notes.append(f"{found.compared:,} of {recording.rows:,} rows are compared.")
-    series, units = _series(found, recording, from_row)
+    if comparison.compared < recording.rows:
+        notes.append(f"{comparison.compared:,} of {recording.rows:,} rows are compared.")
+    series, units = _series(comparison, recording, from_row)
     limits = [size * x for (_, size), x in zip(units, case.allowed.tolist(), strict=True) if size]
-    largest = found.worst.max(axis=1)
+    largest = comparison.worst.max(axis=1)
     details = Details(
         error=_pair(largest),
         allowed=_pair(case.allowed),
         by=rows.allowed.by,
         noise=_pair(rows.noise),
         digits=recording.digits,
-        first_row=_pair(found.alone),
+        first_row=_pair(comparison.alone),
         units=units,
-        compared=found.compared,
+        compared=comparison.compared,
         in_file=recording.rows + sum(recording.left.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
         unused={shorten(column): reason for column, reason in recording.layout.unused.items()},
-        shape="" if shaped else _misshapen(found, recording),
+        shape="" if shaped else _misshapen(comparison, recording),
         explaining=tuple(proven),
         candidates=() if proven else tuple(explained.named[:3]),
         tried=tuple(explained.tried),
@@ -217,11 +217,11 @@ def verify_recording(
             Quantity(quantity, float(x.max()), float(x[-1]), limits[i] if i < len(limits) else math.nan)
             for i, (quantity, x) in enumerate(series.items())
         ],
-        times=found.case.t[: len(found.errors[0])] + found.shift,
+        times=comparison.case.t[: len(comparison.errors[0])] + comparison.shift,
         series=series,
     )
     worse = details.worse
-    causes = tuple(_cause(each, worse) for each in proven)
+    causes = tuple(_cause(explanation, worse) for explanation in proven)
     finding = Finding(
         name,
         "recording",
@@ -234,7 +234,7 @@ def verify_recording(
         causes,
         doubt or details.shape,
     )
-    notes += [*_instability(found), *(note for note in recording.layout.notes if note != "unit")]
+    notes += [*_instability(comparison), *(note for note in recording.layout.notes if note != "unit")]
     return Verification(name, "recording", [finding], _reason(finding, details, proven), notes, details)
 
 
@@ -242,8 +242,8 @@ def _pair(values: Array) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def _cause(found: Explanation, worse: int) -> Cause:
-    return replace(found.cause, left=found.left[worse], of=found.plain[worse])
+def _cause(explanation: Explanation, worse: int) -> Cause:
+    return replace(explanation.cause, left=explanation.left[worse], of=explanation.plain[worse])
 
 
 def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
@@ -256,7 +256,8 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
         *([details.shape] if details.shape else []),
     ]
     causes = [
-        uncapitalised(each.sentence) + (f" (leaves {details.show(each.left)})" if max(each.plain) else "") for each in proven
+        uncapitalised(explanation.sentence) + (f" (leaves {details.show(explanation.left)})" if max(explanation.plain) else "")
+        for explanation in proven
     ]
     if finding.verdict is Verdict.UNDECIDED:
         return "; ".join([finding.detail, *decided])
@@ -266,12 +267,12 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     return "; ".join([*decided, *(["no known mistake explains it"] if unknown else [])])
 
 
-def _single_rows(found: Comparison) -> Explanation:
-    row, at, size = found.outliers[0]
-    unit = UNITS[int(np.argmax(found.worst.max(axis=1)))]
+def _single_rows(comparison: Comparison) -> Explanation:
+    row, at, size = comparison.outliers[0]
+    unit = UNITS[int(np.argmax(comparison.worst.max(axis=1)))]
     text = f"Single rows are off, the first of them row {row:,} at {at:g} s, by {number(size)} {unit}; the others agree"
     values = {"row": float(row), "time": at, "error": size}
-    return Explanation(("single rows",), text, values, [0.0, 0.0], found.worst.max(axis=1).tolist(), 0.0, 0.0, True)
+    return Explanation(("single rows",), text, values, [0.0, 0.0], comparison.worst.max(axis=1).tolist(), 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
@@ -279,7 +280,7 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
     single = max(recording.digits[1:]) > 1e-9
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
-            f"The error is larger than the digits of the file allow, and as small as that of a good solver in "
+            f"The error is larger than the digits of the file allow, and as small as the error of a good solver in "
             f"{'single' if single else 'double'} precision. An allowed error decides: --error"
         )
     if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
@@ -290,22 +291,22 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
     return ""
 
 
-def _misshapen(found: Comparison, recording: Recording) -> str:
+def _misshapen(comparison: Comparison, recording: Recording) -> str:
     """Return the finding that matrices are not rotations, or quaternions not of norm 1."""
-    matrix, (size, t) = recording.layout.attitude == "matrix", found.shape
+    matrix, (size, t) = recording.layout.attitude == "matrix", comparison.shape
     what = "The matrices are not rotations: |R'R - 1| is" if matrix else "The quaternions are not of norm 1: it differs by"
     return f"{what} up to {size:.3g}, at {t:g} s. They are repaired before they are compared"
 
 
-def _series(found: Comparison, recording: Recording, from_row: bool) -> tuple[dict[str, Array], tuple[Unit, Unit]]:
+def _series(comparison: Comparison, recording: Recording, from_row: bool) -> tuple[dict[str, Array], tuple[Unit, Unit]]:
     """Return errors and drifts (n,) by their names, and the unit of errors of attitudes and rates, with its size or 0."""
-    case = found.case.take(slice(0, len(found.errors[0])))
+    case = comparison.case.take(slice(0, len(comparison.errors[0])))
     R, w = case.data
     unit = ("deg/s", float(np.degrees(case.scale))) if recording.degrees else ("rad/s", case.scale)
     units = Unit("rad", float(R is not None)), Unit(unit[0], unit[1] * (w is not None))
     series: dict[str, Array] = {
-        f"{name} error, {unit}": each * size
-        for name, (unit, size), each in zip(("attitude", "rate"), units, found.errors, strict=True)
+        f"{name} error, {unit}": error * size
+        for name, (unit, size), error in zip(("attitude", "rate"), units, comparison.errors, strict=True)
         if size
     }
     series |= _drifts(case, from_row)
@@ -315,10 +316,10 @@ def _series(found: Comparison, recording: Recording, from_row: bool) -> tuple[di
     return series, units
 
 
-def _instability(found: Comparison) -> list[str]:
-    """Return the note on energies that approach that of the intermediate axis."""
-    scene, w = found.case.scene, found.case.data[1]
-    if w is None or not scene.free or scene.body.rotor_momentum is not None or found.errors.max() <= FAR:
+def _instability(comparison: Comparison) -> list[str]:
+    """Return the note on energies that approach the energy of rotation about the intermediate axis."""
+    scene, w = comparison.case.scene, comparison.case.data[1]
+    if w is None or not scene.free or scene.body.rotor_momentum is not None or comparison.errors.max() <= FAR:
         return []
     J, L = np.sort(scene.body.moments), np.linalg.norm(scene.body.momentum(w), axis=1)
     gap = np.abs(kinetic_energy(scene.body, w) * 2 * J[1] / np.where(L == 0, math.inf, L) ** 2 - 1)
@@ -329,11 +330,13 @@ def _instability(found: Comparison) -> list[str]:
 def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
-    energy = None if case.scene.potential else find_energy(case.scene.invariants)  # rates alone determine that of a free body
+    energy = (
+        None if case.scene.potential else find_energy(case.scene.invariants)
+    )  # rates alone determine the energy of a free body
     for invariant in case.scene.invariants if w is not None else ():
         if w is not None and invariant.supplied is None and (R is not None or invariant is energy):
             R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R
             drift = Trajectory(case.scene, case.t, R_WB, w, "file").drift(invariant)
-            # The initial value is that at t = 0, and the field may have turned until the first row.
+            # The initial value is the value at t = 0, and the field may have turned until the first row.
             drifts[f"drift of {invariant.name}"] = sizes(drift - drift[0] if from_row else drift)
     return drifts

@@ -25,7 +25,13 @@ from .traced import trace
 
 WIDTH = 2 * FOUR if COMPILED else 1
 """Number of bodies in most kernels: two registers of most processors, so that these work on one while they wait for the other.
-Kernels that have no room for two use `REGISTER`."""
+Kernels whose numbers fill the registers of a processor already use `REGISTER`."""
+
+
+def _flatten(value):
+    """Return the numbers of a tuple of tuples, or of one number, as a list."""
+    return [x for part in value for x in _flatten(part)] if isinstance(value, tuple) else [value]
+
 
 if COMPILED:
     from llvmlite import ir
@@ -39,6 +45,9 @@ if COMPILED:
         unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
 
         def result_of(*kinds):
+            """Return the type of the result. None refuses the arguments: lanes go with lanes of their width and with numbers,
+            masks only with masks.
+            """
             widths = {kind.width for kind in kinds if isinstance(kind, first)}
             others = [kind for kind in kinds if not isinstance(kind, first)]
             fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
@@ -48,8 +57,8 @@ if COMPILED:
         type_callable(symbol)(lambda _: (lambda a: result_of(a)) if unary else (lambda a, b: result_of(a, b)))
 
         def lower(context, builder, sig, args):
-            # No flags: the function that is compiled says whether products may be fused.
-            numbers = (unpack(builder, *each, ()) for each in zip(sig.args, args, strict=True))
+            # No flags: the flags of the function that is being compiled decide whether products may be fused.
+            numbers = (unpack(builder, *typed, ()) for typed in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
 
         pairs = ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes))
@@ -97,10 +106,7 @@ if COMPILED:
             return types.UniTuple(kind, like.literal_value)
         if not isinstance(like, types.BaseTuple):
             return kind
-        return types.BaseTuple.from_types([_arrange(each, kind) for each in like], getattr(like, "instance_class", None))
-
-    def _flatten(value):
-        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
+        return types.BaseTuple.from_types([_arrange(part, kind) for part in like], getattr(like, "instance_class", None))
 
     @intrinsic(prefer_literal=True)
     def load(typing, array, index, width):
@@ -122,9 +128,9 @@ if COMPILED:
             at = args[1]
 
             def fill(part):
-                nonlocal at
+                nonlocal at  # the numbers of all parts follow each other
                 if isinstance(part, types.BaseTuple):
-                    return context.make_tuple(builder, part, [fill(each) for each in part])
+                    return context.make_tuple(builder, part, [fill(inner) for inner in part])
                 number, at = _read(context, builder, (sig.args[0], args[0]), at, kind), builder.add(at, args[2])
                 return number
 
@@ -165,7 +171,11 @@ if COMPILED:
         return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, len(at)), list(at)))
 
     def _transpose(builder, numbers):
-        """Return four registers, one per lane, from up to four registers of four, one per number."""
+        """Return four registers, one per lane, from up to four registers of four, one per number.
+
+        First a with b and c with d, the even lanes apart from the odd ones, then both pairs: eight shuffles. Missing
+        numbers leave parts without a value, which `save_columns` does not store.
+        """
         pick, nothing = partial(_pick, builder), ir.Constant(ir.VectorType(DOUBLE, FOUR), ir.Undefined)
         a, b, c, d = [*numbers] + [nothing] * (FOUR - len(numbers))
         ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
@@ -177,6 +187,7 @@ if COMPILED:
         """Store the numbers of each body one after the other: the first body at index, the next at index + stride."""
 
         def build(context, builder, sig, args):
+            # Four numbers of four bodies are transposed at a time, so that one instruction stores four numbers of a body.
             numbers = _flatten(unpack(builder, sig.args[3], args[3]))
             parts = range(0, numbers[0].width // len(numbers[0].registers), FOUR)
             fours = [[_pick(builder, x, x, range(i, i + FOUR)) for x in number.registers for i in parts] for number in numbers]
@@ -203,6 +214,7 @@ if COMPILED:
         def build(context, builder, sig, args):
             if a.width == floats_in_register(a.width):
                 return builder.extract_element(builder.extract_value(args[0], 0), args[1])
+            # Several registers: which of them is known only when the code runs, so the lane is read from memory.
             return builder.load(builder.gep(_copy(builder, args[0])[1], [args[1]]))
 
         return types.float64(a, types.intp), build
@@ -227,15 +239,12 @@ else:
     def _fill(like, numbers):
         if not isinstance(like, tuple):
             return float(next(numbers))
-        parts = [_fill(each, numbers) for each in like]
+        parts = [_fill(part, numbers) for part in like]
         return like._make(parts) if hasattr(like, "_make") else tuple(parts)
 
     def load_rows(array, index, stride, like, width):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Return the numbers at index, index + stride and so on: `like` of them, or arranged as the tuple `like`."""
         return _fill((0.0,) * like if isinstance(like, int) else like, iter(array[index::stride]))
-
-    def _flatten(value):
-        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
 
     def save(array, index, value):  # type: ignore[misc]  # the same name twice: one of them is defined
         """Store a number at index."""
@@ -265,7 +274,7 @@ def gather_numbers(values):
 
     def clear(value):
         if isinstance(value, tuple):
-            return tuple.__new__(type(value), map(clear, value))
+            return tuple.__new__(type(value), map(clear, value))  # for tuples and named tuples
         numbers.append(value)
         return 0.0
 
@@ -278,7 +287,7 @@ def cache_by_types(build):
 
     Named tuples of different types with equal numbers are equal, and fields of different types need code of their own.
     """
-    known = {}
+    built = {}
 
     def kinds(value):
         return (type(value), *map(kinds, value)) if isinstance(value, tuple) else type(value)
@@ -286,14 +295,15 @@ def cache_by_types(build):
     @wraps(build)
     def recall(like):
         key = kinds(like)
-        if key not in known:
-            known[key] = build(like)
-        return known[key]
+        if key not in built:
+            built[key] = build(like)
+        return built[key]
 
     return recall
 
 
 join = trace(traced.join)
+"""`traced.join` as kernels call it."""
 
 
 @trace

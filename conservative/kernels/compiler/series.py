@@ -53,7 +53,7 @@ if COMPILED:
         return builder.asm(ir.FunctionType(value.type, [value.type]), "", "=r,0", [value], False)
 
     class Memory:
-        """Registers like that of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
+        """Registers like the register of a number, on the stack of the function that is compiled, in places 0, 1, ..."""
 
         def __init__(self, number):
             self.builder, self._places, self.register = number.builder, {}, ir.VectorType(DOUBLE, number.width or FOUR)
@@ -158,8 +158,8 @@ def recall(terms, n, series):
     at = builder.add(start, builder.mul(builder.sub(number, ir.Constant(INTEGER, 1)), step))
     places = (builder.add(at, ir.Constant(INTEGER, 8 * 2 * FOUR * k)) for k in range(3))
     pointers = (builder.inttoptr(place, register.as_pointer()) for place in places)
-    found = [Symbol(builder, [builder.load(pointer, align=8 * FOUR)]) for pointer in pointers]
-    return tuple(v if series.one_body else Axes(*v.split()[:3]) for v in found)
+    vectors = [Symbol(builder, [builder.load(pointer, align=8 * FOUR)]) for pointer in pointers]
+    return tuple(v if series.one_body else Axes(*v.split()[:3]) for v in vectors)
 
 
 class Series:
@@ -228,7 +228,7 @@ class Series:
 
     def _add(self, total, pairs):
         if self.one_body:
-            return [add(each, *pair) for each, pair in zip(total, pairs, strict=True)]
+            return [add(term, *pair) for term, pair in zip(total, pairs, strict=True)]
         added = add(total[0], *pairs[0])
         return [added if len(pairs) == 1 else fuse(-pairs[1][0], pairs[1][1], added)]
 
@@ -259,19 +259,19 @@ class Series:
                     loaded[key] = memory.load_behind(key[0], byte)
             return gather(loaded[place - step, id(byte)] for place in first)
 
-        found = []
+        added = []
         for pairs, numbers in zip(sums, phis, strict=True):
             total = gather(Symbol(builder, [phi]) for phi in numbers)
-            found.append(self._add([total], [(read(x, i), read(y, j)) for x, y in pairs])[0])
+            added.append(self._add([total], [(read(x, i), read(y, j)) for x, y in pairs])[0])
         following = builder.add(i, memory.count_bytes(step))
         i.add_incoming(following, body)
-        for numbers, begin, total in zip(phis, starts, found, strict=True):
+        for numbers, begin, total in zip(phis, starts, added, strict=True):
             for phi, x, y in zip(numbers, begin, total if isinstance(total, Axes) else (total,), strict=True):
                 phi.add_incoming(x.registers[0], before)
                 phi.add_incoming(y.registers[0], body)
         builder.cbranch(builder.icmp_unsigned("<", following, end), body, after)
         builder.position_at_end(after)
-        return [[total] for total in found]
+        return [[total] for total in added]
 
 
 def add(c, a, b):
@@ -333,13 +333,13 @@ def sum_to_order(order, sums):
     """Return the tuple of numbers that `sums` yields for an order; it yields one for each order 1, 2, ... up to the highest."""
     sums = enumerate(sums, 1)
     if not isinstance(order, Traced):
-        return next(found for n, found in sums if n == order)
+        return next(number for n, number in sums if n == order)
     builder, exits = order.builder, []
     end = builder.append_basic_block("series_end")
-    for n, found in sums:
+    for n, number in sums:
         if n < LOWEST:
             continue
-        exits.append((builder.block, found))
+        exits.append((builder.block, number))
         if n == HIGHEST:
             builder.branch(end)
             break
@@ -351,7 +351,7 @@ def sum_to_order(order, sums):
     def merge(values):
         """Return the number, or tuple of numbers, of the exit that was taken."""
         if isinstance(values[0], tuple):
-            parts = [merge(each) for each in zip(*values, strict=True)]
+            parts = [merge(parts_of_exits) for parts_of_exits in zip(*values, strict=True)]
             return Axes(*parts) if isinstance(values[0], Axes) else tuple(parts)
         phis = [builder.phi(register.type) for register in values[0].registers]
         for (block, _), value in zip(exits, values, strict=True):
@@ -359,4 +359,4 @@ def sum_to_order(order, sums):
                 phi.add_incoming(register, block)
         return Symbol(builder, phis)
 
-    return merge([found for _, found in exits])
+    return merge([number for _, number in exits])

@@ -200,7 +200,7 @@ else:
             return None
         if isinstance(kind, types.BaseTuple):
             parts = cgutils.unpack_tuple(builder, value, len(kind))
-            numbers = [unpack(builder, *each, flags) for each in zip(kind, parts, strict=True)]
+            numbers = [unpack(builder, *typed, flags) for typed in zip(kind, parts, strict=True)]
             return kind.instance_class(*numbers) if isinstance(kind, types.BaseNamedTuple) else tuple(numbers)
         if isinstance(kind, Lanes | Mask):
             count = kind.width // floats_in_register(kind.width)
@@ -210,7 +210,7 @@ else:
     def pack(context, builder, kind, value):
         """Return the LLVM value of a numba type of a symbol, a constant or a tuple of them."""
         if isinstance(kind, types.BaseTuple):
-            parts = [pack(context, builder, *each) for each in zip(kind, value, strict=True)]
+            parts = [pack(context, builder, *typed) for typed in zip(kind, value, strict=True)]
             return context.make_tuple(builder, kind, parts)
         if value is None:
             return context.get_dummy_value()
@@ -229,7 +229,7 @@ else:
             return types.none
         if isinstance(value, tuple):
             named = type(value) if hasattr(value, "_fields") else None
-            return types.BaseTuple.from_types([type_of(each) for each in value], named)
+            return types.BaseTuple.from_types([type_of(part) for part in value], named)
         if not isinstance(value, Symbol):
             return types.boolean if isinstance(value, bool) else types.int64 if isinstance(value, int) else types.float64
         kind = value.registers[0].type
@@ -244,7 +244,7 @@ else:
         arguments = [context.get_value_type(kind) for kind in kinds]
         whole = ir.Function(ir.Module(), ir.FunctionType(INDEX, arguments), "trial")
         builder = ir.IRBuilder(whole.append_basic_block())
-        return type_of(function(*(unpack(builder, *each) for each in zip(kinds, whole.args, strict=True))))
+        return type_of(function(*(unpack(builder, *typed) for typed in zip(kinds, whole.args, strict=True))))
 
     def trace(function):
         """Register a function with numba and return it unchanged."""
@@ -262,7 +262,7 @@ else:
 
         @lower_builtin(function, types.VarArg(types.Any))
         def build(context, builder, signature, arguments):
-            numbers = (unpack(builder, *each) for each in zip(signature.args, arguments, strict=True))
+            numbers = (unpack(builder, *typed) for typed in zip(signature.args, arguments, strict=True))
             return pack(context, builder, signature.return_type, function(*numbers))
 
         return function

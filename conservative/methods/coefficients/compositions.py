@@ -44,8 +44,8 @@ class Composition(NamedTuple):
 
 
 COMPOSITIONS = {
-    each.order: each
-    for each in (
+    composition.order: composition
+    for composition in (
         Composition(2, "the step itself", "1"),
         Composition(
             4,

@@ -1,9 +1,9 @@
 """Explicit Runge-Kutta methods: a tableau and an order each. Tests check the order conditions.
 
-Three steppers take them, for three paths of data. `kernels.projected.take_step` skips the zeros of `packed`, of which
+Three steppers use them, one for each path of data. `kernels.projected.take_step` skips the zeros of `packed`, of which
 `DORMAND_PRINCE_8` has 20 among 78 coefficients. `kernels.textbook.runge_kutta_step` turns the body by exponentials, because
-rotations do not add up. The search for integrators in `benchmarks/verification/mistakes/steps.py` steps many
-states at once by any slope.
+rotations cannot be added. The search for integrators in `benchmarks/verification/mistakes/steps.py` steps many
+states at once, with any equations.
 """
 
 from __future__ import annotations

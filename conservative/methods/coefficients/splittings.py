@@ -39,8 +39,8 @@ class Sequence(NamedTuple):
 
 
 SEQUENCES = {
-    each.order: each
-    for each in (
+    sequence.order: sequence
+    for sequence in (
         Sequence(
             4,
             "Blanes & Moan 2002, SRKN6b",
@@ -57,8 +57,8 @@ SEQUENCES = {
         ),
     )
 }
-"""Sequences by order. Their errors on random bodies are below a twentieth (order 4) and a thousandth (order 6) of those of the
-composition with the same step."""
+"""Sequences by order. Their errors on random bodies are below a twentieth (order 4) and a thousandth (order 6) of the errors
+of the composition with the same step."""
 
 
 def lengths_of(order: int, exact: bool) -> Lengths:

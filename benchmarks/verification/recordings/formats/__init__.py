@@ -30,17 +30,17 @@ FORMATS = (
 """The families; the first one that returns a table counts."""
 GONE = {b"PAR1": ".parquet", b"\x1f\x8b": ".gz", b"stk.v": ".a", b"CCSDS_AEM_VERS": ".aem"}
 """Beginnings of files in formats that are gone, and their endings."""
-ENDINGS = (*(ending for each in FORMATS for ending in each.endings), *GONE.values())
+ENDINGS = (*(ending for form in FORMATS for ending in form.endings), *GONE.values())
 """Endings of recordings in folders. A file in a format that is gone is refused there, and not left out."""
 
 
 def open_table(path: Path) -> Table:
     """Return the table of a file. Raises `BadInput` for a file without one."""
-    start = Start(path, ", ".join(f"{each.name} ({each.endings[0]})" for each in FORMATS))
+    start = Start(path, ", ".join(f"{form.name} ({form.endings[0]})" for form in FORMATS))
     for beginning, ending in GONE.items():
         if start.head.startswith(beginning):
             raise BadInput("run", f"{path}, of the format {ending}", REMOVED[ending])
-    for each in FORMATS:
-        if (table := each.read(start)) is not None:
+    for form in FORMATS:
+        if (table := form.read(start)) is not None:
             return table
     raise start.fail("it has no row of numbers" if any(line.strip() for line in start.lines) else "it is empty")

@@ -22,7 +22,7 @@ def read(start: Start) -> Table | None:
         header = words(line.lstrip("#% "), separator)
         if len(header) == len(fields) + (line.lstrip().startswith(("#", "%")) and header[:1] == [""]):
             units = [word.strip("()[] ").lower() for word in header]
-            if not names and len(before) > 1 and all(each in UNITS or len(each) < 2 for each in units):
+            if not names and len(before) > 1 and all(unit in UNITS or len(unit) < 2 for unit in units):
                 names = [f" ({unit})" if unit not in ("", "-") else "" for unit in units]  # a line of units below the names
                 continue
             names = [word + unit for word, unit in zip(header, names or [""] * len(header), strict=True)]

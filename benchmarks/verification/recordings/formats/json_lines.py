@@ -44,7 +44,7 @@ def _record(start: Start, line: str) -> dict[str, Any]:
 
 
 def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Return a JSON object with names such as angular_velocity.x for nested ones."""
+    """Return the values of a JSON object by name. A nested value has a name such as angular_velocity.x, or q.0 in a list."""
     out: dict[str, Any] = {}
     for name, value in record.items():
         parts = dict(enumerate(value)) if isinstance(value, list) else value if isinstance(value, dict) else None
@@ -53,7 +53,8 @@ def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def _number(value: Any) -> float:
+    """Return a value as a number: NaN for a gap, whose row is left out, and infinity for other values, which are refused."""
     try:
         return math.nan if value is None else math.inf if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
-        return math.inf  # not a gap
+        return math.inf

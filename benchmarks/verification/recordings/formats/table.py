@@ -102,7 +102,7 @@ class Start:
 
 
 def words(line: str, separator: str | None) -> list[str]:
-    """Return the fields of a line; a separator in quotation marks is none."""
+    """Return the fields of a line; a separator in quotation marks does not separate."""
     if '"' in line and separator is not None:
         line = re.sub(r'"([^"]*)"', lambda match: match[1].replace(separator, " "), line)
     return [word.strip().strip('"').strip() for word in line.strip("\r\n").split(separator)]
