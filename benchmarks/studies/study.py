@@ -31,7 +31,7 @@ MOST_TRUTHS = 32
 HANG_LIMIT = 60.0
 """Shortest time limit of a run, s: a first run may compile."""
 ENGINE_LIMIT = 180.0
-"""The same of an engine in an environment of its own: importing and compiling it can take more than a minute."""
+"""Shortest time limit, s, of an engine in an environment of its own: importing and compiling it can take a minute."""
 HANG_FACTOR = 10.0
 """Ratio of the time limit of a run to the time budget."""
 SLOW_FACTOR = 100.0

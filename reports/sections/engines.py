@@ -27,9 +27,9 @@ from ..rows.names import ABSENT, at_own_step, of_measure, of_study, outcomes, wi
 from .measured import Measured, of_scene
 from .provenance import lock_sections
 
-STUDIES = tuple(each.STUDY.name for each in (paper, convergence, speed, work_precision))
+STUDIES = tuple(study.STUDY.name for study in (paper, convergence, speed, work_precision))
 WORSE = "worse with smaller steps"
-"""Said of an order that does not exist, because the error increases as steps get shorter."""
+"""Text in place of an order: the error increases as steps get shorter."""
 SAME_MOTION = 1.0
 """Largest attitude error, rad, of a run that is compared by its time. A run with a larger error is another motion."""
 USABLE = 0.1
@@ -181,7 +181,7 @@ def _versions(measured: Measured) -> Table:
 def engine_rows(measured: Measured, scene: str) -> list[EngineRow]:
     """Return the measurements of engines on a scene, accurate ones first, those that did not run last."""
     accuracy, times, over_steps = (
-        of_study(measured.engine_rows, each.STUDY.name, scene) for each in (paper, speed, convergence)
+        of_study(measured.engine_rows, study.STUDY.name, scene) for study in (paper, speed, convergence)
     )
     at_step, points = pd.concat([at_own_step(accuracy), times]), of_scene(measured.points, scene)
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}

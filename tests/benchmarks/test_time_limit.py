@@ -186,8 +186,6 @@ def test_the_limits_of_a_study():
     limits = {quick: Study("speed", (SCENE,), (cv.Reduced(),), quick) for quick in (False, True)}
     assert (limits[False].longest_run, limits[True].longest_run) == (0.6, 0.15)
     assert limits[False].hang_limit == 60.0
-    assert limits[False].limit_of(registry.method("pinocchio")) == 60.0
-    assert limits[False].limit_of(registry.engine("exudyn")()) == 180.0
     given = Study("speed", (SCENE,), (cv.Reduced(),), time_limit=10.0)
     assert (given.longest_run, given.hang_limit) == (10.0, 100.0)
 

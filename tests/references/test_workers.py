@@ -279,6 +279,11 @@ def test_a_crash_or_a_hang_is_a_row(name, do):
         assert any(row.measure is Measure.TIME and row.outcome.ok and row.value > 0 for row in measured if row.method == method)
 
 
+def test_an_engine_in_its_environment_has_time_to_compile():
+    planned = Study("speed", (SCENE,), (Trial(),))
+    assert [planned.limit_of(method) for method in (Trial(), registry.method("pinocchio"))] == [180.0, 60.0]
+
+
 def test_a_run_that_crashes_while_it_is_timed_is_marked():
     runs = {do: Trial(do).prepare(SCENE, grid_for(SCENE, 0.01)) for do in ("integrate", "abort")}
     timings = time_interleaved(runs, rounds=3, min_time=1e-3)
