@@ -47,6 +47,7 @@ def make_fields(strength=1.0):
     return {
         "gravity": cv.UniformGravity(3.1 * strength, POINT),
         "spring": cv.LinearSpring(3.0 * strength, POINT, ANCHOR, 0.4),
+        "spring about its length": cv.LinearSpring(3.0 * strength, POINT, ANCHOR, 2.3),  # 1.75 to 2.83 m long
         "spring of no length": cv.LinearSpring(3.0 * strength, POINT, ANCHOR),
         "spring on an axis": cv.LinearSpring(3.0 * strength, TURN[:, 0] * 0.5, ANCHOR, 0.4),
         "spring at the pivot": cv.LinearSpring(3.0 * strength, POINT, (0, 0, 0), 0.4),

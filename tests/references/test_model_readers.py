@@ -278,6 +278,10 @@ USD = {
         usda(MASS.format(12e3) + cube(), units="metersPerUnit = 0.01\n kilogramsPerUnit = 0.001"),
         Piece(12.0, np.zeros(3), ONE * 12 * 1e-4 / 6),
     ),
+    "a density in centimetres": (
+        usda(DENSITY.format(5e-4) + cube(), units="metersPerUnit = 0.01"),
+        Piece(5e-4, np.zeros(3), ONE * 5e-4 * 1e-4 / 6),
+    ),
     "a collider of a body below that is not enabled": (
         usda(DENSITY.format(500) + cube() + BELOW),
         Piece(1000.0, np.array([1.0, 0, 0]), ONE * 500 / 3 + np.diag([0, 1000, 1000])),

@@ -8,6 +8,7 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
+from click import Option
 from click.testing import CliRunner
 
 from conservative.benchmarks.versions import project, version
@@ -156,11 +157,16 @@ def test_options_of_a_baseline_do_not_go_with_two_versions(gate, options):
     assert "cannot be used with --against" in text
 
 
-@pytest.mark.parametrize(
-    "options", [("--scenes", "brick_flip"), ("--html", "page.html"), ("--project", "."), ("--with", "numpy")]
-)
-def test_options_of_two_versions_need_two(gate, options):
-    code, text = gate(*options)
+ALONE = {"--against", "--baseline", "--update", "--force", "--csv", "--json", "--markdown", "--html", "--junit"}
+"""Options of the gate that go with a baseline, and formats of output."""
+VALUES = {"--processes": "3", "--find-links": "."}
+OF_TWO = [option.opts[0] for option in main.commands["gate"].params if isinstance(option, Option) and not option.hidden]
+
+
+@pytest.mark.parametrize("option", [option for option in OF_TWO if option not in ALONE] + ["--html", "--junit"])
+def test_options_of_two_versions_need_two(gate, option):
+    flag = next(param for param in main.commands["gate"].params if option in param.opts).is_flag
+    code, text = gate(option, *([] if flag else [VALUES.get(option, "name")]))
     assert code == 2
     assert "needs --against" in text
 

@@ -70,7 +70,7 @@ def test_the_folder_has_every_format_and_is_replaced_by_the_same_command_only(tm
     done, _ = verify(tmp_path, late(), "--out", out)
     assert done.exit_code == 1
     text = " ".join(done.stdout.split())
-    assert "; its largest error is 0.0047 deg/s; " in text
+    assert "; its largest error is 4.7e-3 deg/s; " in text
     assert "run.csv is wrong: constant time shift: the file is +0.0005 s ahead of the exact motion after its first row" in text
     assert sorted(path.name for path in out.iterdir()) == ["errors.csv", "errors.svg", "verify.csv", "verify.json", "verify.md"]
     table = pd.read_csv(out / "errors.csv")

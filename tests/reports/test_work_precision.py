@@ -53,7 +53,7 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
 
 def test_errors_below_the_resolution_of_the_reference_are_raised_to_it():
     def agreement(detail):
-        return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
+        return [row("paper", "truth", Measure.AGREEMENT, size, role="truth", detail=detail) for size in (1e-7, 1e-5)]
 
     checked = points(table(*OURS, *ENGINE, agreement(APPROXIMATE)))
     assert [c.error for c in speed_ratios(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
