@@ -1,4 +1,4 @@
-"""What a run costs in a new process: the error of both sides, and the rows of measured.csv."""
+"""Cost of a run in a new process: the error of both sides, and the rows of measured.csv."""
 
 import sys
 

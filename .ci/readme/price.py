@@ -1,4 +1,4 @@
-"""What a run to 1e-6 rad costs in a new process, with imports, search and compilation, on random bodies of all fields.
+"""Cost of a run to 1e-6 rad in a new process, with imports, search and compilation, on random bodies of all fields.
 
 Ours is `integrate(scene, error=1e-6)`, with a full cache of compiled kernels. heyoka is built with base vectors and the numbers
 of a body as parameters, at a tolerance with which its errors on these bodies are below 1e-6 rad. NumPy and this project's text

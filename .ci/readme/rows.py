@@ -41,7 +41,7 @@ MOVING = {
 }
 """The motions of README's first picture, and the most accurate setting of an engine in it."""
 SEED = 1004
-"""Of the random bodies; fixed before the run, and never used before."""
+"""Seed of the random bodies, fixed before the run and never used before."""
 METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
 LONGER = "brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8"
 COMMANDS = {

@@ -19,7 +19,7 @@ MISSING = "missing"
 
 @dataclass(frozen=True)
 class Decision:
-    """What the gate decided: violations (changes that are not allowed), notes, and the number of compared rows."""
+    """The decision of the gate: violations (changes that are not allowed), notes, and the number of compared rows."""
 
     violations: tuple[Change, ...]
     notes: tuple[str, ...]

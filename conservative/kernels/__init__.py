@@ -65,7 +65,7 @@ CACHED = COMPILED and _can_cache()
 def _alone(place: Path) -> Iterator[None]:
     """Wait until no other process is in a block with this file, which exists during the block only.
 
-    Where files cannot be locked nobody waits.
+    On systems without file locks, processes do not wait for each other.
     """
     try:
         place.touch()

@@ -62,7 +62,7 @@ class Face(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """What is drawn of a body, in principal axes.
+    """The solid that is drawn for a body, in principal axes.
 
     Attributes
     ----------

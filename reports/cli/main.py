@@ -81,7 +81,7 @@ conservative verify run.csv --body my_body.toml  is a recorded motion right, and
 conservative report                              compare methods and engines: a page, in a minute or two
 conservative new > my_body.toml                  describe your own body; every command accepts this file
 conservative --help                              all commands"""
-"""What to do first, for a user who types only the name of the command."""
+"""First steps, for a user who types only the name of the command."""
 
 
 @click.group(

@@ -103,7 +103,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
 
 
 def paper_table(table: pd.DataFrame, points: Mapping[str, pd.DataFrame], scenes: Iterable[Scene]) -> Table:
-    """Return the error, drift, order and time of each scheme, for a paper: by scene and name, whoever wrote the scheme.
+    """Return the error, drift, order and time of each scheme, for a paper, sorted by scene and name, without regard to authors.
 
     A scheme that failed has the outcome in place of its error.
     """

@@ -1,4 +1,4 @@
-"""What studies time of an engine against the shortest correct script that a user would write, and the ratio of their times.
+"""The timed call of an engine, compared with the shortest correct script of a user, and the ratio of their times.
 
 The scripts are independent of the adapters. Each body is the brick, in principal axes, and a run is one step, or what
 an adaptive solver needs for `SHORT` s. Both sides are prepared `COPIES` times, because the place of data in memory makes a

@@ -81,7 +81,7 @@ def test_the_table_for_a_paper_has_error_drift_order_and_time_of_each_scheme(mad
     rows = [[cell.strip(" \\") for cell in line.split("&")] for line in text.splitlines() if line.endswith("\\")]
     assert rows[0][0] == "scheme"
     names = [row[0] for row in rows[1:]]
-    assert names == sorted(names)  # by name, whoever wrote the scheme
+    assert names == sorted(names)  # without regard to authors
     value = lambda cell: float(cell.strip("$").replace(r"\times10^{", "e").replace("10^{", "1e").strip("}"))  # noqa: E731
     reduced, mujoco = ({row[0]: row for row in rows}[name] for name in ("reduced", "mujoco RK4"))
     own = table[(table["study"] == "paper") & (table["method"] == "reduced") & (table["dt"] == 0.01)]

@@ -29,8 +29,8 @@ def speed_ratio(error, *groups):
 
 
 def test_the_cheapest_of_several_lines_counts():
-    dear = (point("dear", "ours", 1e-4, 5.0), point("dearer", "engine", 1e-4, 90.0))
-    found = speed_ratio(1e-4, *OURS, *ENGINE, *dear)
+    expensive = (point("expensive", "ours", 1e-4, 5.0), point("more expensive", "engine", 1e-4, 90.0))
+    found = speed_ratio(1e-4, *OURS, *ENGINE, *expensive)
     assert found.ours == Cheapest(4.0, "ours", (4.0,))
     assert found.theirs.name == "engine"
 
