@@ -98,7 +98,11 @@ LISTS = ("only", "pairs", "engines")
 @click.option("--from", "start_time", type=float, metavar="S", help="Recordings: time of the first row to compare, s.")
 @click.option("--until", "end_time", type=float, metavar="S", help="Recordings: time of the last row to compare, s.")
 @error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: from digits and noise]")
-@names_option("only", "Checks to run: motions, order, repeatability, pairs, protocol, times.  [default: all]", "CHECKS")
+@names_option(
+    "only",
+    "Methods, engines, programs: motions, order, repeatability, pairs, and for programs protocol, times.  [default: all]",
+    "CHECKS",
+)
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
 @click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
 @names_option(

@@ -75,6 +75,13 @@ def test_a_lucky_zero_is_not_a_floor():
     assert observed_order(STEPS, errors).slope == pytest.approx(4, rel=1e-9)
 
 
+def test_of_two_sequences_of_equal_slopes_the_finer_one_has_the_order():
+    errors = np.where(STEPS[4] > STEPS, STEPS**2, STEPS**3 / STEPS[4])
+    order = observed_order(STEPS, errors)
+    assert order.slope == pytest.approx(2, rel=1e-12)
+    assert order.used == (4, 5, 6, 7, 8)
+
+
 def test_order_of_the_input_and_failed_runs_do_not_matter():
     errors = noisy(STEPS**2, 0.05, 1)
     errors[3] = math.nan

@@ -133,6 +133,13 @@ def test_pieces_cover_the_run_once_and_fill_every_sample_once(seed):
     assert sum(piece.n for piece in pieces if piece.whole) <= n
 
 
+def test_a_break_is_moved_to_a_step_by_round_off_only():
+    """It divides a step if it is a ten-millionth of its time away, and not if it is at it: 0.3 / 0.1 is 3 but for round-off."""
+    for share, divided in ((1e-7, True), (-1e-7, True), (0.0, False)):
+        pieces = list_pieces(cv.Grid(0.1, 10), np.array([0.3 * (1 + share)]))
+        assert (not all(piece.whole for piece in pieces)) is divided
+
+
 def test_a_table_of_thousands_of_rows_is_integrated_at_any_step():
     random, n = np.random.default_rng(4), 600
     times, walk = np.linspace(0, 1.2, n), np.cumsum(random.normal(size=(n, 3)), axis=0)

@@ -316,6 +316,14 @@ def test_axial_momentum_is_that_of_the_bodies_that_have_one():
         assert "axial momentum" in require_drifts(read_bodies(scene(body=symmetric), *starts(FIVE), own, None))
 
 
+def test_a_body_with_its_own_field_is_symmetric_only_if_its_field_is():
+    potential = cv.UniformGravity(3.0, (0, 0, 0.3))
+    com_B = np.outer(np.arange(1, 6), (0, 0, 0.1))
+    com_B[2, 0] = 0.1
+    bodies = read_bodies(scene(potential, body=cv.RigidBody((1.0, 1.0, 2.0))), *starts(FIVE), None, {"com_B": com_B})
+    assert np.isfinite(bodies.symmetry_axes_B).all(axis=1).tolist() == [True, True, False, True, True]
+
+
 def test_invariants_of_the_scene_itself_count_where_all_have_its_body():
     extra = Invariant("first momentum", "kg m^2/s", 2.0, lambda R, w: momentum_W(BODY, R, w)[..., 0])
     with_extra = scene(extra_invariants=(extra,))

@@ -88,6 +88,8 @@ def test_the_table_has_every_line_and_at_how_many_bodies():
     assert ["heavy tops", "taylor, one at a time"] in [row[:2] for row in rows]
     (heyoka,) = [row for row in rows if row[:2] == ["heavy tops", "heyoka"]]
     assert heyoka[5:7] == ["8 (10)", "20 (10)"]
+    (taylor,) = [row for row in rows if row[:2] == ["heavy tops", "taylor"]]
+    assert taylor[5:7] == ["1 (1,000)", "20 (1,000)"]
     assert {row[2] for row in rows} == {
         "our general integrators",
         "our solutions of integrable motions",

@@ -109,7 +109,9 @@ def test_errors_of_times_lie_along_the_motion():
 def test_single_rows_are_two_in_a_hundred(rows, cause):
     w = W.copy()
     w[10 :: 500 // rows][:rows] += 0.1 * AXIS
-    assert verify(None, w).findings[0].mistake == cause
+    found = verify(None, w).findings[0]
+    assert found.mistake == cause
+    assert [(each.numbers["row"], each.numbers["time"]) for each in found.causes] == [(11, T[10])] * bool(cause)
 
 
 @pytest.mark.parametrize(("turn", "expected"), [(1.45, "right"), (2.0, "undecided")])
