@@ -456,8 +456,11 @@ def test_a_part_is_right_or_refused(cell: Cell, column: Any) -> None:
     check(cell, column, column not in NEVER)
 
 
+SCENES = {feature: ROWS[feature].scene() for feature in Feature}
+
+
 def supported(method: str, feature: Feature) -> bool:
-    return registry.method(method).unsupported(ROWS[feature].scene()) is None
+    return registry.method(method).unsupported(SCENES[feature]) is None
 
 
 @pytest.mark.parametrize("method", METHODS)
