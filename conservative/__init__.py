@@ -26,7 +26,8 @@ def __getattr__(name: str) -> object:
 
     with unstoppable():
         if name in FORMER:
-            raise AttributeError(f"{__name__}.{name} has another name now: {__name__}.{FORMER[name]}")
+            message = f"{__name__}.{name} has another name now: {__name__}.{FORMER[name]}"
+            raise ImportError(message, name=__name__)  # `from conservative import Need` would replace an AttributeError
         if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
             return import_module(f"{__name__}.{name}")
         if name == "verification":  # of a package above the core, which the core cannot import

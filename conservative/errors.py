@@ -70,9 +70,14 @@ REMOVED: Mapping[str, str] = MappingProxyType(
         "study engines_over_steps": "Run: conservative study convergence --engines NAMES for orders, or "
         "conservative study work_precision --engines NAMES for times",
         "to_xarray": "to_pandas(), which returns the same samples as a table",
+        **{"needs": "features", "takes": "supports", "card": "method_info"},
     }
 )
 """Removals since the last release, and what to use instead: endings of files, options, studies, and attributes."""
+
+
+CONVERTED: Mapping[str, str] = MappingProxyType({".mp4": ".gif", ".pdf": ".svg"})
+"""Endings of the files from which files of removed endings can be made. The advice helps where those can be written."""
 
 
 class RemovedAttribute:

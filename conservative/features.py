@@ -71,7 +71,7 @@ def features_of(part: Any) -> Features:
 
 @lru_cache(maxsize=256)
 def lacking(supports: Features, features: Features, why: str = "") -> str:
-    """Return the reason why a scene with these needs is not supported, and the methods and engines that support it.
+    """Return the reason why a scene with these features is not supported, and the methods and engines that support it.
 
     `why` is what the method itself says about it.
     """

@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from .errors import REMOVED, BadInput, NotWritten
+from .errors import CONVERTED, REMOVED, BadInput, NotWritten
 from .posix import NO_LOCK, lock, release
 
 _AGE = 7 * 86400.0
@@ -64,9 +64,12 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
 
 def require_ending(argument: str, path: Path, endings: Iterable[str]) -> None:
     """Raise `BadInput` for the name of a file with another ending. For a format that is gone, it says what to do instead."""
-    if path.suffix not in endings:
-        instead = f". Instead of {path.suffix}: {REMOVED[path.suffix]}" if path.suffix in REMOVED else ""
-        raise BadInput(argument, repr(str(path)), f"a file that ends in {', '.join(endings)}{instead}")
+    allowed = list(endings)
+    if path.suffix not in allowed:
+        suffix = path.suffix.lower()
+        helps = suffix in REMOVED and (suffix not in CONVERTED or CONVERTED[suffix] in allowed)
+        instead = f". Instead of {suffix}: {REMOVED[suffix]}" if helps else ""
+        raise BadInput(argument, repr(str(path)), f"a file that ends in {', '.join(allowed)}{instead}")
 
 
 def open_file(path: Path) -> BinaryIO:

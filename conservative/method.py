@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from .drifts import drifts_of
-from .errors import InvalidResult, Unsupported
+from .errors import InvalidResult, RemovedAttribute, Unsupported
 from .features import Features, lacking
 from .grid import Grid, grid_for
 from .invariants import AXIAL_MOMENTUM
@@ -84,6 +84,7 @@ class Method(ABC):
     family: ClassVar[str]
     role: ClassVar[Role]
     method_info: ClassVar[MethodInfo] = MethodInfo()
+    takes, card = RemovedAttribute(), RemovedAttribute()
     if TYPE_CHECKING:
         __dataclass_fields__: ClassVar[dict[str, Any]]  # subclasses are dataclasses
 
@@ -236,8 +237,10 @@ class Method(ABC):
         """
         return call_with_settings(cls, f"method {cls.family}", settings, cls.method_info.removed)
 
-    def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
+    def run(self, scene: Scene, dt: float | None = None, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
         """Return the trajectory with step size dt to t_end, s, whatever its outcome. `integrate` raises exceptions instead.
+
+        Both are by default the scene's.
 
         Raises
         ------

@@ -26,7 +26,7 @@ from .check import (
     rotation,
     set_fields,
 )
-from .errors import BadInput
+from .errors import BadInput, RemovedAttribute
 from .features import LOADS, Feature, Features, features_of
 from .flight import Flight, read_flight
 from .identity import NOT_OF_MOTION, Identity, equal_to_nothing, identify
@@ -169,6 +169,8 @@ class Scene(PickledByFields):
         if self.features:
             require_size(body.inertia)
         self._call_loads()
+
+    needs = RemovedAttribute()
 
     @cached_property
     def features(self) -> Features:

@@ -162,7 +162,7 @@ def integrate_corners(cell: Cell) -> None:
         many = cv.integrate_many(scene, w_WB_B0=row.starts[:2], dt=case.t_end / STEPS, method=method, threads=1)
     assert row.distance(alone.t, alone.R_WB) < 1e-4
     assert row.distance(between.t, between.R_WB) < 1e-4
-    check_many(row, many)
+    check_many(row, many, 2)
 
 
 def integrate_error(cell: Cell) -> None:
@@ -200,9 +200,10 @@ def truth(cell: Cell) -> None:
     assert found.agreement_rad < 1e-9
 
 
-def check_many(row: Row, found: cv.Ensemble) -> None:
+def check_many(row: Row, found: cv.Ensemble, n: int | None = None) -> None:
+    """Fail unless the first n of the row's starts, by default all, have the right motions."""
     assert not found.failures
-    for case, R_WB in zip(row.started, found.R_WB, strict=False):
+    for case, R_WB in zip(row.started[:n], found.R_WB, strict=True):
         assert angle_between(right_motion(case, found.t)[0], np.asarray(R_WB)).max() < RIGHT
 
 

@@ -57,6 +57,8 @@ def _can_cache() -> bool:
     return True
 
 
+PATIENCE = 60.0
+"""Time for which a process waits until another one has compiled a kernel, s. Compiling takes 1 to 11 s."""
 CACHED = COMPILED and _can_cache()
 """True if compiled code is stored for the next process."""
 
@@ -65,11 +67,13 @@ CACHED = COMPILED and _can_cache()
 def _alone(place: Path) -> Iterator[None]:
     """Wait until no other process is in a block with this file, which exists during the block only.
 
-    On systems without file locks, processes do not wait for each other.
+    On systems without file locks, processes do not wait for each other. They wait for `PATIENCE` at most: the other process may
+    be stopped, and what is written twice is the same.
     """
+    end = time.monotonic() + PATIENCE
     try:
         place.touch()
-        while (handle := lock(place)) is None:
+        while (handle := lock(place)) is None and time.monotonic() < end:
             time.sleep(0.01)
             place.touch()  # the other process removes it
     except OSError:
@@ -77,9 +81,10 @@ def _alone(place: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):
-            place.unlink()
-        release(handle)
+        if handle is not None:
+            with suppress(OSError):
+                place.unlink()
+            release(handle)
 
 
 def _compile(function: Any, **options: Any) -> Any:

@@ -30,7 +30,7 @@ from conservative.scene import Scene
 from ..engine import EngineRun, load, principal_axes, unsupported_reason, version
 from .environment import KINDS
 from .kind import Distribution
-from .plain_numbers import FIELDS, NEEDS, describe, read_many, read_one, take_axes
+from .plain_numbers import FEATURES, FIELDS, describe, read_many, read_one, take_axes
 
 
 @dataclass(frozen=True)
@@ -150,9 +150,11 @@ class AdapterMethod(Method):
         super().__init_subclass__()
         if "adapter" not in vars(cls):
             return
+        if "card" in cls.adapter.ENGINE:
+            raise TypeError(f"ENGINE of {cls.adapter.__file__} has the former name `card`. Write: method_info")
         cls.family, cls.data = cls.adapter.__name__.rpartition(".")[2], EngineData(**cls.adapter.ENGINE)
         method_info, flags = cls.data.method_info, {"flight": Feature.FLIGHT, "rotors": Feature.ROTOR}
-        supports = {feature for kind in FIELDS if kind.__name__ in cls.data.fields for feature in NEEDS[kind]}
+        supports = {feature for kind in FIELDS if kind.__name__ in cls.data.fields for feature in FEATURES[kind]}
         supports |= {feature for word, feature in flags.items() if method_info.get(word)}
         cls.method_info = MethodInfo(
             **{name: value for name, value in method_info.items() if name not in flags}, supports=frozenset(supports)

@@ -44,7 +44,8 @@ class Pip(EnvironmentKind):
         python = interpreter_of(folder)
         run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
         options = ("--quiet", "--require-hashes", "--python", python)
-        run_uv("pip", "sync", *options, *source.options, folder / self.lock_file)
+        lines = "" if source.find_links is None else requirements_in(lock.text)
+        run_uv("pip", "sync", *options, *source.options, "-" if lines else folder / self.lock_file, stdin=lines)
         packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
         ask = [str(python), "-I", "-c", "import platform; print('Python', platform.python_version())"]
         return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip(), packages
@@ -76,7 +77,23 @@ def interpreter_of(folder: Path) -> Path:
 
 def versions_in(lock: str) -> dict[str, str]:
     """Return the versions of all packages in the text of a lock, by their normal names."""
-    return {package["name"]: package["version"] for package in tomllib.loads(lock)["packages"]}
+    return {package["name"]: package.get("version", "") for package in tomllib.loads(lock)["packages"]}
+
+
+def requirements_in(lock: str) -> str:
+    """Return the packages of a lock with their hashes as requirements, which a folder of wheels can satisfy without a network.
+
+    A lock has the addresses from which its packages came. Empty if one of them has no version or no hash.
+    """
+    lines = []
+    for package in tomllib.loads(lock)["packages"]:
+        files = [*package.get("wheels", ()), *(package[kind] for kind in ("sdist", "archive") if kind in package)]
+        hashes = sorted({f"--hash={kind}:{value}" for file in files for kind, value in file.get("hashes", {}).items()})
+        if not hashes or "version" not in package:
+            return ""
+        marker = f" ; {package['marker']}" if "marker" in package else ""
+        lines.append(f"{package['name']}=={package['version']}{marker} {' '.join(hashes)}\n")
+    return "".join(lines)
 
 
 def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source: Source) -> Lock:

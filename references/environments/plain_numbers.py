@@ -37,8 +37,10 @@ FIELDS: dict[Any, tuple[str, ...]] = {
 }
 """Fields that the numbers describe, and names of the numbers in their `kernel_field`. Uniform gravity is in the mass model."""
 
-NEEDS: dict[Any, Features] = {kind: frozenset({Feature.TURNING}) if kind is Turning else features_of(kind) for kind in FIELDS}
-"""Needs of these fields."""
+FEATURES: dict[Any, Features] = {
+    kind: frozenset({Feature.TURNING}) if kind is Turning else features_of(kind) for kind in FIELDS
+}
+"""Features of these fields."""
 
 
 def describe_field(axes: EngineAxes) -> dict[str, Any]:

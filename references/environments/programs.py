@@ -103,9 +103,9 @@ _COMMAND = "an executable or a command line"
 
 def _check_description(engine: dict[str, Any]) -> None:
     """Raise `ValueError` for a field of another kind. Unknown fields are found where they are used."""
-    method_info = engine.get("method_info")
-    for name, value in [*engine.items(), *(method_info.items() if isinstance(method_info, dict) else ())]:
-        is_right, expected = DESCRIPTION.get(name, (lambda value: True, ""))
+    infos = [engine[name] for name in ("method_info", "card") if isinstance(engine.get(name), dict)]
+    for name, value in [*engine.items(), *(item for info in infos for item in info.items())]:
+        is_right, expected = DESCRIPTION.get(FORMER.get(name, name), (lambda value: True, ""))
         if not is_right(value):
             raise ValueError(f"`{name}` is {describe(value)}; expected {expected}")
 
@@ -118,9 +118,9 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)
-        engine = {FORMER.get(name, name): value for name, value in greeting.get("engine", {}).items()}
+        engine = greeting.get("engine", {})
         _check_description(engine)
-        module.ENGINE = {**every, **engine}
+        module.ENGINE = {**every, **{FORMER.get(name, name): value for name, value in engine.items()}}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)

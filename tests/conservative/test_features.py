@@ -1,4 +1,4 @@
-"""Needs of scenes, the key of a scene, pickling, and steps that end at break points."""
+"""Features of scenes, the key of a scene, pickling, and steps that end at break points."""
 
 import math
 import pickle

@@ -156,6 +156,10 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
         shutil.rmtree(module) if module.is_dir() else module.unlink()
     close_workers()  # the running one has imported the package
     assert installed(wheels, "trial==1.9").trouble
+    lock = before.folder / before.kind.lock_file
+    there = re.sub(r'\b(path|url) = "[^"]*/', 'url = "http://127.0.0.1:9/', lock.read_text())  # as from an index
+    assert there != lock.read_text()
+    lock.write_text(there)
     rebuilt = install.install("trial", Source(wheels), force=True)  # not 1.10, the newest in the folder of wheels
     assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")
     assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial")).ok

@@ -72,8 +72,11 @@ def test_an_entry_of_method_info_is_refused_as_a_class_attribute(name):
 
 @pytest.mark.parametrize(("former", "name"), [("Need", "Feature"), ("Card", "MethodInfo"), ("needs", "features")])
 def test_a_former_public_name_is_an_error_with_the_new_one(former, name):
-    with pytest.raises(AttributeError, match=rf"{former} has another name now: conservative\.{name}$"):
+    message = rf"{former} has another name now: conservative\.{name}$"
+    with pytest.raises(ImportError, match=message):
         getattr(cv, former)
+    with pytest.raises(ImportError, match=message):
+        exec(f"from conservative import {former}")
 
 
 @pytest.mark.parametrize(("former", "name"), [("card", "method_info"), ("takes", "supports")])

@@ -66,7 +66,8 @@ def lengths_of(order: int, exact: bool) -> Lengths:
 
     A step of order 2 is half a kick, a rotation and half a kick. Raise `BadInput` if there is none of this order.
     """
+    composition = composition_of(order)
     if exact and order in SEQUENCES:
         return SEQUENCES[order].lengths
-    weights = (Fraction(0), *composition_of(order).weights, Fraction(0))
+    weights = (Fraction(0), *composition.weights, Fraction(0))
     return weights[:-1], tuple((a + b) / 2 for a, b in itertools.pairwise(weights))

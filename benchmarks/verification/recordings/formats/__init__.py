@@ -30,7 +30,8 @@ FORMATS = (
 """The families; the first one that returns a table counts."""
 GONE = {b"PAR1": ".parquet", b"\x1f\x8b": ".gz", b"stk.v": ".a", b"CCSDS_AEM_VERS": ".aem"}
 """Beginnings of files in formats that are gone, and their endings."""
-ENDINGS = (*(ending for form in FORMATS for ending in form.endings), *GONE.values())
+_TABLES = [ending for form in FORMATS for ending in form.endings]
+ENDINGS = (*_TABLES, *(f"{ending}.gz" for ending in _TABLES), *(ending for ending in GONE.values() if ending != ".gz"))
 """Endings of recordings in folders. A file in a format that is gone is refused there, and not left out."""
 
 
