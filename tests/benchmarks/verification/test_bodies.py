@@ -84,7 +84,7 @@ def test_the_body_of_a_urdf_file_is_that_of_pinocchio_and_yourdfpy(tmp_path):
     pin = pytest.importorskip("pinocchio")
     yourdfpy = pytest.importorskip("yourdfpy")
     rng = np.random.default_rng(7)
-    for _ in range(200):
+    for _ in range(50):
         path = write_urdf(rng, tmp_path / "body.urdf")
         links = read_links(path)
         inertia = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()).inertias[1]
