@@ -191,7 +191,7 @@ BODY = cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.0, 0.3], [-0.2, 0.3, 4.0]])
 SCENE = cv.Scene("recorded", BODY, Rotation.from_rotvec([0.4, -0.7, 0.3]), [0.7, -1.1, 1.6], 8.0)
 R, W = free_body(BODY, SCENE.R_WB0, SCENE.w_WB_B0, T)
 TURN = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
-STOP = 150
+STOP = 30
 EVEN = (np.arange(len(T)) % 2 == 1)[:, None]
 
 
