@@ -116,7 +116,7 @@ def test_single_rows_are_two_in_a_hundred(rows, cause):
 
 @pytest.mark.parametrize(("turn", "expected"), [(1.45, "right"), (2.0, "undecided")])
 def test_noise_is_told_from_motion_up_to_a_quarter_of_a_turn_a_row(turn, expected):
-    t = np.arange(801) * turn / SCALE
+    t = np.arange(401) * turn / SCALE
     w = free_body(SCENE.body, SCENE.R_WB0, SCENE.w_WB_B0, t)[1] + noise(0.01, len(t))
     assert verify(None, w, t, SCENE.rename("long", t_end=float(t[-1]))).verdict == expected
 
