@@ -176,7 +176,7 @@ COMPILED = [("gradient", "taylor"), ("gradient", "projected")]
 """The loops of these are those of `gravity`, with another field, whose kernels take seconds to compile."""
 
 
-@pytest.mark.parametrize(("field", "name"), sampled(product(FIELDS, TIMED), leave=COMPILED))
+@pytest.mark.parametrize(("field", "name"), sampled(product(("gravity", "gradient"), TIMED), leave=COMPILED))
 def test_the_timed_loop_reaches_the_final_state(name, field):
     """`own_loop` of a run leaves the kernel's arrays, or heyoka's state, as the run itself does."""
     scene = random_body(field, 3, 0)
