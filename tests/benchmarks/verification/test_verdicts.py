@@ -130,7 +130,7 @@ def test_an_error_that_is_no_size_is_refused(error):
         verdict(T, R, W, error=error)
 
 
-def test_the_noise_of_the_first_row_is_no_fault(unnamed):
+def test_the_noise_of_the_first_row_is_no_fault(unnamed, no_moments):
     """Near the separatrix the first row alone is off by 0.9 rad/s after 4 s; the fit leaves the noise."""
     phone, t = cv.Scene("phone", cv.RigidBody([1e-3, 2e-3, 3e-3]), np.eye(3), [0.02, 6, 0.02], 4.0), np.linspace(0, 4, 401)
     w = free_body(phone.body, np.eye(3), phone.w_WB_B0, t)[1] + np.random.default_rng(1).normal(0, 0.01, (401, 3))
@@ -236,7 +236,7 @@ def test_fewer_numbers_do_not_win_over_a_much_smaller_rest():
     assert found.details.explaining[0].name == "phase drift"
 
 
-def test_an_allowed_error_decides_alone(unnamed):
+def test_an_allowed_error_decides_alone(unnamed, no_moments):
     t, off = T[::10], 1e-3 * np.sin(T[::10])[:, None]
     noise = np.random.default_rng(2).normal(0, 0.01, (len(T), 3))
     assert [verdict(t, None, W[::10] + off, error=error).verdict for error in (None, 1e-2)] == ["wrong", "right"]
@@ -284,7 +284,7 @@ def test_our_own_samples_of_every_scene_are_right_whole_and_without_their_start(
         assert verdict(made.t[k:], made.R_WB[k:], made.w_WB_B[k:], scene).verdict == "right"  # measured: at most 2e-10
 
 
-def test_times_that_jitter_are_no_noise(monkeypatch):
+def test_times_that_jitter_are_no_noise(monkeypatch, no_moments):
     """Errors of times lie along the motion. Noise of the same size has all directions, and is right."""
     # The other parts of the search find nothing, for seconds, and leave their work to this one.
     monkeypatch.setattr(explain, "SEARCHES", {"other times": explain.SEARCHES["other times"]})
@@ -342,7 +342,7 @@ def test_a_noisy_recording_of_another_body_has_the_ratios_of_its_moments():
     assert (np.abs(found - [3, 3.5]) <= 2 * off).all()
 
 
-def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_permit_it(unnamed):
+def test_times_that_jitter_are_no_noise_unless_their_digits_or_an_allowed_error_permit_it(unnamed, no_moments):
     jitter = 1e-3 * np.random.default_rng(3).normal(size=len(T))
     moved, rates = free_body(SCENE.body, np.eye(3), W0, np.maximum(T + np.append(0, jitter[1:]), 0))
     assert verdict(T, moved, rates).verdict == "wrong"
