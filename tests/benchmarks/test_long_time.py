@@ -18,6 +18,8 @@ from conservative.benchmarks.studies.study import Study
 from conservative.reports.rows.names import with_names
 from conservative.reports.sections import long_time as page
 
+from .generic_study import truth
+
 BRICK = cv.scenes.brick_flip()
 
 
@@ -46,7 +48,7 @@ def findings():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Study, "attempt", attempt_at_cost)
-        return list(studies.findings(Study("long_time", (BRICK,), methods, quick=True, time_limit=0.2)))
+        return list(studies.findings(Study("long_time", (BRICK,), methods, quick=True, time_limit=0.2, truth=truth)))
 
 
 def test_each_family_runs_once_and_stops_within_its_time(findings):

@@ -76,7 +76,7 @@ def few_steps():
 
 @pytest.fixture(scope="module")
 def rows(few_steps):
-    study = throughput.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=2)
+    study = throughput.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=1)
     return list(studies.rows(replace(study, scenes=study.scenes[:1], time_limit=PATIENCE)))
 
 

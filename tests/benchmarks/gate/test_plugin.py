@@ -21,7 +21,9 @@ from ...environments import PATIENCE
 from ...sampling import sampled
 
 SUITE = Path(suite.__file__).parent
-INI = "[pytest]\naddopts = -p no:cacheprovider --benchmark-max-time=0.001\n"
+FEW_PLUGINS = " ".join(f"-p no:{name}" for name in ("zarr", "hypothesispytest", "anyio"))
+"""Plugins of other packages, whose imports take two seconds in each pytest that a test starts."""
+INI = f"[pytest]\naddopts = {FEW_PLUGINS} -p no:cacheprovider --benchmark-max-time=0.001\n"
 OTHER = """
 def test_plain():
     pass
@@ -279,7 +281,7 @@ FEW = ("checks/test_one.py::TestFirst", "checks more -k kept", "checks more -m l
 
 @pytest.mark.parametrize("selections", sampled([(FEW,), (tuple(SELECTIONS),)], 1), ids=["few", "all"])
 def test_rows_that_are_not_selected_are_not_missing(selections, tmp_path):
-    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --benchmark-max-time=0.001\nmarkers = late\n")
+    (tmp_path / "pytest.ini").write_text(f"[pytest]\naddopts = {FEW_PLUGINS} --benchmark-max-time=0.001\nmarkers = late\n")
     for name, text in PARTS.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)

@@ -3,6 +3,7 @@
 import csv
 import json
 import shlex
+import shutil
 import sys
 import tempfile
 from dataclasses import replace
@@ -24,7 +25,7 @@ from conservative.errors import BadInput, MissingEngine
 from conservative.references.model_files import loaders
 from conservative.references.model_files.pieces import Piece, distance, join_links, weigh
 from conservative.references.model_files.readers import read_here
-from conservative.references.worker.client import close_workers
+from conservative.references.worker import client
 
 from ...environments import PATIENCE
 from ...sampling import sampled
@@ -84,7 +85,7 @@ def test_the_body_of_a_urdf_file_is_that_of_pinocchio_and_yourdfpy(tmp_path):
     pin = pytest.importorskip("pinocchio")
     yourdfpy = pytest.importorskip("yourdfpy")
     rng = np.random.default_rng(7)
-    for _ in range(200):
+    for _ in range(50):
         path = write_urdf(rng, tmp_path / "body.urdf")
         links = read_links(path)
         inertia = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()).inertias[1]
@@ -209,11 +210,16 @@ def test_mistakes_of_loaders_are_in_the_table_of_all():
 # ----------------------------------------------------------------------------------------------------------------- engines
 
 
-def test_local_engines_read_the_catalogue():
+def test_local_engines_read_the_catalogue(monkeypatch, tmp_path):
+    """A few of its models, which are verified if no file is named."""
     pytest.importorskip("pinocchio")
+    right = ("turned_inertial_frame", "products_of_inertia", "turned_fixed_child", "shape_that_disagrees", "moments_1e-12")
+    for name in (*(f"{trap}.urdf" for trap in right), "triangle_inequality.urdf", "quaternion.urdf", "density.sdf"):
+        shutil.copy(CATALOGUE / name, tmp_path)
+    monkeypatch.setattr(loaded, "CATALOGUE", tmp_path)
     found = findings([], "mujoco", "pinocchio")
     verdicts = {key: each.verdict for key, each in found.items()}
-    for trap in ("turned_inertial_frame", "products_of_inertia", "turned_fixed_child", "shape_that_disagrees", "moments_1e-12"):
+    for trap in right:
         assert verdicts["mujoco", f"{trap}.urdf"] == verdicts["pinocchio", f"{trap}.urdf"] == RIGHT
     assert verdicts["mujoco", "triangle_inequality.urdf"] == RIGHT  # it refuses the file
     assert verdicts["pinocchio", "triangle_inequality.urdf"] == WRONG  # it accepts an impossible body
@@ -300,11 +306,13 @@ def register(tmp_path, monkeypatch):
     """Return a function that registers programs, from their names and command lines."""
     monkeypatch.setenv("CONSERVATIVE_PROJECT", str(tmp_path))
     deferred_imports.list_entries.cache_clear()
+    before = set(client._workers)
     yield lambda **lines: (tmp_path / "conservative.toml").write_text(
         "[engines]\n" + "".join(f"{name} = {json.dumps(shlex.join(map(str, words)))}\n" for name, words in lines.items())
     )
     deferred_imports.list_entries.cache_clear()
-    close_workers()
+    for worker in set(client._workers) - before:  # the reader of all tests goes on
+        worker.close()
 
 
 def test_a_program_is_right_or_its_mistake_is_named(register, tmp_path):

@@ -20,7 +20,8 @@ from ...sampling import sampled
 from .made import FREE, T, exact
 
 pytestmark = pytest.mark.usefixtures("unnamed")
-R, W = exact(FREE)
+T = T[::3]
+R, W = exact(FREE, T)
 TURNS = Rotation.from_matrix(R)
 VECTORS = TURNS.as_rotvec()
 ANGLES = np.linalg.norm(VECTORS, axis=1, keepdims=True)

@@ -134,7 +134,12 @@ CASES = [
 
 
 SEARCHED_LONG = [("golden_4", "no gyroscopic term + world rates"), ("products", "no gyroscopic term + world rates")]
-FREE = [("golden_9", key) for key in PLANTED if ("golden_9", key) in CASES and key.partition(" + ")[2] != "world rates"]
+ELSEWHERE = (
+    "no gyroscopic term + damping", "no gyroscopic term + world rates", "transposed", "order xyzw", "rates in degrees",
+    "axes y up",
+)  # fmt: skip
+"""Mistakes that are named in `test_diagnose.py` or on another motion, and readings, which are written and read back below."""
+FREE = [("golden_9", key) for key in PLANTED if ("golden_9", key) in CASES and key not in ELSEWHERE]
 HEAVY = [("golden_4", key) for key in (*ONLY["golden_4"], "inertia of the start")]
 TENSOR = [("products", key) for key in (*ONLY["products"], "inverted inertia", "inertia in world axes", "axes y up")]
 
@@ -191,7 +196,7 @@ BODY = cv.RigidBody([[3.0, 0.4, -0.2], [0.4, 2.0, 0.3], [-0.2, 0.3, 4.0]])
 SCENE = cv.Scene("recorded", BODY, Rotation.from_rotvec([0.4, -0.7, 0.3]), [0.7, -1.1, 1.6], 8.0)
 R, W = free_body(BODY, SCENE.R_WB0, SCENE.w_WB_B0, T)
 TURN = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
-STOP = 150
+STOP = 30
 EVEN = (np.arange(len(T)) % 2 == 1)[:, None]
 
 

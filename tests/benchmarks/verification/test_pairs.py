@@ -415,9 +415,8 @@ def test_command_shows_what_differs_and_its_script_repeats_it(tmp_path):
 
     The script has at most 25 lines in the engine's own language and does not need this package.
     """
-    arguments = ("--only", "pairs", "--pairs", "other joints,turned world")
-    command = ("verify", "mujoco:implicitfast", *arguments, "--json", "--scripts", tmp_path / "scripts")
-    found = conservative(*command)
+    arguments, written = ("--only", "pairs", "--pairs"), ("--json", "--scripts", tmp_path / "scripts")
+    found = conservative("verify", "mujoco:implicitfast", *arguments, "other joints,turned world", *written)
     (subject,) = json.loads(found.stdout)["subjects"]
     findings = {each["case"]: each for each in subject["findings"]}
     lost = findings["needle: other joints"]
@@ -433,9 +432,9 @@ def test_command_shows_what_differs_and_its_script_repeats_it(tmp_path):
     assert first.endswith("warnings 0")
     assert not second.endswith("warnings 0")
     script.write_text("mine")
-    assert conservative(*command).exit_code == 2
+    assert conservative("verify", "mujoco:implicitfast", *arguments, "other joints", *written).exit_code == 2
     assert script.read_text() == "mine"
-    fine = conservative("verify", "mujoco:RK4", *arguments)
+    fine = conservative("verify", "mujoco:RK4", *arguments, "other joints,turned world")
     assert fine.exit_code == 0
     assert "6 of 6 pairs" in fine.stdout
 

@@ -40,6 +40,7 @@ def test_few_digits_and_noise_are_not_wrong(make, size, unnamed):
     assert found.details.first_row[0] > 5 * found.details.allowed[0]
 
 
+@pytest.mark.slow
 def test_another_body_stays_wrong(unnamed):
     near, other = scene(), scene(9.0)
     found = verdict.verify_recording(near, rounded(*free_body(other.body, near.R_WB0, near.w_WB_B0, T), 1e-4))

@@ -37,7 +37,8 @@ std::vector<State> simulate(const Motion &motion, double h, int steps, int sampl
 """
 COMPILERS = {"C": "gcc", "C++": "g++", "Rust": "rustc", "JavaScript": "node", "Python": sys.executable, "C#": "mcs"}
 """The program that each language needs."""
-PYTEST = ("-m", "pytest", "-q", "--tb=short", "-rN", "-n0", "-p", "no:cacheprovider", "-p", "no:zarr", "test_motions.py")
+PLUGINS = *("-p", "no:cacheprovider"), *("-p", "no:zarr"), *("-p", "no:hypothesispytest")
+PYTEST = ("-m", "pytest", "-q", "--tb=short", "-rN", "-n0", *PLUGINS, "test_motions.py")
 OWN = re.compile(r"^\w+: \w+ error |motions failed$|^\".+\" explains|not explained by|^this program has order")
 """Lines of the test in Python, among the lines of pytest."""
 LANGUAGES = {
