@@ -67,7 +67,13 @@ def test_dead_links_are_found(tmp_path):
 
 @pytest.fixture(scope="module")
 def pytest_options():
-    told = subprocess.run([sys.executable, "-m", "pytest", "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    told = subprocess.run(
+        [sys.executable, "-m", "pytest", "--help", "-p", "no:hypothesispytest", "-p", "no:anyio"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return set(re.findall(r"--[\w-]+", told.stdout))
 
 
