@@ -67,6 +67,7 @@ def test_order_and_invariants(method, name, order, conserves):
         (lambda: cv.MoserVeselov(True), "order"),
         (lambda: cv.MoserVeselov(12), "order"),
         (lambda: cv.MoserVeselov("best"), "order"),
+        (lambda: cv.Splitting([4]), "order"),
         (lambda: cv.Taylor(3), "order"),
         (lambda: cv.Taylor(19), "order"),
         (lambda: cv.Taylor(True), "order"),

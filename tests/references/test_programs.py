@@ -95,6 +95,8 @@ UNUSABLE = "its answer to `hello` cannot be used"
         ({"settings": 5}, UNUSABLE),
         ({"orders": ["rk4"]}, UNUSABLE),
         ("fast", "answers `hello` with `engine`: 'fast'; expected an object"),
+        ({"card": 3}, "`card` is 3; expected an object"),  # a former name, as it was sent
+        ({"ways": [1]}, "`ways` is [1]; expected a list of texts"),
     ],
 )
 def test_a_description_that_cannot_be_used_is_reported(engine, words, folder):

@@ -291,6 +291,7 @@ def test_samples_as_csv_equal_the_table_and_replace_their_own_file(tmp_path):
         (["study", "random", "--latex=a"], "study --latex"),
         (["run", "brick_flip", "--picture", "a.pdf"], ".pdf"),
         (["watch", "brick_flip", "--out", "a.mp4"], ".mp4"),
+        (["watch", "brick_flip", "--out", "a.MP4"], ".mp4"),
         (["study", "engines_at_one_step", "--engines", "all"], "study engines_at_one_step"),
         (["study", "engines_over_steps", "--engines", "mujoco"], "study engines_over_steps"),
     ],
@@ -299,6 +300,11 @@ def test_what_is_gone_is_answered_with_what_to_do(arguments, name, tmp_path, mon
     monkeypatch.chdir(tmp_path)
     done = conservative(*arguments)
     assert (done.exit_code, REMOVED[name] in done.stderr, list(tmp_path.iterdir())) == (2, True, [])
+
+
+def test_what_cannot_be_written_here_is_no_advice(tmp_path):
+    done = conservative("watch", "brick_flip", "--out", tmp_path / "a.pdf")  # not as .svg, either
+    assert (done.exit_code, ".html, .gif, .png" in done.stderr, ".svg" in done.stderr) == (2, True, False)
 
 
 def test_a_failed_run_reports_the_failure_and_writes_its_samples(tmp_path):

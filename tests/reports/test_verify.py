@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative.benchmarks.verification.finding import Cause, Finding, Verdict, Verification
+from conservative.benchmarks.verification.verify import expand
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import OLD_NAMES
 
@@ -189,3 +190,9 @@ def test_an_old_name_answers_with_the_command_that_replaces_it(words, new):
     assert all(
         each in {opt for option in main.commands[command].params for opt in option.opts} for each in rest if "--" in each[:2]
     )
+
+
+def test_a_folder_stands_for_its_recordings_and_not_for_other_archives(tmp_path):
+    for name in ("b.csv", "a.json", "c.csv.gz", "backup.tar.gz", "notes.md", "d.urdf"):
+        (tmp_path / name).touch()
+    assert [subject.path.name for subject in expand([str(tmp_path)])] == ["a.json", "b.csv", "c.csv.gz", "d.urdf"]
