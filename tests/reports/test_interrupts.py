@@ -236,7 +236,7 @@ launch()
 """
 
 
-@pytest.mark.parametrize(("encoding", "sign"), [("ascii", b"\\u2713"), ("latin-1", b"\\u2713"), ("utf-8", "✓".encode())])
+@pytest.mark.parametrize(("encoding", "sign"), [("latin-1", b"\\u2713"), ("utf-8", "✓".encode())])
 def test_an_encoding_without_our_signs_is_no_error(encoding, sign):
     environment = variables(PYTHONPATH=str(ROOT), PYTHONIOENCODING=encoding)
     done = subprocess.run([sys.executable, "-c", SIGNS], env=environment, capture_output=True, timeout=PATIENCE)
