@@ -56,14 +56,14 @@ def measurements():
     lines = [Samples(**names_of, t=t, value=1e-15 * t, **common) for names_of in names]
     return Measurements(
         table().drop(columns=["name", "line"]),
-        measurement.samples_frame([*lines, *curves_of_the_brick()]),
+        measurement.samples_frame([*lines, *curves_of("brick_flip")]),
     )
 
 
 @cache
-def curves_of_the_brick():
-    """Lines of the motion of `reduced` on brick_flip."""
-    return curves(registry.scene("brick_flip"), Reduced())
+def curves_of(name):
+    """Lines of the motion of `reduced` on a registered scene."""
+    return curves(registry.scene(name), Reduced())
 
 
 def curves(scene, *methods):

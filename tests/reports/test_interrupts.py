@@ -45,7 +45,7 @@ def start(popen, arguments, folder, code=None):
         text=True,
     )
     wait_until(lambda: temporaries(folder) or process.poll() is not None)
-    time.sleep(0.5)  # s, so that it is usually further on; a signal that comes earlier has to end it as well
+    time.sleep(0.2)  # s, so that it is usually further on; a signal that comes earlier has to end it as well
     return process
 
 

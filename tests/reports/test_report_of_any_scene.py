@@ -171,7 +171,7 @@ def test_a_centre_of_mass_in_the_fixed_point_is_drawn(tmp_path):
 def rows_of_a_report(monkeypatch, tmp_path):
     """`report` with made-up rows, which are counted as they are measured."""
     monkeypatch.chdir(tmp_path)
-    found, count = [*made_up.convergence("reduced", 2), *made_up.curves_of_the_brick()], []
+    found, count = [*made_up.convergence("reduced", 2), *made_up.curves_of("brick_flip")], []
 
     def findings(study, tell):
         count.append(study.name)

@@ -23,7 +23,7 @@ from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import LockedEngine, provenance
 from conservative.reports.sections.report import build
 
-from .made_up import at_step, convergence, curves, measurements, over_steps
+from .made_up import at_step, convergence, curves, curves_of, measurements, over_steps
 from .made_up import named as engines_of
 from .rows import frame, parts, point, row
 from .rows import texts as texts_of
@@ -56,8 +56,7 @@ def nothing_is_measured(monkeypatch):
 def report():
     """Plan, measurements and origin of a report of both scenes: curves are measured."""
     plan = plan_report([], ["reduced"], quick=True)
-    found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
-    samples = [finding for finding in found if isinstance(finding, Samples)]
+    samples = [curve for scene in plan.scenes for curve in curves_of(scene.name)]
     return plan, Measurements(measurements().table, measurement.samples_frame(samples)), provenance(["report"])
 
 
