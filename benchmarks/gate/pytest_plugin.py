@@ -99,8 +99,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Skip the suite unless benchmarks were asked for."""
     if config.getoption("conservative_benchmark"):
         return
+    suite = SUITE.resolve()
+    in_suite = {path: suite in path.resolve().parents for path in {item.path for item in items}}  # a file has many tests
     for item in items:
-        if SUITE.resolve() in item.path.resolve().parents:
+        if in_suite[item.path]:
             item.add_marker(pytest.mark.skip(reason="a benchmark, which runs with --benchmark"))
 
 

@@ -396,7 +396,7 @@ def compare_answers(scene: Scene, t: Array, data: States, allowed: Array, step: 
     scale = float(np.linalg.norm(np.vstack([scene.w_WB_B0, w]), axis=1).max()) or 1.0
     noise = np.maximum(allowed * PART_OF_ALLOWED, 1e-13)
     case = Compared(scene, t, data, 0.0, scale, allowed, noise, rounded=(float(allowed[0]), float(allowed[1])), step=step)
-    vars(case)["exact"] = R, w  # a closed form takes most of the time of a verification, and the property would compute it again
+    vars(case)["exact"] = R, w  # which the property would compute again: closed forms take most of the time of a verification
     return case
 
 
