@@ -100,9 +100,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if config.getoption("conservative_benchmark"):
         return
     suite = SUITE.resolve()
-    paths = {path for path in {item.path for item in items} if suite in path.resolve().parents}
+    in_suite = {path: suite in path.resolve().parents for path in {item.path for item in items}}  # a file has many tests
     for item in items:
-        if item.path in paths:
+        if in_suite[item.path]:
             item.add_marker(pytest.mark.skip(reason="a benchmark, which runs with --benchmark"))
 
 

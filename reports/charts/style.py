@@ -135,14 +135,16 @@ def power_axis(title: str, low: float, high: float) -> alt.Axis:
 
 def apply_style(chart: Any) -> Any:
     """Return a whole picture with the common fonts, on white, so that it reads the same on any page."""
-    return (
-        chart.configure(background="white", padding=12, font="sans-serif")
-        .configure_axis(
+    return chart.configure(  # in one call, as each copies the whole picture
+        background="white",
+        padding=12,
+        font="sans-serif",
+        axis=alt.AxisConfig(
             labelFontSize=11, titleFontSize=12, titleFontWeight="normal", gridColor="#E6E6E6", domainColor=PALETTE["grey"]
-        )
-        .configure_view(stroke=None)
-        .configure_legend(labelFontSize=11, titleFontSize=12, labelLimit=320, symbolStrokeWidth=2, symbolSize=80)
-        .configure_title(fontSize=13, fontWeight="bold", anchor="start", offset=8)
+        ),
+        view=alt.ViewConfig(stroke=None),
+        legend=alt.LegendConfig(labelFontSize=11, titleFontSize=12, labelLimit=320, symbolStrokeWidth=2, symbolSize=80),
+        title=alt.TitleConfig(fontSize=13, fontWeight="bold", anchor="start", offset=8),
     )
 
 

@@ -7,6 +7,7 @@ import shlex
 import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -60,14 +61,21 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
     Commands call it before any work: files and the commit can change meanwhile.
     """
     command = sys.argv[1:] if arguments is None else arguments
-    packages = {package.metadata["Name"]: package.version for package in distributions()}
     here = Path(__file__)
     tracked = git(here.parent, "ls-files", "--error-unmatch", here.name)  # False inside another project's working tree
     return Provenance(
         shlex.join(["conservative", *command]),
         machine(),
         f"{platform.python_implementation()} {platform.python_version()}",
-        dict(sorted(packages.items(), key=lambda item: item[0].lower())),
+        dict(_packages()),
         (commit(here.parent, mark_changes=True) if tracked else "") or "unknown",
         datetime.now(UTC).isoformat(timespec="seconds"),
     )
+
+
+@cache  # parsing the metadata of 200 packages takes 0.1 s; a process runs what it has imported, whatever is installed later
+def _packages() -> tuple[tuple[str, str], ...]:
+    """Return name and version of every installed package, by name."""
+    descriptions = [package.metadata for package in distributions()]  # `package.version` would parse the metadata again
+    versions = {description["Name"]: description["Version"] for description in descriptions}
+    return tuple(sorted(versions.items(), key=lambda item: item[0].lower()))

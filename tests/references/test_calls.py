@@ -29,8 +29,15 @@ def hang():
         pass
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def no_process_before():
+    close_workers()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_process_of_other_tests():
+    close_workers()
+    yield
     close_workers()
 
 
@@ -38,6 +45,7 @@ def children():
     return psutil.Process().children(recursive=True)
 
 
+@pytest.mark.usefixtures("no_process_before")
 @pytest.mark.parametrize("work", [hang, lambda: ctypes.PyDLL(None).sleep(600)])  # PyDLL does not release the interpreter
 def test_work_beyond_its_limit_is_ended_and_no_process_remains(work):
     before = threading.enumerate()
@@ -47,15 +55,16 @@ def test_work_beyond_its_limit_is_ended_and_no_process_remains(work):
     assert children() == []
 
 
-@pytest.mark.parametrize(
-    ("work", "description"),
-    [
-        (lambda: ctypes.string_at(0), "signal 11 (SIGSEGV)"),
-        (os.abort, "signal 6 (SIGABRT)"),
-        (lambda: os.kill(os.getpid(), signal.SIGKILL), "signal 9 (SIGKILL)"),  # as when memory runs out
-        (lambda: os._exit(3), "exit code 3"),
-    ],
-)
+ENDS = [
+    (lambda: ctypes.string_at(0), "signal 11 (SIGSEGV)"),
+    pytest.param(os.abort, "signal 6 (SIGABRT)", marks=pytest.mark.slow),
+    pytest.param(lambda: os.kill(os.getpid(), signal.SIGKILL), "signal 9 (SIGKILL)", marks=pytest.mark.slow),  # no memory left
+    (lambda: os._exit(3), "exit code 3"),
+]
+
+
+@pytest.mark.usefixtures("no_process_before")
+@pytest.mark.parametrize(("work", "description"), ENDS)
 def test_the_end_of_its_process_is_described(work, description):
     with pytest.raises(EngineCrashed) as caught:
         run_within(PATIENCE, work)
@@ -77,8 +86,9 @@ def answer_by_half():
     os._exit(4)
 
 
+@pytest.mark.usefixtures("no_process_before")
 @pytest.mark.parametrize(
-    ("work", "patience", "description"), [(close_all, 0.5, "signal 9"), (answer_by_half, PATIENCE, "exit code 4")]
+    ("work", "patience", "description"), [(close_all, 0.2, "signal 9"), (answer_by_half, PATIENCE, "exit code 4")]
 )
 def test_a_process_with_an_incomplete_answer_is_ended(work, patience, description, monkeypatch):
     monkeypatch.setattr(client, "_PATIENCE", patience)
@@ -105,6 +115,7 @@ def test_results_and_exceptions_are_returned():
     assert (caught.value.argument, caught.value.got, caught.value.allowed) == ("dt", 0, "above 0")
 
 
+@pytest.mark.usefixtures("no_process_before")
 def test_one_process_does_one_piece_of_work_after_the_other():
     assert run_within(PATIENCE, os.getpid) == run_within(PATIENCE, os.getpid) != os.getpid()
     (process,) = children()
@@ -133,6 +144,7 @@ def test_threads_have_processes_of_their_own():
     assert sorted(results) == [0, 1, 2]
 
 
+@pytest.mark.usefixtures("no_process_before")
 def test_an_interrupt_ends_the_work(tmp_path):
     begun = tmp_path / "begun"
 

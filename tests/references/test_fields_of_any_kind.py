@@ -109,10 +109,10 @@ def test_precise_and_engines_support_the_same_fields():
 INTEGRATED = ["gravity", "spring", "attraction", "gradient on another inertia"]
 
 
-FRAMES = [("gradient on another inertia", "base_vectors"), ("spring", "body"), ("gravity", "body")]
+FRAMES = [("gradient on another inertia", "base_vectors"), ("spring", "body")]
 
 
-@pytest.mark.parametrize(("name", "frame"), sampled(product(INTEGRATED, ["body", "base_vectors"]), 3, keep=FRAMES))
+@pytest.mark.parametrize(("name", "frame"), sampled(product(INTEGRATED, ["body", "base_vectors"]), 2, keep=FRAMES))
 def test_heyoka_agrees_with_truth(name, frame):
     """Check errors near the tolerance, measured over both frames."""
     scene = scene_in(FIELDS[name])
@@ -258,7 +258,7 @@ def check_order(method, name, right=None, above=0.1):
 SETTINGS = ["mujoco:RK4", "mujoco:Euler", "mujoco:implicit", "pinocchio:RK4", "pinocchio:Euler"]
 
 
-@pytest.mark.parametrize(("engine", "name"), sampled(product(SETTINGS, IN_ENGINES), 26))
+@pytest.mark.parametrize(("engine", "name"), sampled(product(SETTINGS, IN_ENGINES), len(IN_ENGINES)))
 def test_engines_converge_to_the_truth_in_every_field(engine, name):
     check_order(registry.method(engine), name)
 

@@ -224,6 +224,7 @@ def test_urdf_1_1_has_quaternions_and_1_0_ignores_them(read):
     assert any("quat_xyzw" in note for note in model.notes)
 
 
+@pytest.mark.usefixtures("shared_reader")
 def test_the_readers_of_scenes_and_of_engines_agree_about_a_urdf(read, tmp_path):
     quaternion = '<origin xyz="0.02 -0.01 0.03" quat_xyzw="0 0 0.6 0.8"/>'
     ours = body_of(read("a.urdf", urdf(INERTIAL.replace("<mass", f"{quaternion}<mass"), attributes=' version="1.1"')))
@@ -710,13 +711,22 @@ def test_a_body_that_the_file_holds_is_set_free(read, name):
     assert "world" not in text.replace("worldbody", "")
 
 
-def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
+@pytest.fixture(scope="module")
+def verified(tmp_path_factory):
+    """The verifications of two files by two engines, which are started once: a bad link, and what acts beside the mass."""
+    folder = tmp_path_factory.mktemp("models")
+    robot, beside = folder / "robot.urdf", folder / "a.xml"
+    robot.write_text(ROBOT.replace(joint("fixed", "hip", "foot"), joint("revolute", "hip", "foot")))
+    head = '<option density="1000" viscosity="1" wind="1 2 3"/><default><joint armature="1" damping="1"/></default>'
+    beside.write_text(mjcf('<joint type="free"/><geom type="box" size="0.1 0.2 0.3"/>', head))
+    return dict(zip(("robot", "beside"), verify_files([robot, beside], ["mujoco", "pinocchio"]), strict=True))
+
+
+def test_the_bad_link_of_a_robot_is_named(read, verified):
     base, hip = read("robot.urdf", ROBOT)
     assert [(each.label, each.truth.mass) for each in (base, hip)] == [("robot.urdf: a", 2.0), ("robot.urdf: hip", 4.0)]
-    path = tmp_path / "robot.urdf"
-    path.write_text(ROBOT.replace(joint("fixed", "hip", "foot"), joint("revolute", "hip", "foot")))
-    (verified,) = verify_files([path], ["mujoco", "pinocchio"])
-    assert {(finding.case, finding.subject.split()[0]): finding.verdict for finding in verified.findings} == {
+    found = verified["robot"]
+    assert {(finding.case, finding.subject.split()[0]): finding.verdict for finding in found.findings} == {
         ("robot.urdf: a", "mujoco"): RIGHT,
         ("robot.urdf: a", "pinocchio"): RIGHT,
         ("robot.urdf: hip", "mujoco"): RIGHT,  # it refuses the link
@@ -724,8 +734,8 @@ def test_the_bad_link_of_a_robot_is_named(read, tmp_path):
         ("robot.urdf: foot", "mujoco"): RIGHT,
         ("robot.urdf: foot", "pinocchio"): RIGHT,
     }
-    assert verified.exit_code == 1
-    (note,) = (each for each in verified.notes if "no body is like this" in each)
+    assert found.exit_code == 1
+    (note,) = (each for each in found.notes if "no body is like this" in each)
     assert note.startswith("hip: ")
     assert "-0.0012 -0.0011 0.0003" in note
 
@@ -741,12 +751,9 @@ def test_a_bad_link_below_a_good_body_excuses_a_refusal_and_a_repair(read):
     assert decide_body(model, "pinocchio", model.truth, 1e-4)[:2] == (RIGHT, "")
 
 
-def test_what_a_model_has_beside_mass_does_not_change_the_body_that_mujoco_has(tmp_path):
+def test_what_a_model_has_beside_mass_does_not_change_the_body_that_mujoco_has(verified):
     """Armature, damping and a fluid act on the accelerations of a body and are not its mass."""
-    path = tmp_path / "a.xml"
-    head = '<option density="1000" viscosity="1" wind="1 2 3"/><default><joint armature="1" damping="1"/></default>'
-    path.write_text(mjcf('<joint type="free"/><geom type="box" size="0.1 0.2 0.3"/>', head))
-    assert [finding.verdict for finding in findings(path, engines=["mujoco", "pinocchio"]).values()] == [RIGHT, RIGHT]
+    assert [finding.verdict for finding in verified["beside"].findings] == [RIGHT, RIGHT]
 
 
 @pytest.mark.slow

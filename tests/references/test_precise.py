@@ -24,23 +24,28 @@ def moment_of(case):
     return moment if any(float(x) for x in moment) else None
 
 
-@pytest.mark.parametrize("name", sampled(CASES, 3, keep=["asymmetric_heavy_top", "brick_flip_1e-12", "gazebo_box"]))
-def test_thirty_digits_of_every_reference_state(name):
-    case = CASES[name]
-    times = [state["t"] for state in case["states"]]
+FIRST = ("asymmetric_heavy_top", "brick_flip_1e-12", "gazebo_box")
+
+
+@pytest.mark.parametrize(
+    ("name", "last"), [*((name, 1) for name in FIRST), *(pytest.param(name, None, marks=pytest.mark.slow) for name in CASES)]
+)
+def test_thirty_digits_of_every_reference_state(name, last):
+    case, states = CASES[name], CASES[name]["states"][:last]
+    times = [state["t"] for state in states]
     q, w = states_in_digits(case["J"], case["q0"], case["w0"], times, moment_of(case), bits=208)
     with mpmath.workprec(208):
-        for state, row in zip(case["states"], zip(q, w, strict=True), strict=True):
+        for state, row in zip(states, zip(q, w, strict=True), strict=True):
             expected, computed = state["q"] + state["w"], [*row[0], *row[1]]
             off = max(abs(mpmath.mpf(x) - y) / max(abs(y), mpmath.mpf("1e-3")) for x, y in zip(expected, computed, strict=True))
             assert off < 2e-28  # measured 8.6e-29 where the file's own inputs have 30 digits, 5e-30 elsewhere
 
 
 def test_more_bits_change_no_double(heavy):
-    coarse, fine = (Precise(bits).prepare(heavy, Grid(0.5, 4))() for bits in (80, 160))
+    coarse, fine = (Precise(bits).prepare(heavy, Grid(0.5, 4))() for bits in (80, 128))
     assert angle_between(coarse.R_WB, fine.R_WB).max() < 1e-15  # measured 0
     np.testing.assert_allclose(coarse.w_WB_B, fine.w_WB_B, rtol=1e-15)
-    assert fine.label.endswith("/160 bits")
+    assert fine.label.endswith("/128 bits")
     assert fine.counters.steps > 0
 
 

@@ -24,7 +24,7 @@ ATTITUDE_LOADS = [case for case in product(ROWS, KINDS) if case[0] is Feature.AT
 
 @pytest.mark.parametrize(
     ("feature", "method"),
-    sampled(product(ROWS, KINDS), 30, keep=ATTITUDE_LOADS[:1], leave=ATTITUDE_LOADS[1:]),
+    sampled(product(ROWS, KINDS), 20, keep=ATTITUDE_LOADS[:1], leave=ATTITUDE_LOADS[1:]),
     ids=lambda each: getattr(each, "integrator", str(each)),
 )
 def test_every_part_is_right_or_refused_by_name(feature, method):

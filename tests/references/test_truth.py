@@ -102,15 +102,15 @@ def test_the_second_solution_does_not_round_the_numbers_of_the_field():
     assert truth.confirm(scene, Grid(scene.t_end / 12, 12)).agreement_rad < 6e-14  # measured 2.9e-14
 
 
-@pytest.mark.parametrize("factor", sampled([1 + 1e-12, 1 - 1e-11], 1))
-def test_a_law_that_is_slightly_wrong_is_no_confirmation(monkeypatch, factor):
-    """Planted in the field of the second solution only."""
+@pytest.mark.parametrize(("factor", "samples"), [(1 - 1e-11, 3), pytest.param(1 + 1e-12, 12, marks=pytest.mark.slow)])
+def test_a_law_that_is_slightly_wrong_is_no_confirmation(monkeypatch, factor, samples):
+    """Planted in the field of the second solution only: measured 3.8e-13 after a quarter of the duration, 2.5e-13 after all."""
     scene = random_body("spring", 7, 0)
     other = scene.rename("other", potential=replace_stiffness(scene.potential, factor))
     real = truth.collocate
     monkeypatch.setattr(truth, "collocate", lambda _, *grid: real(other, *grid))
     with pytest.raises(truth.Disagreement) as caught:
-        truth.confirm(scene, Grid(scene.t_end / 12, 12))
+        truth.confirm(scene, Grid(scene.t_end / 12, samples))
     assert caught.value.agreement_rad > caught.value.allowed_rad == truth.CONFIRMED
 
 

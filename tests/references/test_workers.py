@@ -76,11 +76,11 @@ CRASHES = {
 }
 
 
-@pytest.mark.parametrize("at", ["prepare", "run"])
-@pytest.mark.parametrize("do", CRASHES)
+AT = {do: ("run",) if do == "shape" else ("prepare", "run") for do in CRASHES}
+
+
+@pytest.mark.parametrize(("do", "at"), sampled([(do, at) for do in CRASHES for at in AT[do]], len(CRASHES)))
 def test_a_crash_is_an_outcome_and_the_next_run_succeeds(do, at):
-    if do == "shape" and at == "prepare":
-        at = "run"
     before = run("integrate")
     trajectory = run(do, at)
     assert trajectory.outcome.kind is OutcomeKind.CRASHED
@@ -91,8 +91,8 @@ def test_a_crash_is_an_outcome_and_the_next_run_succeeds(do, at):
 
 @pytest.mark.parametrize("do", sampled(["spin", "hang", "lock"], 1))
 def test_an_engine_that_hangs_is_ended_after_its_limit(do):
-    trajectory = run(do, limit=0.5)
-    assert str(trajectory.outcome) == "timeout (after 0.5 s)"
+    trajectory = run(do, limit=0.2)
+    assert str(trajectory.outcome) == "timeout (after 0.2 s)"
     assert run("integrate").ok
 
 
@@ -147,14 +147,14 @@ def test_a_process_that_is_killed_while_it_runs_is_a_crash():
 def test_wall_time_grows_with_the_number_of_calls():
     timed = Trial("rest").prepare(SCENE, grid_for(SCENE, DT))  # for 0.05 s in each call
     assert timed.wall_time(1) >= 0.05
-    assert timed.wall_time(8) >= 0.4
+    assert timed.wall_time(4) >= 0.2
 
 
 def test_renewing_a_run_is_not_measured():
     renewed = Trial("renew").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
     start = time.perf_counter()
     measured = renewed.wall_time(2)
-    assert time.perf_counter() - start - measured >= 1.0  # twice 0.5 s
+    assert time.perf_counter() - start - measured >= 0.4  # twice 0.2 s
 
 
 def test_the_loop_is_measured_instead_of_the_run():
@@ -297,8 +297,8 @@ def test_a_run_that_crashes_while_it_is_timed_is_marked():
 @pytest.mark.parametrize("within", [attempt_here, attempt_within])
 def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
     case = Case("test", SCENE.rename(SCENE.name), Trial("hang"), grid_for(SCENE, 0.01))
-    assert str(within(0.5, case)) == "timeout (after 0.5 s)"
-    assert within(0.5, case).reason == "a run of 50 steps was ended after 0.5 s"  # not tried again
+    assert str(within(0.2, case)) == "timeout (after 0.2 s)"
+    assert within(0.2, case).reason == "a run of 50 steps was ended after 0.2 s"  # not tried again
 
 
 @pytest.mark.usefixtures("trial_registered")

@@ -40,7 +40,7 @@ def prepare(given):
         return {"q": states[:, :4], "w": states[:, 4:], "steps": given.n_steps, "evaluations": 4 * given.n_steps}
 
     if given.do == "renew":
-        run.renew = lambda: time.sleep(0.5)
+        run.renew = lambda: time.sleep(0.2)
     if given.do == "loop":
         run.loop = lambda: time.sleep(0.1)
     return run

@@ -1,6 +1,7 @@
 """Made-up measurements of a whole report, and of engines."""
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -46,6 +47,7 @@ def table():
     return frame([*lines, *drift, *convergence("reduced", 2), row("speed", "reduced", "first call time", 0.25)])
 
 
+@cache  # integrating the motions takes most of a second
 def measurements():
     """Rows and lines."""
     t = np.linspace(0.5, 60, 120)
@@ -54,8 +56,14 @@ def measurements():
     lines = [Samples(**names_of, t=t, value=1e-15 * t, **common) for names_of in names]
     return Measurements(
         table().drop(columns=["name", "line"]),
-        measurement.samples_frame([*lines, *curves(registry.scene("brick_flip"), Reduced())]),
+        measurement.samples_frame([*lines, *curves_of("brick_flip")]),
     )
+
+
+@cache
+def curves_of(name):
+    """Lines of the motion of `reduced` on a registered scene."""
+    return curves(registry.scene(name), Reduced())
 
 
 def curves(scene, *methods):

@@ -133,7 +133,7 @@ def test_a_chaotic_motion_that_no_step_reaches_is_not_ok(tmp_path):
     assert summary["status"].startswith(("less accurate than asked for", "inaccurate"))
 
 
-@pytest.mark.parametrize("ending", ["svg", "png"])
+@pytest.mark.parametrize("ending", sampled(["svg", "png"], 1, ["png"]))
 def test_a_run_has_a_picture_and_a_folder(ending, tmp_path):
     picture, folder = tmp_path / f"picture.{ending}", tmp_path / "out"
     for _ in range(2):  # its own files are replaced

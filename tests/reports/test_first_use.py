@@ -3,7 +3,6 @@
 import pytest
 
 from ..environments import run_python
-from ..sampling import sampled
 
 TWICE = """
 import conservative as cv
@@ -52,11 +51,7 @@ def plan(*methods):
 """
 
 
-def test_a_process_that_ends_leaves_the_compilation_to_the_studies(tmp_path):
-    code, out, err = run_python(ELSEWHERE + "compile_kernels(plan(Ends(order=2)), print)", NUMBA_CACHE_DIR=str(tmp_path))
-    assert (code, out) == (0, "0.0 compilation of kernels, for the first time: 1 of 1\n"), err
-
-
+ENDED = "compile_kernels(plan(Ends(order=2)), print)\n"
 DURING_A_COMPILATION = """
 def interrupt():
     while not BEGUN.exists(): time.sleep(0.01)
@@ -72,8 +67,14 @@ except KeyboardInterrupt: print("interrupted")
 """
 
 
-@pytest.mark.parametrize("what", sampled([DURING_A_COMPILATION, BETWEEN_TWO], 1))
-def test_an_interrupt_does_not_wait_for_a_compilation(what, tmp_path):
+@pytest.mark.parametrize(
+    ("code", "shown"),
+    [
+        (ENDED + DURING_A_COMPILATION, "0.0 compilation of kernels, for the first time: 1 of 1\ninterrupted\n"),
+        pytest.param(BETWEEN_TWO, "interrupted\n", marks=pytest.mark.slow),
+    ],
+)
+def test_a_process_that_ends_leaves_its_compilation_to_the_studies_and_an_interrupt_does_not_wait(code, shown, tmp_path):
     """Otherwise the process waits for the sleeping one until the time limit of this test."""
-    code, out, err = run_python(ELSEWHERE + what, NUMBA_CACHE_DIR=str(tmp_path))
-    assert (code, out) == (0, "interrupted\n"), err
+    status, out, err = run_python(ELSEWHERE + code, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (status, out) == (0, shown), err

@@ -45,7 +45,7 @@ def start(popen, arguments, folder, code=None):
         text=True,
     )
     wait_until(lambda: temporaries(folder) or process.poll() is not None)
-    time.sleep(0.5)  # s, so that it is usually further on; a signal that comes earlier has to end it as well
+    time.sleep(0.2)  # s, so that it is usually further on; a signal that comes earlier has to end it as well
     return process
 
 
@@ -236,7 +236,7 @@ launch()
 """
 
 
-@pytest.mark.parametrize(("encoding", "sign"), [("ascii", b"\\u2713"), ("latin-1", b"\\u2713"), ("utf-8", "✓".encode())])
+@pytest.mark.parametrize(("encoding", "sign"), [("latin-1", b"\\u2713"), ("utf-8", "✓".encode())])
 def test_an_encoding_without_our_signs_is_no_error(encoding, sign):
     environment = variables(PYTHONPATH=str(ROOT), PYTHONIOENCODING=encoding)
     done = subprocess.run([sys.executable, "-c", SIGNS], env=environment, capture_output=True, timeout=PATIENCE)

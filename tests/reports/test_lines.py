@@ -12,7 +12,7 @@ from conservative.method import Role
 from conservative.reports.rows import lines
 from conservative.reports.rows.names import with_names
 
-from .made_up import curves, row
+from .made_up import curves, curves_of, row
 from .rows import frame
 
 T = np.linspace(0.5, 60, 120)
@@ -28,10 +28,15 @@ def test_drifts_of_motions_have_their_sign_and_the_name_without_a_tolerance():
     assert set(drifts["name"]) == {"engine"}
 
 
+def points(samples):
+    """Return the points (n, 3) of lines on a sphere."""
+    return lines.curves(with_names(measurement.samples_frame(samples)))[["x", "y", "z"]].to_numpy()
+
+
 @pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
 def test_curves_lie_on_the_unit_sphere(name):
-    found = lines.curves(with_names(measurement.samples_frame(curves(registry.scene(name), registry.method("reduced")))))
-    assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
+    found = points(curves_of(name))
+    assert np.abs(np.linalg.norm(found, axis=1) - 1).max() < 1e-13  # measured 3e-16
     assert 200 < len(found) <= motion.SAMPLES
 
 
@@ -39,10 +44,7 @@ def test_polhode_is_the_same_whatever_the_body_axes():
     base = scenes.brick_flip()
     S = rotation_about((1.0, 2.0, -0.5), 0.7)
     turned = Scene("turned", RigidBody(S.T @ base.body.inertia @ S), base.R_WB0 @ S, S.T @ base.w_WB_B0, base.t_end, dt=base.dt)
-    one, other = (
-        np.abs(lines.curves(with_names(measurement.samples_frame(curves(scene, Reduced()))))[["x", "y", "z"]].to_numpy())
-        for scene in (base, turned)
-    )
+    one, other = (np.abs(points(samples)) for samples in (curves_of("brick_flip"), curves(turned, Reduced())))
     assert np.abs(one - other)[:50].max() < 1e-9  # measured 3e-13
 
 

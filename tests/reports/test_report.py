@@ -35,7 +35,18 @@ def made(tmp_path_factory):
     """A real report of one scene and three methods: its folder and the result of the command."""
     folder = tmp_path_factory.mktemp("made") / "report"
     methods = "reduced,mujoco:RK4,heyoka:tol=1e-9,frame=non_spinning"
-    options = ["--quick", "--scenes", "brick_flip", "--methods", methods, "--latex", "--out", str(folder)]
+    options = [
+        "--quick",
+        "--time-limit",
+        "0.03",
+        "--scenes",
+        "brick_flip",
+        "--methods",
+        methods,
+        "--latex",
+        "--out",
+        str(folder),
+    ]
     done = CliRunner().invoke(main, ["report", *options], env={"COLUMNS": "80"})
     assert done.exit_code == 0, done.output
     return folder, done
@@ -151,7 +162,7 @@ def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
     commits = iter(["before", "after"])
     monkeypatch.setattr(report, "provenance", lambda: replace(provenance([]), commit=next(commits)))
     monkeypatch.setattr(report, "measure", lambda plan, step, progress: measurements())
-    monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
+    monkeypatch.setattr(report, "render", lambda document, folder, png: document)
     written = report.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
     assert written.data["commit"] == "before"
 

@@ -31,6 +31,7 @@ from conservative.reports.sections.report import build
 
 from ..crossing import ROWS, write_file
 from ..sampling import sampled
+from ..shared_reader import reading_worker, shared_reader  # noqa: F401
 from . import made_up
 
 PARTS = [feature for feature, row in ROWS.items() if row.in_file]
@@ -79,6 +80,7 @@ def check(document, scene, folder):
     assert (folder / "index.html").stat().st_size > 1e5
 
 
+@pytest.mark.usefixtures("shared_reader")
 @pytest.mark.parametrize("seed", sampled([0, 7, 8], 1, [8]))  # gravity, a torque, damping on a body from a URDF file
 def test_a_page_of_a_file_without_a_step(seed, tmp_path, without_files):
     path = random_file(tmp_path, seed)
@@ -169,7 +171,7 @@ def test_a_centre_of_mass_in_the_fixed_point_is_drawn(tmp_path):
 def rows_of_a_report(monkeypatch, tmp_path):
     """`report` with made-up rows, which are counted as they are measured."""
     monkeypatch.chdir(tmp_path)
-    found, count = [*made_up.convergence("reduced", 2), *made_up.curves(registry.scene("brick_flip"), cv.Reduced())], []
+    found, count = [*made_up.convergence("reduced", 2), *made_up.curves_of("brick_flip")], []
 
     def findings(study, tell):
         count.append(study.name)
@@ -184,23 +186,36 @@ def fault(*_, **__):
     raise ZeroDivisionError("planted")
 
 
-PLANTED = {  # what fails, and a word of its sentence
-    "section": (advice, "section", "'advice'"),
-    "chart": (scenes, "convergence_figure", "chart of convergence of brick_flip"),
-    "animation": (tumbling, "animation", "animation of brick_flip"),
-    "results": (tumbling, "results", "'motion'"),
-    "picture": (style, "picture_file", "'brick_flip: attitude error against step'"),
+class Cell:
+    """A cell of a table that cannot be shown."""
+
+    def __str__(self):
+        raise ZeroDivisionError("planted")
+
+
+PLANTED = {  # what fails, how, and a word of its sentence
+    "section": (advice, "section", fault, "'advice'"),
+    "chart": (scenes, "convergence_figure", fault, "chart of convergence of brick_flip"),
+    "animation": (tumbling, "animation", fault, "animation of brick_flip"),
+    "results": (tumbling, "results", fault, "'motion'"),
+    "picture": (style, "picture_file", fault, "'brick_flip: attitude error against step'"),
+    "block": (scenes, "accuracy", lambda *_: Table(["method"], [[Cell()]], "accuracy"), ""),
+    "table in LaTeX": (latex, "table", fault, "'report.tex'"),
 }
+TOGETHER = ("section", "animation", "block", "table in LaTeX")
 
 
-@pytest.mark.parametrize("what", sampled(PLANTED, 2, ["section", "animation"]))
-def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(what, rows_of_a_report, tmp_path, monkeypatch):
-    place, name, words = PLANTED[what]
-    if what != "picture":
+@pytest.mark.parametrize(
+    "parts", [TOGETHER, *(pytest.param((part,), marks=pytest.mark.slow) for part in PLANTED)], ids="+".join
+)
+def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(parts, rows_of_a_report, tmp_path, monkeypatch):
+    if "picture" not in parts:
         monkeypatch.setattr(style, "picture_file", lambda picture, kind: b"")
-    command = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced"]
+    command = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--latex"]
     with monkeypatch.context() as patch:
-        patch.setattr(place, name, fault)
+        for part in parts:
+            place, name, broken, _ = PLANTED[part]
+            patch.setattr(place, name, broken)
         done = CliRunner().invoke(main, command)
     assert done.exit_code == 1, (done.output, done.exception)
     folder = tmp_path / "report"
@@ -208,11 +223,18 @@ def test_a_part_that_fails_is_a_sentence_and_nothing_measured_is_lost(what, rows
     table, content = pd.read_csv(folder / "measurements.csv"), json.loads((folder / "measurements.json").read_text())
     assert len(table) == len(content["rows"]) == len(made_up.convergence("reduced", 2))
     assert set(content["files"]) == {path.name for path in folder.iterdir()}
-    for text in (done.stderr, (folder / "index.html").read_text(), (folder / "report.md").read_text()):
+    page, pages = (folder / "index.html").read_text(), [folder / "index.html", folder / "report.md"]
+    for text in (done.stderr, *([] if parts == ("table in LaTeX",) else [path.read_text() for path in pages])):
         assert "ZeroDivisionError: planted" in text
         assert "--resume" in text
-    assert words in done.stderr
-    assert "Where drift comes from" in (folder / "index.html").read_text() or what == "results"
+    for part in parts:
+        assert PLANTED[part][-1] in done.stderr
+    if "table in LaTeX" in parts:
+        assert "'report.tex' could not be made (ZeroDivisionError: planted)" in done.stderr
+    if "block" in parts:
+        assert page.count("ZeroDivisionError: planted") == len(parts) - ("table in LaTeX" in parts)
+    assert "Where drift comes from" in page or parts == ("results",)
+    assert "observed order" in page  # the table next to the accuracy
     measured = len(rows_of_a_report)
     done = CliRunner().invoke(main, [*command, "--resume"])
     assert done.exit_code == 0, done.output
@@ -228,28 +250,6 @@ def test_an_animation_that_cannot_be_drawn_is_a_sentence(tmp_path):
     assert "trajectories: got []" in sentence
     page = (tmp_path / "index.html").read_text()
     assert page.index("trajectories: got []") < page.index("after it")
-
-
-def test_a_block_that_cannot_be_rendered_is_a_sentence(rows_of_a_report, without_files, tmp_path, monkeypatch):
-    class Cell:
-        def __str__(self):
-            raise ZeroDivisionError("planted")
-
-    monkeypatch.setattr(scenes, "accuracy", lambda *_: Table(["method"], [[Cell()]], "accuracy"))
-    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced"])
-    assert done.exit_code == 1
-    page = (tmp_path / "report" / "index.html").read_text()
-    assert page.count("ZeroDivisionError: planted") == 1
-    assert "observed order" in page  # the table next to it
-
-
-def test_a_table_in_latex_that_fails_leaves_the_pages(rows_of_a_report, tmp_path, monkeypatch):
-    monkeypatch.setattr(latex, "table", fault)
-    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--latex"])
-    assert done.exit_code == 1
-    assert "'report.tex' could not be made (ZeroDivisionError: planted)" in done.stderr
-    assert {"index.html", "report.md", "measurements.csv"} <= {path.name for path in (tmp_path / "report").iterdir()}
-    assert "observed order" in (tmp_path / "report" / "index.html").read_text()
 
 
 def test_measurements_are_written_if_no_page_can_be(rows_of_a_report, tmp_path, monkeypatch):

@@ -23,7 +23,7 @@ from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import LockedEngine, provenance
 from conservative.reports.sections.report import build
 
-from .made_up import at_step, convergence, curves, measurements, over_steps
+from .made_up import at_step, convergence, curves, curves_of, measurements, over_steps
 from .made_up import named as engines_of
 from .rows import frame, parts, point, row
 from .rows import texts as texts_of
@@ -56,8 +56,7 @@ def nothing_is_measured(monkeypatch):
 def report():
     """Plan, measurements and origin of a report of both scenes: curves are measured."""
     plan = plan_report([], ["reduced"], quick=True)
-    found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
-    samples = [finding for finding in found if isinstance(finding, Samples)]
+    samples = [curve for scene in plan.scenes for curve in curves_of(scene.name)]
     return plan, Measurements(measurements().table, measurement.samples_frame(samples)), provenance(["report"])
 
 
@@ -68,32 +67,30 @@ def texts(document, folder):
 
 
 def test_building_and_rendering_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):
-    text, page = texts(build(*report), tmp_path)
+    """The report has no section of engines but the locks of its methods."""
+    plan, measured, source = report
+    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3.11.7", ("numpy==2.0",)),))
+    document = build(plan, measured, locked)
+    text, page = texts(document, tmp_path)
     assert 'data-figure="sphere_lagrange_top"' in page
     assert "The motion itself" not in text  # its figures are on the page alone
+    for each in (text, page):
+        assert not any(part in each for part in ("## Engines", 'id="engines"'))
+        assert "Environments of engines" in each
+        assert "numpy==2.0" in each.rpartition("How this was made")[2]
+    assert json.loads(json_renderer.render(document.data))["environments"][0]["packages"] == ["numpy==2.0"]
 
 
 def test_engines_and_locks_are_in_the_document(report, nothing_is_measured, tmp_path):
     plan, measured, source = report
     rows = [*at_step("exudyn==1.0", "RK44", 1e-6), *over_steps("exudyn==1.0", "RK44", (1e-1, 1e-2, 1e-3, 1e-4), 4.0)]
-    named = dataclasses.replace(plan, engines=(registry.method("pinocchio"), *engines_of(rows)))
+    (brick, _) = plan.scenes
+    named = dataclasses.replace(plan, scenes=(brick,), engines=(registry.method("pinocchio"), *engines_of(rows)))
     locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3", ("exudyn==1.0", "numpy==2.0")),))
     document = build(named, Measurements(measurement.frame(rows), measured.samples), locked)
     for text in texts(document, tmp_path):
         assert all(part in text for part in ("exudyn==1.0/RK44", "4.00 ± 0.01 (4)", "exudyn==1.0, numpy==2.0"))
     assert (tmp_path / "engines_brick_flip.svg").exists()
-
-
-def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_methods(report, nothing_is_measured, tmp_path):
-    plan, measured, source = report
-    for text in texts(build(plan, measured, source), tmp_path):
-        assert not any(part in text for part in ("## Engines", 'id="engines"', "Environments of engines"))
-    locked = dataclasses.replace(source, environments=(LockedEngine("exudyn==1.0", "Python 3.11.7", ("numpy==2.0",)),))
-    document = build(plan, measured, locked)
-    for text in texts(document, tmp_path):
-        assert "Environments of engines" in text
-        assert "numpy==2.0" in text.rpartition("How this was made")[2]
-    assert json.loads(json_renderer.render(document.data))["environments"][0]["packages"] == ["numpy==2.0"]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +126,10 @@ def test_orders_of_attitude_and_rates_are_fitted_to_their_own_errors(report):
         for measure, order in (("attitude error max", 2), ("rate error max", 3))
         for dt in (0.1, 0.05, 0.025, 0.0125)
     ]
-    document = build(plan, Measurements(measurement.frame(errors), measured.samples), source)
+    (brick, _) = plan.scenes
+    document = build(
+        dataclasses.replace(plan, scenes=(brick,)), Measurements(measurement.frame(errors), measured.samples), source
+    )
     (line,) = texts_of(tables(document, "All tables of brick_flip")["brick_flip: observed order"])
     assert line[:3] == ["reduced", "2.00 ± 0.00", "3.00 ± 0.00"]
 

@@ -24,6 +24,7 @@ from conservative.reports.run.single_study import plan_study
 from conservative.reports.sections.study import rows_table
 from conservative.scenes.random_body import FIELDS
 
+from ..sampling import sampled
 from .rows import frame, row
 from .test_random_ratios import SLOWER, TWICE
 
@@ -151,7 +152,7 @@ def numbers(finding):
     return [value.tobytes() if isinstance(value, np.ndarray) else repr(value) for value in vars(finding).values()]
 
 
-@pytest.mark.parametrize("name", ["paper", "long_runs"])
+@pytest.mark.parametrize("name", sampled(["paper", "long_runs"], 1, ["long_runs"]))
 def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
     study = plan_study(name, ("brick_flip", "symmetric_body"), ("gauss",))
     here, told = Here(), []

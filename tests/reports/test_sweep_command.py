@@ -138,8 +138,8 @@ def test_text_has_the_same_figures_without_a_folder_and_bodies_that_fail_are_lis
     for part in ("bodies", "2: 0 ok, 2 ", "rate=1%; seed 0", "none: no body has this invariant, or all bodies failed"):
         assert part in done.stdout
     assert "body 1 " in done.stdout
-    assert done.stderr.count("\n") == 1
-    assert "2 of 2 bodies failed, the first of them number 0: " in done.stderr
+    (error,) = [line for line in done.stderr.splitlines() if "bodies/s" not in line]  # without the progress of a slow machine
+    assert "2 of 2 bodies failed, the first of them number 0: " in error
 
 
 def test_an_error_instead_of_a_step():
