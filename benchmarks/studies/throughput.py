@@ -284,5 +284,5 @@ STUDY = Declaration(
     settings=methodcaller("settings_for", "many"),
     in_report=family_settings,
     options=("methods", "bodies", "seed", "sizes"),
-    more=(("quick", True), ("bodies", QUICK_BODIES)),  # coarse: preparing engines takes minutes
+    report_keywords=(("quick", True), ("bodies", QUICK_BODIES)),  # coarse: preparing engines takes minutes
 )

@@ -151,7 +151,8 @@ def plan_report(
             continue
         limit = kind.time_limit if time_limit is None and not (named and declared.named) else time_limit
         extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if declared.draw else shared
-        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent, **dict(declared.more)}
+        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent}
+        settings |= dict(declared.report_keywords)
         study = declared.plan(taken, () if declared.scenes else chosen, kind.processes, **settings)
         if declared.draw and few:
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])
