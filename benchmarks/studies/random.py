@@ -66,6 +66,7 @@ MARGIN = 3.0
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run above which only every third setting of a line is measured."""
 TIME = Value(Measure.TIME, math.nan)
+"""The time of a setting that is not timed."""
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
 
 
@@ -120,10 +121,10 @@ Line = list[TimedSetting]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    every = study.drawn or (NOT_DRAWN,) * len(study.scenes)
+    drawn_of_scenes = study.drawn or (NOT_DRAWN,) * len(study.scenes)
     tell = study.count(progress, len(study.lines) + 2)
     with Processes(study.processes) as processes:
-        for scene, drawn in zip(study.scenes, every, strict=True):
+        for scene, drawn in zip(study.scenes, drawn_of_scenes, strict=True):
             tell(f"{scene.name}: truth")
             coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
             about = Case(study.name, scene, Precise(BITS), coarsest, drawn)
@@ -186,9 +187,9 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     chosen: dict[TimedSetting, None] = {}
     for side, error in itertools.product(sides.values(), DECADES):
         costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in side]
-        least = min((each for each in costs if not math.isnan(each)), default=math.nan)
-        for line, each in zip(side, costs, strict=True):
-            if each <= MARGIN * least:
+        least = min((seconds for seconds in costs if not math.isnan(seconds)), default=math.nan)
+        for line, seconds in zip(side, costs, strict=True):
+            if seconds <= MARGIN * least:
                 chosen.update((line[i], None) for i in list_deciding([p.error for p in line], error))
     return list(chosen)
 

@@ -22,6 +22,7 @@ from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 TIME = Value(Measure.TIME, math.nan)
+"""The time of a point that is not timed."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
