@@ -35,9 +35,9 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
+    all_names = [engine for name in names for engine in (list_installed() if name == ALL else (name,))]
     methods: list[Method] = []
-    for name in dict.fromkeys(registry.read_name(each, "engines", settings=False) for each in every):
+    for name in dict.fromkeys(registry.read_name(name, "engines", settings=False) for name in all_names):
         try:
             methods += _family(name.base, name.version).settings_in_tables()
         except MissingEngine as error:
@@ -63,7 +63,7 @@ def list_installed() -> tuple[str, ...]:
     newest = {
         environment.engine: environment for environment in list_environments() if environment.engine in known
     }  # older versions come first
-    apart = [each.name for name, each in newest.items() if here.get(name) != each.version]
+    apart = [environment.name for name, environment in newest.items() if here.get(name) != environment.version]
     return (*here, *apart, *list_programs())
 
 

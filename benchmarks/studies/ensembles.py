@@ -39,7 +39,7 @@ def draw(kind: str, n: int, seed: int = 0) -> Batch:
     J = second.sum(axis=1, keepdims=True) - second
     J /= J.mean(axis=1, keepdims=True)
     normal = (table.standard_normal((n, 4)) for table in tables[1:3])
-    R_BP, R_WB0 = (from_quaternion(each / np.linalg.norm(each, axis=1)[:, None]) for each in normal)
+    R_BP, R_WB0 = (from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]) for q in normal)
     w_WB_B0 = RATE * tables[3].standard_normal((n, 3))
     inertia = (R_BP * J[:, None]) @ R_BP.swapaxes(1, 2)
     inertia = (inertia + inertia.swapaxes(1, 2)) / 2

@@ -164,8 +164,8 @@ def verify(
     left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
-    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        verifications = verify(names, tell=step, **options)
+    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as tell:
+        verifications = verify(names, tell=tell, **options)
         made = {
             "csv": lambda: section.findings_text(verifications),
             "errors.csv": lambda: section.errors_text(verifications),

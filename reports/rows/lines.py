@@ -118,7 +118,8 @@ def fits(errors: pd.DataFrame) -> pd.DataFrame:
 
 def orders(rows: pd.DataFrame) -> pd.Series[float]:
     """Return the observed order of each method by its name, without those whose standard error is above `SURE`."""
-    order, error = (of_measure(rows, each).groupby("method")["value"].last() for each in (Measure.ORDER, Measure.ORDER_STDERR))
+    measures = Measure.ORDER, Measure.ORDER_STDERR
+    order, error = (of_measure(rows, measure).groupby("method")["value"].last() for measure in measures)
     return order[~(error.reindex(order.index) > SURE)]
 
 

@@ -113,7 +113,7 @@ def names_in_turn(picture: pd.DataFrame) -> tuple[str, ...]:
     turns = (MethodClass.GENERAL, MethodClass.ENGINE, MethodClass.SOLVER)
     sides = [[name for _, name in ranked if classes[name] == kind] for kind in turns]
     rest = [name for _, name in ranked if classes[name] not in turns]
-    return tuple([name for each in zip_longest(*sides) for name in each if name] + rest)
+    return tuple([name for names in zip_longest(*sides) for name in names if name] + rest)
 
 
 def _rank(line: pd.DataFrame) -> tuple[int, float]:

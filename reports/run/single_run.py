@@ -31,7 +31,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..document.cells import angle
-from ..terminal.progress import Step
+from ..terminal.progress import Tell
 
 SAMPLES = 1_000_000
 """Largest number of samples. Shorter runs store every step."""
@@ -102,7 +102,7 @@ def run_methods(
     dt: float | None,
     t_end: float | None,
     truth: bool | None,
-    step: Step,
+    tell: Tell,
     target: float | None = None,
 ) -> tuple[list[dict[str, Any]], Trajectory]:
     """Return the summary of each method on a scene, with its errors, and the trajectory of the last one.
@@ -127,7 +127,7 @@ def run_methods(
     for run in planned:
         _ = run.method.label  # raises `MissingEngine`
     for number, run in enumerate(planned):
-        step(number / len(planned), run.typed)
+        tell(number / len(planned), run.typed)
         if run.refusal:
             summaries.append(run.refused(scene))
             continue

@@ -202,7 +202,8 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
     ends = pd.concat([of_measure(rows, measure) for measure in (Measure.ATTITUDE_MAX, Measure.TIME)])
     outcome = next((outcome for outcome in outcomes(ends) if not outcome.ok), OK)
     usable = with_outcome(of_measure(line, Measure.ATTITUDE_MAX), OutcomeKind.OK)
-    expected, error, bits = (_value(rows, each) for each in (Measure.ORDER_EXPECTED, Measure.ATTITUDE_MAX, Measure.PRECISION))
+    measures = Measure.ORDER_EXPECTED, Measure.ATTITUDE_MAX, Measure.PRECISION
+    expected, error, bits = (_value(rows, measure) for measure in measures)
     longest_step, step_time = float(usable[usable["value"] <= USABLE]["dt"].max()), _value(rows, Measure.TIME_PER_STEP)
     if math.isnan(expected):  # it chooses its steps
         longest_step = step_time = math.nan
