@@ -26,8 +26,10 @@ from .mistakes.scenes import SceneMistake
 from .mistakes.times import Time
 from .solution import Equations, truth
 
-SLOWEST, FASTEST = 0.5, 1.1  # times are scaled by at least, and at most
-AHEAD = 8  # steps that a motion runs ahead of a habit
+FASTEST = 1.1
+"""Largest factor of times."""
+AHEAD = 8
+"""Number of steps that the exact motion first runs ahead of a habit."""
 _DEFAULTS = {field.name: field.default for field in fields(Equations) if field.name not in ("scene", "tolerance", "most")}
 
 

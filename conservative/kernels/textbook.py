@@ -18,8 +18,10 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import Model
 from .symplectic import torque
 
-FAILURE = "no solution within 100 corrections"  # of generalised-alpha
-PAUSE = 2**13  # steps between two calls of handlers of signals
+FAILURE = "no solution within 100 corrections"
+"""Reason that a step of generalised-alpha fails."""
+PAUSE = 2**13
+"""Steps between two calls of handlers of signals."""
 MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC, SPIERS, SPIERS_RATES = range(7)
 ROUND_OFF, NEARLY, REST = 1e-30, 1e-20, 1e-4
 """The solver stops at the first squared correction, relative to squared accelerations and REST, or where corrections below the

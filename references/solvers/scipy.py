@@ -39,7 +39,8 @@ _COMPILED: dict[str, dict[str, Any]] = {
     **{"BDF": {"name": "vode", "method": "bdf", "with_jacobian": True}, "Adams": {"name": "vode", "method": "adams"}},
 }
 """Settings of `scipy.integrate.ode` for its integrators that are like ours."""
-_SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
+_SMALLEST_RTOL = 2.3e-14
+"""Smallest relative tolerance, 100 rounding units. SciPy raises smaller ones to this one, with a warning."""
 
 Derivative = Callable[[float, Array], Array]
 

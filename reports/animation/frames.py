@@ -30,7 +30,8 @@ MOST = 1e6
 ERROR = "attitude error, rad"
 LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
 """Largest values that are good, and fair, of the attitude error; for drifts they are 1e-10 and 1e-3."""
-FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
+FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")
+"""Colours of the faces +x, -x, +y, -y, +z, -z."""
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
 COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
 GRADES = {"good": "#cdebd8", "fair": "#fbe9b7", "bad": "#f8cfc8"}

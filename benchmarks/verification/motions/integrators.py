@@ -258,7 +258,8 @@ def adams(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
     return y + h * f(t, y) if not past else y + h * (3 * f(t, y) - f(t - h, past[0])) / 2
 
 
-KICKS = 12  # iterations, each of which multiplies the error by h D / 2, at most 0.03 here
+KICKS = 12
+"""Number of iterations of a kick. Each multiplies the error by h D / 2, at most 0.03 here."""
 
 
 def splitting(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:

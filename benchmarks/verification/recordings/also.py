@@ -16,7 +16,8 @@ from .attitudes import to_matrices
 from .digits import TURNS, find_quantum
 from .layout import ATTITUDES, Layout, Options
 
-TRIED = 200  # rows on which readings are tried
+TRIED = 200
+"""Number of rows on which readings are tried."""
 SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
 
 

@@ -32,11 +32,16 @@ from ..compare import (
 from ..solution import States, closed, truth
 from .table import Recording
 
-MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
-ROUND_OFF = 2e-15  # of an exact motion
-ROWS_OF_NOISE = 4000  # rows that noise is estimated from
-CLEARLY = 2.0  # times what is allowed, that half of the single rows that are off have as their error
-QUARTER = math.pi / 2  # rad from row to row, above which differences of high order of a motion do not fall
+MOST_NOISE = 0.05
+"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
+ROUND_OFF = 2e-15
+"""Error of an exact motion, rad."""
+ROWS_OF_NOISE = 4000
+"""Largest number of rows from which noise is estimated."""
+CLEARLY = 2.0
+"""Smallest median error of single rows that are off, in allowed errors."""
+QUARTER = math.pi / 2
+"""Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,8 @@ from .layout import Layout, Options
 from .rows import Cleaner
 from .units import find_units, guess_time
 
-ROWS = 2000  # rows that are kept for fits, evenly chosen: this to twice as many
+ROWS = 2000
+"""Smallest number of rows that are kept for fits, evenly chosen; up to twice as many."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,13 @@ from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .table import Recording
 
-ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4  # errors that a good solver may leave, in double and in single precision
-SHAPE = 1e-6  # departure from a rotation that a good solver may leave
+ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
+"""Errors that a good solver may leave, in double and in single precision."""
+SHAPE = 1e-6
+"""Departure from a rotation that a good solver may leave."""
 UNITS = "rad", "of the largest rate"
-FAR = 0.05  # rad, or of the largest rate: of another motion
+FAR = 0.05
+"""Error, rad or relative to the largest rate, above which a motion is a different one."""
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
