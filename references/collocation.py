@@ -148,5 +148,5 @@ def _tableau() -> tuple[Reals, Reals, Reals]:
         derivative = s * (x * P[s] - P[s - 1]) / (x * x - 1)
         x = x - P[s] / derivative
     weights = 2 / ((1 - x * x) * derivative**2)
-    integrals = np.array(P[1:]) - np.array([-P[0], *P[: s - 1]])  # (2 k + 1) times those from -1 to the nodes
+    integrals = np.array(P[1:]) - np.array([-P[0], *P[: s - 1]])  # (2 k + 1) times the integrals from -1 to the nodes
     return (1 + x) / 2, weights / 2, integrals.T @ np.array(P[:s]) * weights / 4

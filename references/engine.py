@@ -31,7 +31,7 @@ from .samples import MATRIX, States, to_body_axes
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
 PACE_STEPS = 1000
-"""After so many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
+"""Number of steps after which the time of the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
 SHARE = 15 / 16
 """Mass of a body about a fixed point, relative to the largest possible one: the mass of the paper's cone."""
 LONG = 1e5

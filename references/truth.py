@@ -181,7 +181,7 @@ def _is_collocated(scene: Scene) -> bool:
 
 
 def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
-    """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, and the last change."""
+    """Return the collocation with enough steps, so that twice as many change it by at most `CONFIRMED`, and the last change."""
     breaks, step, *_ = scene.smoothness(grid.last)
     knots = _knots(grid)
     gaps = np.diff(np.union1d(knots.t, breaks[breaks < grid.t[-1]]))

@@ -111,7 +111,7 @@ def write_text(document: Document, path: Path, render: Callable[[Document], str]
 
 
 def with_pictures(document: Document, draw: Callable[[Figure], str], then: str = "") -> tuple[Document, dict[str, str]]:
-    """Return a document with a sentence in place of what cannot be drawn, and the names of the files of its pictures.
+    """Return a document with a sentence in place of pictures that cannot be drawn, and the names of the files of its pictures.
 
     `then` is a sentence after each of these sentences.
     """

@@ -30,7 +30,7 @@ class Extent(IntEnum):
 
 @dataclass(frozen=True)
 class Declaration:
-    """A study as it is declared; its name is that of its file.
+    """A study as it is declared; its name is the name of its file.
 
     Attributes
     ----------

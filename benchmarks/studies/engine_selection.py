@@ -15,7 +15,7 @@ from conservative.references.environments.environment import list_environments
 from .selection import Missing
 
 ALL = "all"
-"""The name of all installed engines: those of this environment, and the newest version of each in an environment of its own."""
+"""The name of all installed engines: in this environment, and the newest version of each in an environment of its own."""
 
 
 def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
@@ -50,7 +50,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
 
 
 def list_installed() -> tuple[str, ...]:
-    """Return the installed engines: those in this environment, the newest version of each in its own environment, and programs.
+    """Return the installed engines: in this environment, the newest version of each in its own environment, and programs.
 
     If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """

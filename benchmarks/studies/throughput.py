@@ -7,9 +7,9 @@ and for our methods also one body at a time.
 * The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Rows contain the median and the 95th
   percentile over the first `bodies` of a kind. Each body has a reference solution that an independent one confirms
   (`conservative.references.truth`); a body for which they disagree is dropped.
-* The time is that of a prepared run over the same motion, final state only, in interleaved rounds and several processes. The
-  time of the preparation has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest that
-  reaches it and the one before it, and exact solutions.
+* The time is the time of a prepared run over the same motion, final state only, in interleaved rounds and several processes.
+  The time of the preparation has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest
+  that reaches it and the one before it, and exact solutions.
 * With increasing numbers of bodies, a setting is skipped as soon as a call would exceed the time budget.
 """
 
@@ -113,7 +113,7 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Bodies of one kind, the indices (n,) of those whose errors are measured, and their exact attitudes (n, samples, 3, 3)."""
+    """Bodies of one kind, the indices (n,) of the `measured` ones, and their exact attitudes (n, samples, 3, 3)."""
 
     study: ThroughputStudy
     bodies: Batch

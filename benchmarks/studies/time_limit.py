@@ -47,7 +47,7 @@ class Trial:
 def is_quick(case: Case) -> bool:
     """Return whether a case is known to be quick: it takes a fixed number of steps that call no Python functions.
 
-    Steps that call those of a scene, or a method of other people, take as long as the functions need.
+    Steps that call functions of a scene, and methods of other people, take as long as the functions need.
     """
     return isinstance(case.method, Missing) or (is_known_to_end(case.method) and not case.scene.calls_python)
 

@@ -176,7 +176,7 @@ class Compared:
         return changed
 
     def first(self, angle: float, least: int) -> Compared:
-        """Return the rows in which the body turns by an angle, rad, or at least so many."""
+        """Return the rows in which the body turns by an angle, rad, or at least `least` rows."""
         return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
 
     def read(self, R: Array | None, w: Array | None) -> Compared:

@@ -43,7 +43,7 @@ LITTLE = 0.05
 SHRUNK = 1e-3
 """A motion in other units of time that moves by less than this share of the exact motion stands still."""
 SHOWN = 10.0
-"""A motion in other units of time that moves by less than so many allowed errors shows nothing."""
+"""A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -199,7 +199,7 @@ def _changes(case: Compared, asked: _Asked) -> Explanations:
 
 
 def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
-    """Return trials without numbers that make a difference, by the size of what they leave from the start of the scene.
+    """Return trials without numbers that make a difference, by the error that they leave from the start of the scene.
 
     Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
     """

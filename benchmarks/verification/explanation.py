@@ -55,7 +55,7 @@ class Trial:
         return tuple(mistake.key for mistake in self.mistakes)
 
     def sentence(self, values: Mapping[str, float]) -> str:
-        """Return what is wrong, with numbers."""
+        """Return the sentences of the mistakes, with numbers."""
         return ". ".join(mistake.sentence.format(**values) for mistake in self.mistakes) + self.remark
 
 

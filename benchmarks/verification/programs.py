@@ -437,7 +437,7 @@ def verify_method(
 
 
 def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
-    """Return what decides the verdict, with the number of cases of each check that are right."""
+    """Return the reason of the verdict, with the number of cases of each check that are right."""
     parts = []
     for check in dict.fromkeys(finding.check for finding in findings):
         some = [finding for finding in findings if finding.check == check and finding.verdict is not Verdict.NOT_TESTED]

@@ -89,7 +89,7 @@ def times(subject: str, method: EngineMethod) -> Iterator[Finding]:
 
 
 def _measure(worker: Worker, run: int) -> tuple[str, str]:
-    """Return what is wrong with the time of a long request, or "", and a sentence with its numbers."""
+    """Return the fault in the time of a long request, or "", and a sentence with its numbers."""
     calls, wall, seconds = 1, 0.0, 0.0
     while wall < PACE and calls < 1e6:
         calls, start = 4 * calls, perf_counter()

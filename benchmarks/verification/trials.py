@@ -156,7 +156,7 @@ def _at_times(
 
 
 def by_rule(rule: Rule, parts: int) -> Trial:
-    """Return the trial of a rule that integrates attitudes from exact rates, with so many steps between two rows."""
+    """Return the trial of a rule that integrates attitudes from exact rates, with `parts` steps between two rows."""
 
     def build(case: Compared) -> Solution | None:
         if case.data[0] is None:

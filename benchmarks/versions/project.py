@@ -357,7 +357,7 @@ def _moves(was: Row, now: Row) -> bool:
 
 def _moved(was: Row, now: Row) -> Change:
     """Return the change to another motion, with its cause."""
-    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.outcome})"
+    before = f"{error_of(was):.3g} rad from the motion of the scene" if was.values else f"without values ({was.outcome})"
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.outcome})"
     cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
     return Change(RowName(now.scene, now.method, MOTION), before, f"{size}. {cause}")

@@ -483,7 +483,7 @@ def put(v, i, x):
 
 @kernel
 def solve_alone(h, J, J_inverse, field, q, L, carry, largest_square, a, L1, carry1, trusted, finished, first):
-    """Solve for the lanes that are not trusted, one by one; return solutions and momenta of all with what they lost.
+    """Solve for the lanes that are not trusted, one by one; return solutions and momenta of all, with their carries.
 
     A body without a solution is brought to rest, where it needs no further work, and noted in `finished`.
     """

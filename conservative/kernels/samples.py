@@ -1,4 +1,4 @@
-"""Samples in body axes out of what kernels store: quaternions and momenta in principal axes."""
+"""Samples in body axes from the results of kernels: quaternions and momenta in principal axes."""
 
 from __future__ import annotations
 

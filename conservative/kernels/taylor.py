@@ -317,7 +317,7 @@ def quaternion(g, a):
     return (b[0] - a[1], a[2] + g[0], b[2] + g[1], 1.0 - a[0] - b[1] + g[2])
 
 
-# Optimised twice: once alone, steps of a free body take 1.05 times and those in a turning field 1.06 times as long.
+# Optimised twice: once alone, steps of a free body take 1.05 times and steps in a turning field 1.06 times as long.
 @partial(kernel, forceinline=True)
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step that cannot be projected fails; the size is the relative defect that remains."""

@@ -66,7 +66,7 @@ class Environment:
     folder
         The virtual environment, the folder of `node_modules`, or the folder of the compiled program.
     runtime
-        Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
+        Name and version of the program that runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
         All installed packages, as `name==version`.
     kind

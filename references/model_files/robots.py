@@ -201,7 +201,7 @@ def _place_for(folder: Path, path: Path, suffix: str) -> Path:
 
 
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
-    """Return the bodies of an MJCF file: those in the world, and those on joints."""
+    """Return the bodies of an MJCF file: bodies in the world, and bodies on joints."""
     root, missing = inline(path, search)
     spec, entries = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
 

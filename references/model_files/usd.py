@@ -121,7 +121,7 @@ class Stage:
         return (axes * np.array(moments, float)) @ axes.T * self.kilogram * self.metre**2
 
     def authored(self, prim: Any) -> tuple[float | None, float | None, Array | None, Array | None]:
-        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for what it does not have.
+        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for a missing one.
 
         A density that is not positive is not one, by OpenUSD. Nor is such a mass, if the body has colliders.
         """

@@ -30,7 +30,7 @@ from conservative.posix import end_group, life_line, limit_resources, session_op
 from . import program
 
 START_LIMIT = 120.0
-"""Time in seconds that a program may take to start, on however busy a machine."""
+"""Time in seconds that a program may take to start, also on a busy machine."""
 TIME_LIMIT = 600.0
 """Time limit of a request in seconds, unless `time_limit` sets another."""
 LARGEST_ANSWER = 1 << 30

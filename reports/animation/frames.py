@@ -275,7 +275,7 @@ def _solid_of(moments: Array, com_P: Array) -> Solid:
 
 
 def legend(panels: Sequence[Panel], truth: int | None) -> list[tuple[str, str]]:
-    """Return colour and text of what the panels draw."""
+    """Return colour and text of the lines in the panels."""
     solids = {panel.solid.shape: f"{panel.solid.shape} of the same moments" for panel in panels}
     entries = [*((FACES[0], text) for text in solids.values()), (str(COLOURS["arrow"]), "angular momentum")]
     entries.append((str(COLOURS["trace"]), "axis of the body, and the trace of its end"))

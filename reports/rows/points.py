@@ -45,7 +45,7 @@ def points(
     -------
     pd.DataFrame
         Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see `classes`),
-        dt, error (rad), time (s per simulated second) and times (those of each process); each line coarse to fine. An error
+        dt, error (rad), time (s per simulated second) and times (of each process); each line coarse to fine. An error
         below the resolution of the reference solution is raised to it.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)

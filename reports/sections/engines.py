@@ -76,10 +76,10 @@ COLUMNS = (
 class EngineRow:
     """One setting of one engine on one scene: such as family `exudyn`, version `1.13.6` and setting `RK44`.
 
-    The outcome is that of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
+    `outcome` is the outcome of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
     `second_time` the wall time, s, of a simulated second at an error of `ERROR`; NaN if not measured or not reached. `series`
     is its line of steps or tolerances. `as_installed` is true if only the step is set, `best` if no setting of the engine has
-    a smaller error. `cells` are those of `COLUMNS` by name, except "taken".
+    a smaller error. `cells` are the cells of `COLUMNS` by name, except "taken".
     """
 
     family: str

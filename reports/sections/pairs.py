@@ -27,7 +27,7 @@ HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", 
 
 
 def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
-    """Return what differs, its reduced descriptions and scripts, and a table by pair and body for each engine."""
+    """Return the pairs that differ, their reduced descriptions and scripts, and a table by pair and body for each engine."""
     some = [finding for finding in findings if isinstance(finding, PairFinding)]
     engines = dict.fromkeys(finding.subject for finding in some)
     groups = _grouped([finding for finding in some if finding.verdict is Verdict.WRONG])

@@ -115,7 +115,7 @@ def errors_text(verifications: Sequence[Verification]) -> str:
 
 
 def summary(verification: Verification) -> list[Block]:
-    """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
+    """Return the reasons of the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)

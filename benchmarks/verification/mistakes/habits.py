@@ -190,7 +190,7 @@ STANDSTILLS = (
         1.0,
         numbers=(Number("time", unit="s"),),
     ),
-    Standstill("frozen motion", "The motion is frozen: attitude and rates are those of the start", 1.0, True),
+    Standstill("frozen motion", "The motion is frozen: attitude and rates stay as at the start", 1.0, True),
 )
 ROWS = (
     RowHabit("held rows", "One in {period:.0f} rows repeats the one before, from row {first:.0f} on", _held),

@@ -22,7 +22,7 @@ ATTITUDES, RATES, AXES = "attitudes", "rates", "axes"
 
 @dataclass(frozen=True)
 class Reading(Mistake):
-    """Another reading: `read` returns the samples that were meant, `write` those in the recording.
+    """Another reading: `read` returns the samples that were meant, `write` the samples in the recording.
 
     Attributes
     ----------

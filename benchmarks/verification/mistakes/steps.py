@@ -42,7 +42,7 @@ def _product(p: Array, q: Array) -> Array:
 
 
 def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rates: int, use: str, exact: bool) -> Array:
-    """Return the state after rates with so many corrections of their torque, then attitudes by old, new or mean rates."""
+    """Return the state after rates with up to `rates` corrections of their torque, then attitudes by old, new or mean rates."""
     new = y.copy()
     for _ in range(rates):
         before = new[4:].copy()

@@ -207,7 +207,7 @@ def turned_tableau(
 
 
 def semi_implicit(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], use: str, exact: bool, sweeps: int = 1) -> Array:
-    """Rates with so many corrections of their torque, then the attitude with old, new or mean rates."""
+    """Rates with some corrections of their torque, then the attitude with old, new or mean rates."""
     v, end = y[f.n :], y
     for _ in range(sweeps):
         end = np.concatenate([y[: f.n], v + h * f(t, end)[f.n :]])

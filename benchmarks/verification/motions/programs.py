@@ -51,7 +51,7 @@ def measure(motions: Sequence[Motion], parts: Sequence[int] = PARTS) -> list[Mea
 
 
 def single(motion: Motion) -> float:
-    """Return what single precision may add to errors: rounding of each step.
+    """Return the error that single precision may add: rounding of each step.
 
     It is larger if a momentum is, from which rates are computed: with a rotor, or a moment that is small.
     """

@@ -29,7 +29,7 @@ RUN_LIMIT = 60.0
 START_LIMIT = 600.0
 """Time limit of a run of our own methods in a new process, s, which may compile all kernels."""
 HANGS = 2
-"""After so many runs without an end, an engine is not run any more: each trial of a reduction could take the limit."""
+"""Number of runs without an end after which an engine is not run any more: each trial of a reduction could take the limit."""
 ENDLESS = f"the run had not ended after {RUN_LIMIT:g} s"
 FEW = 4
 """Fewer numbers that are not 0 show no resolution."""

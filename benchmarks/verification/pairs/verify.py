@@ -218,7 +218,7 @@ class Apart:
 LOST = Apart(math.nan, math.nan)
 """Nothing can be compared: the first motion ends early or gains energy, and the second one may."""
 WILD = 100.0
-"""A motion is lost if its rates exceed so many times the largest one at the start."""
+"""Largest rate of a motion that is not lost, relative to the largest one at the start."""
 GAIN = 0.5
 """Share of its energy that a motion may gain; otherwise the step is too long, and a lost second motion shows nothing."""
 
@@ -360,7 +360,7 @@ class _Pair:
         return self.wrong(apart, first, motion, threshold)
 
     def wrong(self, apart: Apart, first: Description, motion: str, threshold: str = "") -> PairFinding:
-        """Return the finding on a pair that differs, with what repeats it."""
+        """Return the finding on a pair that differs, with the data that repeats it."""
         size = f"{apart.value / apart.allowed:.2g} times the allowed difference" if apart.allowed else "not the same bits"
         detail = "; ".join(filter(None, (threshold, "" if math.isinf(apart.value) else size, motion)))
         relation = Relation.CRASHES if apart.crashed else Relation.DIFFERS

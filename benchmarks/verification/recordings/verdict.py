@@ -250,7 +250,7 @@ def _cause(explanation: Explanation, worse: int) -> Cause:
 
 
 def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
-    """Return what decides the verdict: the errors, what is allowed, and the mistakes with what they leave."""
+    """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
     decided = [
