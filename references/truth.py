@@ -196,8 +196,8 @@ def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
 
 def _knots(grid: Grid) -> Grid:
     """Return the grid with `KNOTS` of its samples, or all."""
-    every = math.ceil(grid.n_samples / KNOTS)
-    return grid if every == 1 else Grid(grid.dt, grid.n_steps, grid.every * every)
+    stride = math.ceil(grid.n_samples / KNOTS)
+    return grid if stride == 1 else Grid(grid.dt, grid.n_steps, grid.every * stride)
 
 
 def _confirm_loads(scene: Scene, grid: Grid) -> Truth | None:

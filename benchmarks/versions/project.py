@@ -408,8 +408,8 @@ def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) ->
         for text in dict.fromkeys(outcome.reason for outcome in ends):
             scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
         if was and was.cause:
-            still = "in both versions" if now and now.mistake == was.mistake else "not any more"
-            scenes.setdefault(f"{line.setting}: {was.cause} ({still})", []).append(line.scene)
+            when = "in both versions" if now and now.mistake == was.mistake else "not any more"
+            scenes.setdefault(f"{line.setting}: {was.cause} ({when})", []).append(line.scene)
     for text, names in scenes.items():
         yield f"{text}: {', '.join(dict.fromkeys(names))}"
 

@@ -120,7 +120,7 @@ class Checkout(Environment):
         """Return the hashes of the files in the command line of each program."""
         programs = read_programs(self.folder / "conservative.toml").values()
         files = {program.name: [Path(word) for word in program.words if Path(word).is_file()] for program in programs}
-        return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in every) for name, every in files.items()}
+        return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in parts) for name, parts in files.items()}
 
 
 def build_version(name: str, command: str, folder: Path) -> Version:

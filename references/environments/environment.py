@@ -101,8 +101,8 @@ class Environment:
             Another memory limit in bytes. Only Linux limits memory.
         """
         memory, own = memory or physical_memory() // 4 * 3, self.kind.variables(self.folder)
-        every = None if own is None else {**own, **(variables or {})}
-        return Worker(self.kind.command(self.folder), temporary_folder(), every, memory)
+        environment = None if own is None else {**own, **(variables or {})}
+        return Worker(self.kind.command(self.folder), temporary_folder(), environment, memory)
 
     def write(self) -> None:
         """Write the record, which turns a folder into an environment."""

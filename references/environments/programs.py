@@ -115,12 +115,12 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     """Return the class of a program, started for its description within a limit in s. Raise `UnusableProgram` if that fails."""
     module: Any = ModuleType(program.name, f"{program.name}, a program.")
     environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), OwnProgram(program.words))
-    every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
+    defaults = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)
         engine = {FORMER.get(name, name): value for name, value in greeting.get("engine", {}).items()}
         _check_description(engine)
-        module.ENGINE = {**every, **engine}
+        module.ENGINE = {**defaults, **engine}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)

@@ -155,11 +155,11 @@ def verify(
         from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
 
         names = [str(CATALOGUE)]
-    every = [subject.kind for subject in expand(names)]
-    kinds, alone = set(every), every == [Kind.RECORDING]
+    kinds_in_order = [subject.kind for subject in expand(names)]
+    kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **values}, kinds)
     if picture is not None and not alone:
-        raise BadInput("picture", f"{len(every)} subjects", "one recording")
+        raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
     left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}

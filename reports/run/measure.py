@@ -58,11 +58,11 @@ class Measurements:
     @classmethod
     def of(cls, findings: Iterable[Part]) -> Measurements:
         """Return the tables of the findings of studies, and those on engines."""
-        every = list(findings)
+        results = list(findings)
         return cls(
-            measurement.frame(row for row in every if isinstance(row, Measurement)),
-            measurement.samples_frame(line for line in every if isinstance(line, Samples)),
-            tuple(part for part in every if isinstance(part, Verified)),
+            measurement.frame(row for row in results if isinstance(row, Measurement)),
+            measurement.samples_frame(line for line in results if isinstance(line, Samples)),
+            tuple(part for part in results if isinstance(part, Verified)),
         )
 
     def content(self, source: Provenance) -> dict[str, Any]:
