@@ -29,7 +29,7 @@ def __getattr__(name: str) -> object:
             raise AttributeError(f"{__name__}.{name} has another name now: {__name__}.{FORMER[name]}")
         if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
             return import_module(f"{__name__}.{name}")
-        if name == "verification":  # of a package above the core, which the core cannot import
+        if name == "verification":  # it is in a package above the core, which the core cannot import
             from .deferred_imports import PACKAGES, load_entry
 
             value = load_entry(PACKAGES, PACKAGES, name)

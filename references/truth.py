@@ -187,7 +187,7 @@ def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
     gaps = np.diff(np.union1d(knots.t, breaks[breaks < grid.t[-1]]))
     parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / step)))
     trajectory, change = collocate(scene, knots, parts), np.inf
-    while not change <= CONFIRMED and parts < MOST_PARTS:  # of steps that are too long it may be nan
+    while not change <= CONFIRMED and parts < MOST_PARTS:  # nan if steps are much too long
         parts, coarse = 2 * parts, trajectory
         trajectory = collocate(scene, knots, parts)
         change = difference(coarse, trajectory)

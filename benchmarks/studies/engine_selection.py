@@ -60,9 +60,8 @@ def list_installed() -> tuple[str, ...]:
             with suppress(MissingEngine):
                 here[name] = family().maker.version
     known = registry.list_engines()
-    newest = {
-        environment.engine: environment for environment in list_environments() if environment.engine in known
-    }  # older versions come first
+    # Older versions come first, so that the newest one remains.
+    newest = {environment.engine: environment for environment in list_environments() if environment.engine in known}
     apart = [environment.name for name, environment in newest.items() if here.get(name) != environment.version]
     return (*here, *apart, *list_programs())
 

@@ -45,7 +45,7 @@ def draw(kind: str, n: int, seed: int = 0) -> Batch:
     inertia = (inertia + inertia.swapaxes(1, 2)) / 2
     parameters: dict[str, Array] = {}
     potential = None
-    if kind != "free_bodies":  # with a weight of 1 N
+    if kind != "free_bodies":  # the weight is 1 N
         direction, (low, high) = tables[4].standard_normal((n, 3)), MOMENT
         length = (20 / DURATION) ** 2 if kind == "one_body" else low + (high - low) * tables[5].random(n)
         parameters["com_B"] = direction * (length / np.linalg.norm(direction, axis=1))[:, None]

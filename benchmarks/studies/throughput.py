@@ -200,7 +200,7 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
             if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
-                break  # at any tolerance
+                break  # it is unsupported at any tolerance
             continue
         _, block, cost = done
         with np.errstate(all="ignore"):  # too long a step can overflow

@@ -84,7 +84,7 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: 
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
     """
-    elsewhere = isinstance(case.method, EngineMethod)  # in another process already
+    elsewhere = isinstance(case.method, EngineMethod)  # it runs in another process already
     if is_bounded(case.method) or (is_known_to_end(case.method) and not apart and not elsewhere):
         return attempt(case, skip_missing)
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))

@@ -55,7 +55,7 @@ def list_cases(study: Study, scene: Scene, method: Method) -> list[Case]:
     """
     few = method.order == 1 and not isinstance(method, EngineMethod)
     grids = step_ladder.steps(scene, method)[: step_ladder.LENGTH if few else None]
-    tolerances = set(step_ladder.TOLERANCES)  # also if quick: an engine is fastest at one of them
+    tolerances = set(step_ladder.TOLERANCES)  # all of them also in a quick study, as an engine is fastest at one of them
     if setting := tolerance_setting(method):
         tolerances.add(getattr(method, setting))
     case = Case(study.name, scene, method, step_ladder.samples(scene, method))

@@ -85,7 +85,7 @@ def diagnose(
         if not kinds & search.kinds or len(case.t) < search.least:
             continue
         tell(name)
-        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # and what earlier parts have left
+        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # unused work is kept
         for explanation in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
             if explanation is not None:
                 tried.append(explanation)

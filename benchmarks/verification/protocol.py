@@ -78,7 +78,7 @@ def times(subject: str, method: EngineMethod) -> Iterator[Finding]:
     if problem:
         yield Finding(subject, "times", "", Verdict.WRONG, detail=f"{text}: {problem}")
         return
-    rest = math.inf  # of a request, beside the call
+    rest = math.inf  # shortest time of a request without its call
     for _ in range(20):
         start = perf_counter()
         inside = float(worker.ask("time", run=run, calls=1)["seconds"])

@@ -223,7 +223,7 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
         return
     try:
         first, *others = list[Any](select([text]))
-    except UnusableProgram:  # which is a finding
+    except UnusableProgram:  # it becomes a finding
         yield verify_program(text, program, checks, pairs, tell)
         return
     rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]

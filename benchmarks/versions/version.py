@@ -140,7 +140,7 @@ def build_version(name: str, command: str, folder: Path) -> Version:
         last = (done.stdout.split("\n")[-2:] or [""])[0]
         got = f"{command!r}, which ends with exit code {done.returncode} for {name} ({last})"
         raise BadInput("build", got, "a command that builds each version")
-    if not (place / "conservative.toml").exists():  # of before the programs were registered
+    if not (place / "conservative.toml").exists():  # a version from before the programs were registered
         shutil.copy(project_file(), place)
     environment = Checkout("conservative", VERSION, place, "", ())
     return Version(name if key else place.name, key or commit(place, mark_changes=True), environment)

@@ -71,7 +71,7 @@ def prepare(given):
     position, velocity = (engine.numpy.extract_atom(name, nelem=6) for name in ("x", "v"))
     place, velocities = at @ given.R0.T, np.cross(given.w0_W, at @ given.R0.T)
     commands = ["run 0 post no", *(f"run {count} pre no post no" for count in np.diff(given.steps).tolist())]
-    turn = np.eye(4)  # from LAMMPS's principal axes to F: known after a first run, which shows LAMMPS's choice
+    turn = np.eye(4)  # from LAMMPS's principal axes to F: a first run shows LAMMPS's choice
 
     def run():
         position[:], velocity[:] = place, velocities

@@ -124,8 +124,9 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)
-        ["" in made.data.formats, *(method.order for method in made.settings_for("variants"))]  # for their exceptions
-    except Exception as error:  # of the program, or of its description, which can be wrong in any way
+        # These raise if the description is wrong.
+        ["" in made.data.formats, *(method.order for method in made.settings_for("variants"))]
+    except Exception as error:  # a program, or its description, can be wrong in any way
         raise UnusableProgram(program, error) from None
     return made
 

@@ -95,13 +95,8 @@ def _dots(across: Array, up: Array, colour: str, opacity: float) -> Spec:
 
 
 def _line(colour: str, width: float, opacity: float) -> Spec:
-    return {
-        "type": "line",
-        "color": colour,
-        "strokeWidth": width,
-        "opacity": opacity,
-        "order": False,
-    }  # points keep their own order
+    # Points keep their own order.
+    return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}
 
 
 def _split(curve: Array) -> list[tuple[Array, bool]]:

@@ -264,7 +264,7 @@ def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_e
     end = min(float(truth.t[-1]), scene.t_end if t_end is None else t_end)
     try:
         choice = run_chosen(scene, one.TARGET, end, end)[0].choice
-        assert choice is not None  # of `integrate(error=)`
+        assert choice is not None  # `integrate(error=)` always has one
         parts = math.ceil(grid.dt / choice.dt * (1 - ROUNDING))
         if grid.n_steps * parts > MOST_TRIED:
             return None
@@ -337,7 +337,7 @@ def bounded_grid(scene: Scene, dt: float | None, t_end: float | None) -> Grid:
 def summarize_chosen(trajectory: Trajectory) -> dict[str, Any]:
     """Return the description of a run whose method was chosen for an error."""
     choice = trajectory.choice
-    assert choice is not None  # of `integrate(error=)`
+    assert choice is not None  # `integrate(error=)` always has one
     asked = {"error": choice.error, "estimate": choice.estimate, "reached": choice.reached}
     return summarize(trajectory, choice.method, choice.dt) | {"choice": asked}
 

@@ -187,7 +187,7 @@ def engine_rows(measured: Measured, scene: str) -> list[EngineRow]:
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}
     timed = {str(name): rows for name, rows in points[points["error"] <= SAME_MOTION].groupby("series", sort=False)}
     rows = [_engine_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
-    best: dict[str, EngineRow] = {}  # of each engine: the smallest error, then the shortest time
+    best: dict[str, EngineRow] = {}  # the best row of each engine: the smallest error, then the shortest time
     known = (row for row in rows if not math.isnan(row.error))
     for row in sorted(known, key=lambda row: (row.error, math.isnan(row.second_time), row.second_time)):
         best.setdefault(row.engine, row)

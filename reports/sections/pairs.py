@@ -87,7 +87,7 @@ def _cell(finding: PairFinding) -> Cell:
 
 def _reduced(finding: PairFinding) -> list[str]:
     body = finding.first
-    assert body is not None  # of a pair that differs
+    assert body is not None  # a pair that differs has both descriptions
     moments, com, rates = (", ".join(map(number, values)) for values in (np.diag(body.inertia), body.com, body.w0))
     field = f"{com}; {number(body.gravity)}" if body.gravity else DASH
     scale = number(finding.scale) if finding.scale else DASH

@@ -383,7 +383,7 @@ class Program:
             if not self.formats:
                 return self.worker.ask("call", **request, engine=self.engine, function="probe", cases=cases)
             result = self.worker.ask("load", **request, velocities=cases[:, 0], forces=cases[:, 1])
-        except EngineError as error:  # also at the first step
+        except EngineError as error:  # it can also fail at the first step
             return {"refused": error.reason}
         try:
             measured = np.asarray(result["accelerations"], float)

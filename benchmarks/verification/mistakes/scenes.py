@@ -199,9 +199,9 @@ SCENES = (
     ),
     SceneMistake(
         "moments about the centre of mass",
-        "The principal moments about the centre of mass are used for those about the fixed point",
+        "The principal moments about the centre of mass are used as the moments about the fixed point",
         _central_moments,
-        numbers=(Number("mass share", 15 / 16),),  # of the bodies that PROTOCOL.md describes
+        numbers=(Number("mass share", 15 / 16),),  # the share of bodies in PROTOCOL.md
         remedy="`moments` are about the fixed point",
     ),
     SceneMistake(

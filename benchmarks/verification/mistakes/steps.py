@@ -151,7 +151,7 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     k, w, e, J = f(t, y), f.rates(t, y), 1e-5 * h, f.body.inertia
     slope = (f.rates(t + e, y + e * k) - f.rates(t - e, y - e * k)) / (2 * e)
     turn = h * w + h * h / 2 * slope + h**3 / 12 * cross(slope, w)  # w' x w has the same components in world and body axes
-    if order == 3:  # and w'' is w'' + w x w' in body axes
+    if order == 3:  # w'' in world axes is w'' + w x w' in body axes
         turn = turn + h**3 / 6 * ((f(t + e, y + e * k) - f(t - e, y - e * k))[4:] / (2 * e) + cross(w, slope))
     rotor = np.zeros(3) if f.body.rotor_momentum is None or f.body.motor else f.body.rotor_momentum
     L = (J @ y[4:].reshape(3, -1) + rotor[:, None]).reshape(w.shape)

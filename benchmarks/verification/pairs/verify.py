@@ -264,7 +264,7 @@ def _apart(engine: Engine, pair: Pair, description: Description, scale: float | 
         return Apart(apart)
     if engine.runner.digits:
         allowed += DIGITS * max(engine.runner.digits.resolution(motion) for motion in (samples, raw))
-    if pair.variant == "time":  # which is rounded, and so is each step
+    if pair.variant == "time":  # a large time is rounded, and so is each step
         allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(description.w0)) * description.n_steps
     if allowed < 10 * apart and pair.variant in OF_INERTIA:
         allowed = max(allowed, engine.rounding(second, raw))
@@ -337,7 +337,7 @@ class _Pair:
                 return math.isinf(seen.value) if lost else seen.wrong
             return False
 
-        def stays(candidate: Description) -> bool:  # with shorter steps
+        def stays(candidate: Description) -> bool:  # with shorter steps, the pair still differs
             if lost or (pair.exact and not pair.scales):
                 return True
             with suppress(FirstFailed, NotAvailable, IntegrationFailed):

@@ -186,7 +186,7 @@ def _choose_time(layout: Layout, split: Mapping[str, str], matches: Sequence[str
 
     def rank(name: str) -> tuple[bool, bool, bool, int, int]:
         key = split[name]
-        stamped = key.endswith("headerstamp")  # of the measurement, and not of its arrival
+        stamped = key.endswith("headerstamp")  # the time of the measurement, and not of its arrival
         return key != "secondselapsed", not stamped, name.strip() == "T", len(key), order.get(key, 3)  # T: a temperature
 
     times = sorted(matches, key=rank)

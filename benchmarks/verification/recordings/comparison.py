@@ -321,7 +321,7 @@ def _late(case: Compared) -> bool:
     weights = 1 / np.repeat(case.noise, [9, 3])
     v, d = np.hstack([turned, moved]) * weights, case.differences(R, w) * weights
     v = v / (np.linalg.norm(v, axis=1, keepdims=True) + 1e-300)
-    varied = np.linalg.eigvalsh(v.T @ v / n)[-1] < 0.9  # of a motion in one direction nothing can be told
+    varied = np.linalg.eigvalsh(v.T @ v / n)[-1] < 0.9  # a motion in one direction shows nothing
     return bool(varied and ((d * v).sum(axis=1) ** 2).sum() > 0.8 * (d * d).sum())
 
 

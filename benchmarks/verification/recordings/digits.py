@@ -37,7 +37,7 @@ def find_quantum(values: Array) -> float:
     largest = min(float(sizes.max()), OUTLIER * float(np.median(sizes))) if sizes.size else 1.0
     x = np.unique(values[:: max(1, len(values) // 500)])
     x = x[np.abs(x) >= SMALLEST]
-    if len(x) < 5:  # of a constant nothing can be learned
+    if len(x) < 5:  # a constant does not show digits
         return largest * 2.0**-53
     near, half, unit = 4 * np.spacing(np.abs(x)), 0.0, np.zeros_like(x)
     exponent, whole = np.floor(np.log10(np.abs(x))), math.floor(math.log10(largest))

@@ -333,9 +333,8 @@ def _instability(comparison: Comparison) -> list[str]:
 def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
-    energy = (
-        None if case.scene.potential else find_energy(case.scene.invariants)
-    )  # rates alone determine the energy of a free body
+    # Rates alone determine the energy of a free body.
+    energy = None if case.scene.potential else find_energy(case.scene.invariants)
     for invariant in case.scene.invariants if w is not None else ():
         if w is not None and invariant.supplied is None and (R is not None or invariant is energy):
             R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R
