@@ -214,7 +214,7 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
     bodies lose far more energy with half of it.
     """
     second = axes.J.sum() / 2 - axes.J
-    if second.min() < -1e-15 * axes.J.max():
+    if second.min() < -1e-15 * axes.J.max():  # negative by more than round-off
         return None
     potential, flight = axes.scene.potential, axes.scene.flight
     if flight:
@@ -222,7 +222,7 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
     if not isinstance(potential, UniformGravity) or not np.any(axes.moment):
         return MassModel(1.0, np.zeros(3), 0.0, RigidBody(axes.J))
     com = potential.com_B @ axes.R_BF
-    com[np.abs(com) < 1e-15 * np.linalg.norm(com)] = 0.0
+    com[np.abs(com) < 1e-15 * np.linalg.norm(com)] = 0.0  # round-off of a rotation
     lever = com != 0
     if second[lever].min() <= 1e-15 * axes.J.max():
         return None

@@ -30,6 +30,8 @@ ROUND_OFF = 1e-13
 """Smallest noise that fits assume: round-off in double precision."""
 LONGEST, NUMERICAL = 100.0, 5000.0
 """Angles, rad, of the rows that are explained, and of the rows that are compared if the motion has no closed form."""
+FEWEST_FOR_NOISE = 14
+"""Smallest number of rows from which noise is estimated: differences of order 9 need several."""
 TINY = 1e-11
 """Noise below this is round-off, and not motion."""
 SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0
@@ -295,6 +297,7 @@ class Compared:
         small = np.concatenate([np.full(6, 1e-6), changed])
         n = len(self.t)
 
+        # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
             p, cost = self._improve(motion, p, k, moved, small, most)
@@ -331,7 +334,7 @@ class Compared:
             axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
             sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
             goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
-            while damping < 1e3 and not better:
+            while damping < 1e3 and not better:  # a larger damping makes steps of no use
                 step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
                 q = p.copy()
                 q[moved] += step
@@ -343,7 +346,7 @@ class Compared:
                 break
             gain = 1 - (new @ new) / (now @ now)
             p, now = q, new
-            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
+            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
                 break
         return p, float(now @ now)
 
@@ -454,12 +457,12 @@ def exact(case: Compared) -> Solution:
 def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
     """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
 
-    It is the smallest robust estimate from differences of order 3 to 9. Of a smooth motion they fall with each order, and those
-    of noise do not.
+    It is the smallest robust estimate from differences of order 3 to 9. Differences of a smooth motion fall with each order,
+    and differences of noise do not.
     """
     noise, resolved = np.zeros(2), np.zeros(2, bool)
     for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
-        if values is None or len(t) < 14:
+        if values is None or len(t) < FEWEST_FOR_NOISE:
             continue
         x = values
         if i == 0:

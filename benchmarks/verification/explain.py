@@ -175,13 +175,14 @@ def _usable_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ..
 
 def _readings(case: Compared, asked: _Asked) -> Explanations:
     """Yield other readings of attitudes and rates."""
-    near = case.take(slice(0, 10))  # a wrong reading is worse than the file from the first rows on
+    near = case.take(slice(0, 10))
     for mistakes in _usable_readings(case, asked.quaternion):
         trial = compose(*mistakes)
         motion = trial.build(near)
         if motion is None:
             continue
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
+        # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
             yield attempt(case, trial)
 
@@ -238,6 +239,7 @@ def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
     rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
     written = Decimal(f"{rate:.17g}" if len(repr(rate)) > 18 else repr(rate))
     digits = len(written.normalize().as_tuple().digits)
+    # Half a unit of the last digit, and a little more for rounding.
     if abs(explanation.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
         return explanation
     return replace(explanation, sentence=explanation.sentence + ", which is within the digits of the scene file")
@@ -304,7 +306,7 @@ def _own_times(case: Compared, gap: float, end: float) -> Explanations:
 def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
     """Return the explanation by the times at which the motion from the initial state is nearest to the rows."""
     tau, e = case.t.copy(), 1e-6 / case.scale  # e: s, for slopes
-    end += min(end - case.start, 50 * gap)
+    end += min(end - case.start, 50 * gap)  # up to 50 lost rows
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
 
     def sample(t: Array) -> tuple[Array, Array]:
@@ -353,7 +355,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
         return
     for rule in RULES:
         wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
-        while wanted and len(seen) < 8:
+        while wanted and len(seen) < 8:  # each try is nearer to the best number of steps, so a few are enough
             parts = wanted.pop()
             if parts in seen or not 1 <= parts <= PARTS or parts * len(case.t) > 4 * STEPS_AT_MOST:
                 continue

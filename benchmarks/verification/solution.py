@@ -171,7 +171,7 @@ class Equations:
                 left -= 1
                 after = breaks[0] if breaks else math.inf
                 b = min(a + length, after, end)
-                b = min(after, end) if min(after, end) - b < 0.01 * length else b
+                b = min(after, end) if min(after, end) - b < 0.01 * length else b  # no tiny stretch at the end
                 half = (b - a) / 2
                 try:
                     Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half, self.tolerance)
@@ -237,6 +237,7 @@ def _sweep(slope: Callable[[Array], Array], y: Array, half: float, tolerance: fl
     for sweep in range(1, SWEEPS):
         new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
         change, Y = float(np.abs(new - Y).max()) / size, new
+        # Converged, or no longer converging near round-off, or diverged.
         if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
             return Y, sweep
         last = change

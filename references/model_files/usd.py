@@ -72,6 +72,7 @@ class Stage:
 
         world = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
         R = world[:3, :3] / np.linalg.norm(world[:3, :3], axis=0)
+        # Sheared or mirrored axes: the nearest rotation.
         if np.abs(R.T @ R - np.eye(3)).max() > 1e-5 or np.linalg.det(R) < 0:
             u, _, vt = np.linalg.svd(world[:3, :3])
             R = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt

@@ -219,6 +219,7 @@ def find_digits(values: Array) -> Digits:
         single = any(len(part) > 2 and _written(part.astype(np.float32), PROBE) == _written(part, PROBE) for part in parts)
     if len(both) < FEW or single:
         return Digits(single)
+    # A double that is not rounded has 15 digits or more.
     significant = next((n for n in range(3, 15) if all(float(f"{x:.{n}g}") == x for x in both)), 0)
     decimals = next((n for n in range(3, 15) if all(round(x, n) == x for x in both)), 0)
     return Digits(False, significant, decimals)

@@ -21,6 +21,7 @@ def find_digits(raw: Array, layout: Layout) -> tuple[float, float, float]:
     """Return the largest round-off of times, s, attitudes, rad, and rates, rad/s, that the digits of rows stand for."""
     count = 1 + len(layout.used["rates"])
     t, gaps = raw[:, 0], np.diff(raw[:, 0])
+    # Equal gaps up to round-off: the times are exact, whatever their digits.
     uniform = np.ptp(gaps) <= 8 * np.spacing(np.abs(t).max()) if len(gaps) else True
     off = t - np.rint((t - t[0]) / gaps.min()) * gaps.min() - t[0]
     time = 0.0 if uniform else min(find_quantum(t[:, None]), float(np.abs(off).max()))

@@ -17,7 +17,7 @@ from conservative.number_text import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..compare import SIGMAS, UNITS_OF_DIGITS, Compared
+from ..compare import FEWEST_FOR_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
@@ -186,6 +186,7 @@ def verify_recording(
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
+    # With noise, the fit shows how well the recording determines the moments.
     if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
         tell("moments")
         fit = fit_moments(case)
@@ -280,13 +281,17 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
     """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
-    single = max(recording.digits[1:]) > 1e-9
+    single = max(recording.digits[1:]) > 1e-9  # fewer than nine digits
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
             f"The error is larger than the digits of the file allow, and as small as the error of a good solver in "
             f"{'single' if single else 'double'} precision. An allowed error decides: --error"
         )
-    if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
+    if (
+        not resolved[[x is not None for x in case.data]].all()
+        and errors.max() <= 2 * MOST_NOISE
+        and len(case.t) >= FEWEST_FOR_NOISE
+    ):
         d = case.differences(*case.exact)
         lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
         if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
