@@ -29,7 +29,7 @@ Tell = Callable[[float, str], object]
 
 
 class Kind(StrEnum):
-    """What a subject is."""
+    """Kinds of subjects."""
 
     RECORDING = "recording"
     METHOD = "method"
@@ -66,6 +66,7 @@ def kind_of(text: str) -> Kind:
     if path.is_file():
         if path.suffix.lower() in MODELS:
             return Kind.MODEL
+        # Some file systems mark all files as executable, data too.
         return (
             Kind.PROGRAM
             if os.access(path, os.X_OK) and not path.suffix.lower().startswith((".csv", ".json"))

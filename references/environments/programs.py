@@ -151,7 +151,7 @@ def read_program(text: str, name: str = "", project: bool = False) -> Program:
     file = project_file() if project else user_file()
     try:
         words = [text] if Path(text).is_file() else shlex.split(text)
-    except ValueError as error:  # a quote without another one
+    except ValueError as error:  # a quote that is not closed
         raise BadInput("command", f"{text!r} ({error})", _COMMAND) from None
     if not words:
         raise BadInput("command", repr(text), _COMMAND)

@@ -212,7 +212,7 @@ def facts() -> dict[str, str]:
 
 
 def draw(verifications: Sequence[Verification], path: Path | None = None) -> bytes:
-    """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
+    """Return errors and drifts of a recording over time, with their limits, in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures

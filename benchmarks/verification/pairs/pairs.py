@@ -34,7 +34,7 @@ def _without_fields() -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """A body, its start and its steps, as an engine is given them.
+    """A body, its start and its steps, as an engine gets them.
 
     Attributes
     ----------
