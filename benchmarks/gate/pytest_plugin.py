@@ -99,8 +99,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Skip the suite unless benchmarks were asked for."""
     if config.getoption("conservative_benchmark"):
         return
+    suite = SUITE.resolve()
+    paths = {path for path in {item.path for item in items} if suite in path.resolve().parents}
     for item in items:
-        if SUITE.resolve() in item.path.resolve().parents:
+        if item.path in paths:
             item.add_marker(pytest.mark.skip(reason="a benchmark, which runs with --benchmark"))
 
 

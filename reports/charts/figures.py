@@ -34,6 +34,8 @@ _ENGINE_COLOURS = tuple(
 )
 LABELS_AT = 0.86
 """Place of the label of a guide, from its first end to its second."""
+LABEL = (0.1, 0.04)
+"""Width and height of the label of a guide, as shares of those of a chart."""
 _GROWTHS = (("∝ √t", 0.5), ("∝ t", 1.0))
 """Growth of an error whose parts are random, and of one whose parts have the same direction."""
 _KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
@@ -229,15 +231,20 @@ def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any
 def order_guides(errors: pd.DataFrame, fit_ends: pd.DataFrame) -> pd.DataFrame:
     """Return the ends of lines of the whole orders that were fitted, from the largest step and error: columns text, dt, error.
 
-    Each ends at the smallest step or error.
+    Each ends at the smallest step or error. High orders end close together: one whose label would run into the label before it
+    is left out.
     """
     dt, error = (np.log(errors.loc[errors[name] > 0, name]) for name in ("dt", "error"))
     slopes = [
         np.diff(np.log(ends["error"])).item() / np.diff(np.log(ends["dt"])).item() for _, ends in fit_ends.groupby("name")
     ]
-    rows = []
+    rows, width, height, before = [], dt.max() - dt.min(), error.max() - error.min(), (math.inf, math.inf)
     for order in sorted({round(slope) for slope in slopes if slope >= 0.5}):  # orders of 1 or more
-        run = min(dt.max() - dt.min(), (error.max() - error.min()) / order)
+        run = min(width, height / order)
+        place = LABELS_AT * run / width, LABELS_AT * order * run / height
+        if all(abs(a - b) < size for a, b, size in zip(place, before, LABEL, strict=True)):
+            continue
+        before = place
         rows += [(f"order {order}", dt.max() - back, error.max() - order * back) for back in (0.0, run)]
     ends = pd.DataFrame(rows, columns=["text", "dt", "error"])
     return ends.assign(dt=np.exp(ends["dt"]), error=np.exp(ends["error"])) if rows else ends

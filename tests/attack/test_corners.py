@@ -63,6 +63,7 @@ def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     assert not wrong
 
 
+@pytest.mark.slow
 def test_an_order_that_is_presumed_is_found(monkeypatch):
     """The negative control: the differences of corners are divided as if functions were smooth, and are not adapted to."""
     monkeypatch.setattr(trials, "presumed_smooth", lambda scene: True)

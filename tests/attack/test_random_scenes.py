@@ -114,7 +114,7 @@ def check(case):
 OTHERS = [pytest.param(seed, marks=pytest.mark.attack) for seed in range(USUAL, count(ALL)) if seed not in FOUND]
 
 
-@pytest.mark.parametrize("seed", [*sampled([*range(USUAL), *FOUND], 3, keep=(2, 4, 6)), *OTHERS])
+@pytest.mark.parametrize("seed", [*sampled([*range(USUAL), *FOUND], 2, keep=(4, 6)), *OTHERS])
 def test_a_run_called_ok_is_as_accurate_as_was_asked(seed):
     case, what = random_case(seed + (SEED - 1) * 1_000_000)
     print(what)
@@ -162,7 +162,7 @@ def test_a_chaotic_motion_ends():
     assert warned  # rounding the scene moves its end by more
 
 
-@pytest.mark.parametrize("seed", sampled(range(len(THEMES)), 4, leave=(3, 7, 11, 13, 18)))
+@pytest.mark.parametrize("seed", sampled(range(len(THEMES)), 2, keep=(0,), leave=(3, 7, 11, 13, 18)))
 def test_the_truth_is_that_of_another_solver(seed):
     case, _ = random_case(seed)
     t = np.linspace(0, case.t_end, SAMPLES)

@@ -1,8 +1,9 @@
 """`conservative verify` of files with a planted mistake, or none, whose answers are decided before it runs.
 
 No right file is called wrong, no wrong file right, and no diagnosis that is called proven is false. Of the mistakes that are
-identifiable 99 of 100 are named. `pytest` verifies those of `QUICK`, `pytest --attack` 1,000, and writes the tables of the page
-`reports/documentation/planted_files.md`. An interrupted attack goes on where it was, unless the code has changed. By hand:
+identifiable 99 of 100 are named. `pytest --all` verifies those of `QUICK`, `pytest --attack` 1,000, and writes the tables of
+the page `reports/documentation/planted_files.md`. An interrupted attack goes on where it was, unless the code has changed. By
+hand:
 
     python -m tests.attack.test_recordings results.jsonl 0 1000
 """
@@ -19,7 +20,6 @@ import pytest
 from conservative.benchmarks.verification.recordings import verdict
 from conservative.benchmarks.verification.recordings.table import read
 
-from ..sampling import sampled
 from . import recordings
 from .effort import SEED, count
 from .recordings import ATTITUDES, FITTED, PAIR, READINGS, SCENES, STEPS, TIMES, plant
@@ -42,8 +42,6 @@ QUICK = (
     513, 517, 523, 525, 533, 536,
 )  # fmt: skip
 """Seeds of quick files of many kinds."""
-LONG = (3, 13, 20, 32, 39, 42, 50, 56, 59, 63, 508, 510, 517, 523, 525)
-"""Those of them that are left to --all."""
 FALSE = ("right called wrong", "wrong called right", "false proof")
 
 
@@ -143,7 +141,8 @@ def kept(request):
     return Path(request.config.cache.mkdir("recordings")) / f"{code}.jsonl"
 
 
-@pytest.mark.parametrize("seed", sampled(QUICK, leave=LONG))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", QUICK)
 def test_files_with_and_without_a_mistake_are_judged_as_was_decided(seed, tmp_path):
     row = outcome(seed, tmp_path)
     assert not row["complaint"], row

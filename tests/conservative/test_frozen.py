@@ -11,6 +11,8 @@ import conservative as cv
 from conservative import registry, shapes
 from conservative.scene import MOST_DERIVATIONS
 
+from ..sampling import sampled
+
 DIRECTION = (0.3, -0.2, 1.7)
 
 
@@ -133,7 +135,7 @@ def test_the_store_is_bounded() -> None:
 
 
 @pytest.mark.parametrize(
-    "method", [cv.Reduced(), cv.Reduced(4, frame="auto"), cv.Gauss(2), cv.Lame(), cv.Projected(), cv.Taylor()]
+    "method", sampled([cv.Reduced(), cv.Reduced(4, frame="auto"), cv.Gauss(2), cv.Lame(), cv.Projected(), cv.Taylor()], 2)
 )
 def test_a_scene_is_freed_after_its_last_use(method: cv.Method) -> None:
     top = cv.scenes.lagrange_top()

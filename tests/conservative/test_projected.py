@@ -206,7 +206,7 @@ def near_rest(off: float, t_end: float) -> Case:
     return Case((1.3, 1.0, 0.6), R, (0.0, 0.0, 0.0), t_end, ("spring", 1.0, point, 1.01 * away, 0.0))
 
 
-@pytest.mark.parametrize("off", [1e-3, 1e-5])
+@pytest.mark.parametrize("off", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_a_start_at_rest_near_an_equilibrium_is_not_moved_by_round_off(off: float) -> None:
     # The gradient of the energy is short there: the correction of round-off was 1e-11 rad in each step, more with more steps.
     case = near_rest(off, 12.0 - math.log(off))

@@ -112,7 +112,7 @@ def test_a_method_supports_the_fields_that_it_declares(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "method"), sampled([pair for pair in product(KINDS, LARGEST) if supported(*pair)], 5, DIAGONAL)
+    ("kind", "method"), sampled([pair for pair in product(KINDS, LARGEST) if supported(*pair)], 3, DIAGONAL[::2])
 )
 def test_a_method_is_accurate_and_conserves(kind: str, method: str) -> None:
     found, drift = errors(method, kind, 1, 1000)

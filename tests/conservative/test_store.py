@@ -259,7 +259,7 @@ OF_MOTIONS = {"plot": lambda found: found.plot()}
 """Ways that read attitudes or rates, and no work of loads."""
 
 
-@pytest.mark.parametrize("array", ["R_WB", "w_WB_B", "supplied"])
+@pytest.mark.parametrize("array", ["R_WB", pytest.param("w_WB_B", marks=pytest.mark.slow), "supplied"])
 def test_each_way_of_reading_finds_a_flipped_bit(array, tmp_path, monkeypatch):
     """A block of motions is read after it is opened. Its bodies 8 to 15 have a flipped bit; body 9 has failed."""
     monkeypatch.chdir(tmp_path)

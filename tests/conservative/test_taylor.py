@@ -60,7 +60,7 @@ def error(field: str, order: int, steps: int, t: float = 2.0) -> float:
     return float(angle_between(truth(field, t), found.R_WB[-1]))
 
 
-@pytest.mark.parametrize("field", sampled(FIELDS, 6, ["gravity gradient in other axes", "spring", "attraction", "free"]))
+@pytest.mark.parametrize("field", sampled(FIELDS, 3, ["gravity gradient in other axes", "spring", "free"]))
 def test_agrees_with_the_truth(field: str) -> None:
     assert error(field, 18, 40) < 5e-15  # measured up to 1.7e-15
     assert error(field, 14, 60) < 5e-15
@@ -77,7 +77,7 @@ def test_a_step_has_the_error_of_its_order(field: str, order: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "order", "dt"), sampled([(f, *o) for f in FIELDS for o in ((6, 0.05), (14, 0.05), (18, 0.1))], 11)
+    ("field", "order", "dt"), sampled([(f, *o) for f in FIELDS for o in ((6, 0.05), (14, 0.05), (18, 0.1))], 6)
 )
 def test_conserves_every_invariant(field: str, order: int, dt: float) -> None:
     trajectory = cv.integrate(scene(field), dt, cv.Taylor(order), t_end=500.0, sample_every=7)
@@ -232,6 +232,7 @@ def test_a_tolerance_divides_steps_in_a_close_passage(order: int, tolerance: flo
     assert parts == computed
 
 
+@pytest.mark.slow
 def test_a_first_guess_that_is_far_too_long_or_too_short_does_not_matter() -> None:
     """A rotor forces a nutation of 1e6 rad/s on one body. The other one turns at 1e-9 of the rate that all energy allows."""
     rotor = cv.RigidBody((0.9, 1.7, 1.2), rotor_momentum=(0.3e6, -0.5e6, 0.8e6))
@@ -248,7 +249,10 @@ def test_a_first_guess_that_is_far_too_long_or_too_short_does_not_matter() -> No
 MEDIANS = {1e-3: 0.1, 1e-6: 0.06, 1e-9: 0.05, 1e-12: 0.15}
 
 
-@pytest.mark.parametrize(("field", "tolerance"), sampled(product(RANDOM_FIELDS, MEDIANS), 5))
+@pytest.mark.parametrize(
+    ("field", "tolerance"),
+    sampled(product(RANDOM_FIELDS, MEDIANS), 4, [("spring", 1e-12)], [("fixed_gradient", tolerance) for tolerance in MEDIANS]),
+)
 def test_errors_are_below_the_tolerance(field: str, tolerance: float) -> None:
     """After 12 rad, in tolerances. One in 50 random bodies is less stable than these, and can have a larger error."""
     method, found = cv.Taylor(tolerance=tolerance), []

@@ -118,6 +118,9 @@ def test_guides_have_the_slopes_of_the_fitted_orders():
         assert ends["dt"].between(0.01 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
         assert ends["error"].between(1e-8 * (1 - 1e-9), 0.1 * (1 + 1e-9)).all()
     assert figures.order_guides(errors, fits.iloc[:0]).empty
+    high = pd.concat([pd.DataFrame({"name": f"{k}", "dt": dt, "error": dt**k}) for k in (1, 3, 4, 8, 9, 10)])
+    few = pd.DataFrame({"dt": (0.1, 1e-4), "error": (0.1, 1e-12)})  # to which the lines are drawn
+    assert figures.order_guides(few, high)["text"].unique().tolist() == ["order 1", "order 3", "order 4", "order 8"]
     for ends, texts in ((fits, 1), (fits.iloc[:0], 0)):
         spec = figures.convergence(errors.assign(family=errors["name"]), ends, "s").to_dict()
         # In one list: the page removes the legend of each layer, and adds the filter of its buttons.

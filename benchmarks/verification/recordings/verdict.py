@@ -21,6 +21,7 @@ from ..compare import FEWEST_FOR_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
+from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .table import Recording
 
@@ -273,10 +274,9 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
 
 def _single_rows(comparison: Comparison) -> Explanation:
     row, at, size = comparison.outliers[0]
-    unit = UNITS[int(np.argmax(comparison.worst.max(axis=1)))]
-    text = f"Single rows are off, the first of them row {row:,} at {at:g} s, by {number(size)} {unit}; the others agree"
     values = {"row": float(row), "time": at, "error": size}
-    return Explanation(("single rows",), text, values, [0.0, 0.0], comparison.worst.max(axis=1).tolist(), 0.0, 0.0, True)
+    mistake, before = BY_KEY["single rows"], comparison.worst.max(axis=1).tolist()
+    return Explanation((mistake.key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:

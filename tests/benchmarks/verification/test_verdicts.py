@@ -139,6 +139,18 @@ def test_the_noise_of_the_first_row_is_no_fault(unnamed):
     assert verdict(t, None, w, other).verdict == "wrong"
 
 
+@pytest.mark.parametrize("rows", [[10, 47, 103], [10, 47, 103, 160, 201, 222, 275, 300, 301, 333, 402, 450, 480]])
+def test_a_few_rows_and_some_more_are_named_with_the_first_of_them(rows):
+    """Up to two in a hundred are outliers of the comparison, more of them are found by the search for mistakes."""
+    t = np.linspace(0, 10, 501)
+    R, w = free_body(SCENE.body, np.eye(3), W0, t)
+    w[rows] += (0.01, -0.02, 0.01)
+    (cause,) = verdict(t, R, w).findings[0].causes
+    assert cause.key == "single rows"
+    assert (cause.numbers["row"], cause.numbers["time"]) == (11, t[10])
+    assert "row 11 at 0.2 s" in cause.sentence
+
+
 def test_a_single_row_is_found_in_the_whole_file(tmp_path):
     """A file of more rows than fits keep, in more chunks than one: the times go on, and one row is off."""
     n = CHUNK + 3000
