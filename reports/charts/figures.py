@@ -35,7 +35,7 @@ _ENGINE_COLOURS = tuple(
 LABELS_AT = 0.86
 """Place of the label of a guide, from its first end to its second."""
 LABEL = (0.1, 0.04)
-"""Width and height of the label of a guide, as shares of those of a chart."""
+"""Width and height of the label of a guide, relative to the chart."""
 _GROWTHS = (("∝ √t", 0.5), ("∝ t", 1.0))
 """Growth of an error whose parts are random, and of one whose parts have the same direction."""
 _KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
