@@ -30,7 +30,7 @@ def __getattr__(name: str) -> object:
             raise ImportError(message, name=__name__)  # `from conservative import Need` would replace an AttributeError
         if name not in __all__ and not name.startswith("_") and util.find_spec(f"{__name__}.{name}"):
             return import_module(f"{__name__}.{name}")
-        if name == "verification":  # of a package above the core, which the core cannot import
+        if name == "verification":  # it is in a package above the core, which the core cannot import
             from .deferred_imports import PACKAGES, load_entry
 
             value = load_entry(PACKAGES, PACKAGES, name)

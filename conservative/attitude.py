@@ -97,8 +97,8 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
 def axes_about(axis: Array, beside: int | None = None) -> Array:
     """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,).
 
-    The first column is perpendicular to coordinate axis number `beside`, which must not be parallel to `axis`. By default it is
-    the one for which e_z gives the identity.
+    The first column is perpendicular to coordinate axis number `beside`, which must not be parallel to `axis`. The default of
+    `beside` depends on `axis`; for e_z the result is the identity.
     """
     other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3 if beside is None else beside]
     first = np.array(cross(other.tolist(), axis.tolist()))

@@ -1,4 +1,4 @@
-"""Errors and warnings. Each message ends in what the user can do."""
+"""Errors and warnings. Each message ends with a remedy."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Grid:
     every: int = 1
 
     def __init__(self, dt: float, n_steps: int, every: int = 1) -> None:
-        step = real_number(dt)  # of any size: methods integrate very large and very small scenes in other units than SI
+        step = real_number(dt)  # any size: methods integrate very large and very small scenes in other units than SI
         if step is None or not 0 < step < math.inf:
             raise BadInput("dt", describe(dt), "a finite step above 0, s")
         counts = []

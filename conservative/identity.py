@@ -276,7 +276,7 @@ class _Walk:
             self.reads += not (value is MISSING or _library_name(value) is not None)
             if isinstance(value, ModuleType) and not self.in_library:
                 raise _NotFollowed(f"{code.co_name}, which passes on the module {name}")
-            if name == "__class__":  # for `super`
+            if name == "__class__":  # `super` without arguments uses it
                 parts.append((name, self._follow_class(value, called=False)))
             else:
                 parts.append((name, "missing" if value is MISSING else self.follow(value)))

@@ -34,9 +34,9 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     The bytes contain the indices of `shared` objects, which the other process also has, instead of the objects. They contain
     the functions and classes that the value uses of the modules `by_value`, which the other process cannot import.
 
-    Raise `NotTransferable` if a part of it cannot be pickled, and `MissingExtra` without cloudpickle, of the extra `report`.
+    Raise `NotTransferable` if a part cannot be pickled, and `MissingExtra` if cloudpickle (extra `report`) is missing.
     """
-    stream, pickler = io.BytesIO(), _pickler()
+    stream, pickler = io.BytesIO(), _pickler()  # before the import: it reports a missing package
     import cloudpickle
 
     with LOCK, ExitStack() as stack:
@@ -84,6 +84,7 @@ def _pickler() -> Any:
         def reducer_override(self, value: Any) -> Any:
             """Return how pickle restores a value."""
             if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
+                # A copy is writeable. The array itself would be passed to this function again, without end.
                 return read_only, (value.copy(order="K"),)
             if isinstance(value, BaseException):  # without its constructor, whose arguments may differ from `args`
                 return restore, (type(value), value.args, vars(value))

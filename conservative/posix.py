@@ -66,7 +66,7 @@ def is_own(file: Path) -> bool:
     if not hasattr(os, "geteuid"):
         return True
     status, folder = file.stat(), file.parent.stat()
-    sticky = folder.st_mode & stat.S_ISVTX  # as /tmp: only the owner of a file can replace it
+    sticky = folder.st_mode & stat.S_ISVTX  # in a folder such as /tmp, only the owner of a file can replace it
     writable = (status.st_mode | (0 if sticky else folder.st_mode)) & stat.S_IWOTH
     return status.st_uid == os.geteuid() and not writable
 

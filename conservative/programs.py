@@ -89,5 +89,5 @@ def read_programs(file: Path) -> dict[str, Program]:
         if wrong := next(filter(re.compile(r"[@=:,\s]").search, commands), None):
             raise ValueError(f"the name {wrong!r} has one of '@', '=', ':' and ',', or a space")  # no command could take it
         return {name: Program(name, file, command) for name, command in commands.items() if shlex.split(command)}
-    except ValueError as error:  # or a quote without another one
+    except ValueError as error:  # also for a quote that is not closed
         raise BadInput(str(file), str(error), allowed) from None

@@ -146,6 +146,7 @@ class Scene(PickledByFields):
             raise BadInput("extra_invariants", describe(extra_invariants), "Invariants, in a tuple or a list")
         step = dt
         if step is None:
+            # 0.05 rad per step at the initial rate, and at least 100 steps.
             speed = float(np.linalg.norm(rates))
             step = max(SMALLEST, min(end / 100, 0.05 / speed) if speed > 0 else end / 100)
         set_fields(

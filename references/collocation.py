@@ -36,17 +36,18 @@ AT_ONCE = 4096
 
 
 def collocate(scene: Scene, grid: Grid, parts: int, every: int = 1) -> Trajectory:
-    """Return the motion of a scene at the samples of a grid, with `parts` steps between two of each `every`-th of them.
+    """Return the motion of a scene at the samples of a grid.
 
+    There are `parts` steps between successive knots, which are every `every`-th sample.
     The field is one that kernels know. A step that is too long to converge gives a wrong result, or one that is not finite.
     Steps also end where a load is not smooth (`Scene.breaks`). With a motor the momentum in the state includes the rotor's.
-    The samples between are single steps from the step before them, all at once.
+    Other samples are single steps from the step before them, computed all at once.
     """
     slope, ends = _slope(scene), grid.steps.astype(np.longdouble) * np.longdouble(grid.dt)
     bends = scene.smoothness(grid.last).breaks.astype(np.longdouble)
     stops = np.union1d(np.append(ends[::every], ends[-1]), bends[(bends > 0) & (bends < ends[-1])])
     q = to_quaternion(scene.R_WB0).astype(np.longdouble)
-    L = scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0 + wheel(scene, ends[:1])[:, 0]
+    L = scene.body.inertia.astype(np.longdouble) @ scene.w_WB_B0 + motor_momentum(scene, ends[:1])[:, 0]
     y = np.concatenate([q / np.sqrt(q @ q), L])[:, None]
     t, states = stops[:1], [y[:, 0]]
     with np.errstate(all="ignore"):
@@ -63,7 +64,7 @@ def collocate(scene: Scene, grid: Grid, parts: int, every: int = 1) -> Trajector
                 samples[some] = _step(slope, t[row[some]], samples[some].T, gaps[some]).T
         size = np.sqrt((samples[:, :4] ** 2).sum(axis=1, keepdims=True))
         R_WB = from_quaternion((samples[:, :4] / size).astype(float))
-        w_WB_B = ((samples[:, 4:] - wheel(scene, ends).T) @ _inverse(scene).T).astype(float)
+        w_WB_B = ((samples[:, 4:] - motor_momentum(scene, ends).T) @ _inverse(scene).T).astype(float)
     return Trajectory(scene, grid.t, R_WB, w_WB_B, f"collocation of order {2 * STAGES}, extended precision")
 
 
@@ -76,7 +77,7 @@ def _step(slope: Slope, start: Reals, y: Reals, h: Reals) -> Reals:
         before, last = stages, change
         stages = y[:, :, None] + h[:, None] * (rates(stages.reshape(7, -1)).reshape(shape) @ A.T)
         change = float(np.abs(stages - before).max() / np.abs(y).max())
-        if change < ROUND_OFF or (change >= last and change < 1e3 * ROUND_OFF):
+        if change < ROUND_OFF or (change >= last and change < 1e3 * ROUND_OFF):  # converged, or stalled near round-off
             break
     return np.asarray(y + h * (rates(stages.reshape(7, -1)).reshape(shape) @ b))
 
@@ -97,7 +98,7 @@ def _slope(scene: Scene) -> Slope:
         return D, np.array([scene.torque.at(*state) for state in zip(t, R, strict=True)], dtype=np.longdouble).T
 
     def at(t: Reals) -> Callable[[Reals], Reals]:
-        momentum, field, times = wheel(scene, t), fixed, t.astype(float).tolist()
+        momentum, field, times = motor_momentum(scene, t), fixed, t.astype(float).tolist()
         if isinstance(potential, Turning):  # its own `at_time` is for single times in double precision
             half = fixed.rate / np.longdouble(2) * t
             field = fixed._replace(back=(np.cos(half), *(-np.sin(half) * n for n in fixed.normal)))
@@ -113,15 +114,15 @@ def _slope(scene: Scene) -> Slope:
             if torque is not None and scene.torque is not None:
                 T = T + (torque if scene.torque.frame == "body" else np.array(in_body((a, b, c, d), tuple(torque))))
             L1, L2, L3 = L1 + h1, L2 + h2, L3 + h3  # rates follow from the body's own momentum
-            spin = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
-            return np.array([*(rate / 2 for rate in turn), *spin])
+            momentum_rate = L2 * z - L3 * y_ + T[0], L3 * x - L1 * z + T[1], L1 * y_ - L2 * x + T[2]
+            return np.array([*(rate / 2 for rate in turn), *momentum_rate])
 
         return rates
 
     return at
 
 
-def wheel(scene: Scene, t: Reals) -> Reals:
+def motor_momentum(scene: Scene, t: Reals) -> Reals:
     """Return the momentum (3, n) of a rotor with a motor at times (n,), s; 0 without a motor."""
     motor = scene.body.motor
     if motor is None:
@@ -147,5 +148,5 @@ def _tableau() -> tuple[Reals, Reals, Reals]:
         derivative = s * (x * P[s] - P[s - 1]) / (x * x - 1)
         x = x - P[s] / derivative
     weights = 2 / ((1 - x * x) * derivative**2)
-    integrals = np.array(P[1:]) - np.array([-P[0], *P[: s - 1]])  # (2 k + 1) times those from -1 to the nodes
+    integrals = np.array(P[1:]) - np.array([-P[0], *P[: s - 1]])  # (2 k + 1) times the integrals from -1 to the nodes
     return (1 + x) / 2, weights / 2, integrals.T @ np.array(P[:s]) * weights / 4

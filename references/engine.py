@@ -31,7 +31,7 @@ from .samples import MATRIX, States, to_body_axes
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
 PACE_STEPS = 1000
-"""After so many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
+"""Number of steps after which the time of the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
 SHARE = 15 / 16
 """Mass of a body about a fixed point, relative to the largest possible one: the mass of the paper's cone."""
 LONG = 1e5
@@ -214,7 +214,7 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
     bodies lose far more energy with half of it.
     """
     second = axes.J.sum() / 2 - axes.J
-    if second.min() < -1e-15 * axes.J.max():
+    if second.min() < -1e-15 * axes.J.max():  # negative by more than round-off
         return None
     potential, flight = axes.scene.potential, axes.scene.flight
     if flight:
@@ -222,7 +222,7 @@ def mass_model(axes: EngineAxes) -> MassModel | None:
     if not isinstance(potential, UniformGravity) or not np.any(axes.moment):
         return MassModel(1.0, np.zeros(3), 0.0, RigidBody(axes.J))
     com = potential.com_B @ axes.R_BF
-    com[np.abs(com) < 1e-15 * np.linalg.norm(com)] = 0.0
+    com[np.abs(com) < 1e-15 * np.linalg.norm(com)] = 0.0  # round-off of a rotation
     lever = com != 0
     if second[lever].min() <= 1e-15 * axes.J.max():
         return None

@@ -3,10 +3,12 @@
     scene                                           trajectory              checked against
     free body, Lagrange top, compound pendulum      `Exact`                 `Precise`
     any other field that `Precise` knows            `Precise`               `SciPy` (DOP853, the tightest tolerance)
-    torque or damping of time, field of kernels     Gauss collocation       `SciPy` (DOP853, the tightest tolerance)
-    torque or damping of attitude, field of kernels `SciPy` (DOP853)        Gauss collocation
+    torque or damping of time only [1]              Gauss collocation       `SciPy` (DOP853, the tightest tolerance)
+    torque or damping of attitude [1]               `SciPy` (DOP853)        Gauss collocation
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
     random bodies (`confirm`)                       `Precise` (96 bits)     Gauss collocation, extended precision (`collocate`)
+
+[1] in a field that kernels know, or in none.
 
 The difference contains the error of the second solution: a few rounding units in the first line, about 1e-11 rad in the others,
 and more if a motion amplifies errors. For random bodies it is below 1.1e-15 rad on nine in ten, and at most 1e-13 rad:
@@ -35,6 +37,7 @@ from .solvers.scipy import SciPy
 CHECKED_RADIANS = 100.0
 """A closed form is checked over this angle only, rad: multi-precision integration takes seconds for it."""
 CHECKED_SAMPLES = 16
+"""Number of samples at which a closed form is checked."""
 
 BITS = 96
 """Precision of the reference solutions of random bodies."""
@@ -49,6 +52,9 @@ LOADED = 1e-8
 """Largest difference of two reference solutions of a scene with a torque or damping, rad."""
 TIGHTEST = 2.3e-14
 """Smallest relative tolerance of SciPy."""
+EXACT_APART, PRECISE_APART, FUNCTION_APART = 1e-12, 1e-8, 1e-6
+"""Largest differences of two solutions, rad, in addition to rounding of times: of a closed form and `Precise`, which differ by
+round-off; of `Precise` and SciPy, which integrates in double precision; and of two methods of SciPy."""
 
 
 class Disagreement(ArithmeticError):
@@ -63,7 +69,10 @@ class Disagreement(ArithmeticError):
 
 
 class Unsolvable(Disagreement):
-    """A scene without a reference solution up to a time, because one of its functions fails before."""
+    """A scene without a reference solution up to a time, because one of its functions fails before.
+
+    It has the attributes `scene` and `cause` only, because there is no second solution.
+    """
 
     def __init__(self, scene: str, cause: Exception) -> None:
         self.scene, self.cause = scene, cause
@@ -85,7 +94,8 @@ class Truth:
     checked_until
         End of the checked part, s.
     approximate
-        True if the trajectory is neither a closed form nor multi-precision, so that `agreement_rad` bounds its accuracy.
+        True if the trajectory is an integration in double precision, so that `agreement_rad` bounds its accuracy. Closed forms,
+        multi-precision and collocation (extended precision) are more accurate than the solution that checks them.
     """
 
     trajectory: Trajectory
@@ -171,13 +181,13 @@ def _is_collocated(scene: Scene) -> bool:
 
 
 def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
-    """Return the collocation with so many steps that twice as many change it by at most `CONFIRMED`, and the last change."""
+    """Return the collocation with enough steps, so that twice as many change it by at most `CONFIRMED`, and the last change."""
     breaks, step, *_ = scene.smoothness(grid.last)
     knots = _knots(grid)
     gaps = np.diff(np.union1d(knots.t, breaks[breaks < grid.t[-1]]))
     parts = 2 ** math.ceil(math.log2(max(1.0, float(gaps.max()) / step)))
     trajectory, change = collocate(scene, knots, parts), np.inf
-    while not change <= CONFIRMED and parts < MOST_PARTS:  # of steps that are too long it may be nan
+    while not change <= CONFIRMED and parts < MOST_PARTS:  # nan if steps are much too long
         parts, coarse = 2 * parts, trajectory
         trajectory = collocate(scene, knots, parts)
         change = difference(coarse, trajectory)
@@ -186,8 +196,8 @@ def _collocate_loads(scene: Scene, grid: Grid) -> tuple[Trajectory, float]:
 
 def _knots(grid: Grid) -> Grid:
     """Return the grid with `KNOTS` of its samples, or all."""
-    every = math.ceil(grid.n_samples / KNOTS)
-    return grid if every == 1 else Grid(grid.dt, grid.n_steps, grid.every * every)
+    stride = math.ceil(grid.n_samples / KNOTS)
+    return grid if stride == 1 else Grid(grid.dt, grid.n_steps, grid.every * stride)
 
 
 def _confirm_loads(scene: Scene, grid: Grid) -> Truth | None:
@@ -213,10 +223,10 @@ def difference(a: Trajectory, b: Trajectory) -> float:
 def _pair(scene: Scene) -> tuple[Method, Method, float]:
     """Return the method, the method that checks it, and their largest allowed difference, rad."""
     if Exact().unsupported(scene) is None:
-        return Exact(), Precise(), 1e-12
+        return Exact(), Precise(), EXACT_APART
     if Precise().unsupported(scene) is None:
-        return Precise(), SciPy("DOP853", TIGHTEST), 1e-8
-    return SciPy("DOP853", TIGHTEST), SciPy("LSODA", 1e-12), 1e-6
+        return Precise(), SciPy("DOP853", TIGHTEST), PRECISE_APART
+    return SciPy("DOP853", TIGHTEST), SciPy("LSODA", 1e-12), FUNCTION_APART
 
 
 def _agreement(scene: Scene, first: Method, second: Method, until: float) -> float:

@@ -19,13 +19,13 @@ from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
 from .run.provenance import provenance
-from .terminal.progress import Step, announce
+from .terminal.progress import Tell, announce
 from .terminal.report_folder import MANIFEST, report_folder
 
 AGAIN = "All measurements are written. Once the fault is mended, the same command with --resume makes it without measuring."
 
 
-def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
+def write(plan: Plan, out: Path, tell: Tell, resume: bool = False) -> Document:
     """Measure and write the report into the folder `out`, and return its document.
 
     If the report is interrupted or fails, finished studies are stored (see `checkpoint`), and a note of the exception contains
@@ -38,15 +38,15 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
         The folder cannot be written, or there is nothing to resume; raised before any work.
     """
     source = provenance()  # before any work: files, and the commit, can change in the meantime
-    progress = checkpoint.begin(plan, out, source, resume)
-    source = replace(source, resumed=progress.describe_earlier(), environments=plan.locks)
+    stored = checkpoint.begin(plan, out, source, resume)
+    source = replace(source, resumed=stored.describe_earlier(), environments=plan.locks)
     try:
         with report_folder(out) as folder:
-            measurements = measure(plan, step, progress)
+            measurements = measure(plan, tell, stored)
             content = measurements.content(source)
             files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
             files.write_text(folder / MANIFEST, json.render(content), "out")
-            step(1.0, "pictures and page")
+            tell(1.0, "pictures and page")
             announce("pictures and page")
             failure = None
             try:
@@ -62,12 +62,12 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
         if failure is not None:
             raise failure
     except BaseException as error:
-        if progress.results or not isinstance(error, BadInput):
-            error.add_note(progress.summary)
+        if stored.results or not isinstance(error, BadInput):
+            error.add_note(stored.summary)
         raise
     pages = [block for page in document.pages.values() for block in page.blocks]
     if not (failed := list(dict.fromkeys(failed_parts([*document.blocks, *(document.brief or []), *pages])))):
-        progress.remove()
+        stored.remove()
     return replace(document, failures=[*document.failures, *failed])
 
 
@@ -111,7 +111,7 @@ def write_text(document: Document, path: Path, render: Callable[[Document], str]
 
 
 def with_pictures(document: Document, draw: Callable[[Figure], str], then: str = "") -> tuple[Document, dict[str, str]]:
-    """Return a document with a sentence in place of what cannot be drawn, and the names of the files of its pictures.
+    """Return a document with a sentence in place of pictures that cannot be drawn, and the names of the files of its pictures.
 
     `then` is a sentence after each of these sentences.
     """

@@ -66,7 +66,7 @@ def decide(baseline: Baseline, results: Results) -> Decision:
     notes = [f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.outcome.ok]
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results)
-    for id, row in results.rows.items():  # energy that ran away although the run ended without an error, whatever the baseline
+    for id, row in results.rows.items():  # energy that ran away in a run without an error is a violation with any baseline
         if row.outcome.ok and find_runaway(row.values):
             before = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
             name = RowName(row.scene or id, row.method or id, ENERGY_DRIFT)

@@ -162,9 +162,9 @@ def _without_bend(x: Array, y: Array, used: list[int]) -> list[int]:
 
 def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
     while len(used) > MIN_POINTS:
-        every, rest = fit_line(x[used], y[used]), fit_line(x[used[1:]], y[used[1:]])
+        whole, rest = fit_line(x[used], y[used]), fit_line(x[used[1:]], y[used[1:]])
         bend = abs(_pair(x, y, used[:2]) - rest.slope)
-        if bend <= BEND * abs(rest.slope) or every.scatter <= CALMER * rest.scatter:
+        if bend <= BEND * abs(rest.slope) or whole.scatter <= CALMER * rest.scatter:
             break
         used = used[1:]
     return used

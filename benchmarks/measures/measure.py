@@ -13,7 +13,7 @@ class Measure(Enum):
     ATTITUDE_MAX = "attitude error max", "rad"
     ATTITUDE_FINAL = "attitude error final", "rad"
     ATTITUDE_RMS = "attitude error rms", "rad"
-    RATES_MAX = "rate error max", "1"
+    RATES_MAX = "rate error max", "1"  # relative to the largest rate
     RATES_FINAL = "rate error final", "1"
     POSITION_MAX = "position error max", "m"
     POSITION_FINAL = "position error final", "m"
@@ -44,10 +44,12 @@ class Measure(Enum):
     FAILING_STEP = "first |w| dt that does not", "rad"
     TURNS = "turns in the run", "1"
     GROWTH = "growth exponent", "1"
+    """Exponent p of an error that grows with time as t^p: attitude error or drift."""
     TURNS_OVER = "turns over", "1"
+    """How often the body turned over (`count_turns_over`)."""
     TURNS_OVER_TRUE = "turns over of the exact motion", "1"
     PRECISION = "precision of numbers", "bit"
-    ALLOWED = "error over tolerance", "1"
+    ERROR_OVER_TOLERANCE = "error over tolerance", "1"
 
     def __init__(self, text: str, unit: str) -> None:
         self.text, self.unit = text, unit

@@ -15,6 +15,8 @@ from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope
 
+EQUAL = 1e-9
+"""Times and steps that differ by less than this share are equal."""
 TREND = 0.5
 """Share of the largest drift that a straight line must explain in a secular drift."""
 SIGNIFICANT = 3.0
@@ -96,7 +98,7 @@ class ErrorLaw:
 
     def is_measured(self, duration: float) -> bool:
         """Return whether the run covers the duration."""
-        return not self.carried and self.length >= duration * (1 - 1e-9)
+        return not self.carried and self.length >= duration * (1 - EQUAL)
 
     def scale(self, factor: float, carried: str) -> ErrorLaw:
         """Return the law of a finer setting, whose errors are `factor` times as large."""
@@ -134,7 +136,7 @@ def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) ->
         See `ErrorLaw`.
     """
     length, whole = float(t[-1]), float(error.max())
-    half = float(error[t <= length / 2 * (1 + 1e-9)].max())
+    half = float(error[t <= length / 2 * (1 + EQUAL)].max())
     exponent = math.log2(whole / half) if half > 0 else 0.0
     b = min(max(2 * (whole - 2 * half) / length**2, 0.0), whole / length**2)
     a = max(whole / length - b * length, 0.0)

@@ -34,7 +34,7 @@ from ..studies import step_ladder
 from ..studies.case import Case
 from ..studies.selection import tolerance_setting
 from ..studies.time_limit import attempt_within
-from .growth import Amplification, ErrorLaw, ExpectedDrift, amplification_of, extrapolate_drifts, fit_law
+from .growth import EQUAL, Amplification, ErrorLaw, ExpectedDrift, amplification_of, extrapolate_drifts, fit_law
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0
 """Length of short probes, rad, with a closed form and with multi-precision, which takes a second for ten radians."""
@@ -183,9 +183,9 @@ class Conditions(Question):
         longer = dt >= self.spacing
         ratio = dt / self.spacing if longer else self.spacing / dt
         if up is longer:
-            number = _ROUND[bisect.bisect_left(_ROUND, ratio * (1 - 1e-9))]
+            number = _ROUND[bisect.bisect_left(_ROUND, ratio * (1 - EQUAL))]
         else:
-            number = _ROUND[bisect.bisect_right(_ROUND, ratio * (1 + 1e-9)) - 1]
+            number = _ROUND[bisect.bisect_right(_ROUND, ratio * (1 + EQUAL)) - 1]
         return self.spacing * number if longer else self.spacing / number
 
     def choose_ours(self, methods: Sequence[Method] | None = None, error: float | None = None) -> tuple[Method, float]:
@@ -267,7 +267,7 @@ class Conditions(Question):
             return None
         base = max(whole, key=lambda probe: (probe.length, -probe.setting))
         enough = min(base.length / MUCH_LONGER, self.duration)
-        if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
+        if length >= max(enough, min(self.short, self.duration)) * (1 - EQUAL):
             return None
         assert base.error_law is not None  # `shows_growth` requires it
         if name is not None:  # the error is proportional to a tolerance
@@ -282,7 +282,7 @@ class Conditions(Question):
 
     def shows_growth(self, probe: Probe) -> bool:
         """Return whether a probe covered a whole short window without losing the attitude, so that it shows how errors grow."""
-        whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
+        whole = probe.length >= min(self.short, self.duration) * (1 - EQUAL)
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
 
 
@@ -300,7 +300,7 @@ def prepare_conditions(asked: Question) -> Conditions:
         length = duration
     widest = min(length / SAMPLES, step_ladder.RADIANS / rate)
     power = math.floor(math.log10(widest))
-    digit = max(digit for digit in (1, 2, 5) if digit <= widest / 10.0**power * (1 + 1e-9))
+    digit = max(digit for digit in (1, 2, 5) if digit <= widest / 10.0**power * (1 + EQUAL))
     spacing = float(f"{digit}e{power}") / FINER
     samples = count_steps(length, spacing)
     # Runs with steps longer than the spacing end up to a quarter later.

@@ -39,6 +39,7 @@ from ..studies.selection import tolerance_setting
 from ..studies.speed import CALL, own_loop
 from ..studies.study import HANG_LIMIT, Progress
 from ..studies.time_limit import attempt_here
+from .growth import EQUAL
 from .probe import LEAST_SAMPLES, RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
 
 COST_LIMIT = 1.0
@@ -246,7 +247,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     If the truth is known for longer than the short window, short probes only need to be good enough for an error that grows in
     proportion to time, and long probes are made as well.
     """
-    longer = conditions.truth_until > conditions.short * (1 + 1e-9) and conditions.duration > conditions.short
+    longer = conditions.truth_until > conditions.short * (1 + EQUAL) and conditions.duration > conditions.short
 
     def expect_linear(probe: Probe) -> float:
         law = probe.error_law
@@ -259,7 +260,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     last, order = short[-1], method.order
     before: Sequence[Probe] = short
     long = []
-    if order is not None and conditions.window(last.dt, last.cost, long=True).t[-1] < conditions.duration * (1 - 1e-9):
+    if order is not None and conditions.window(last.dt, last.cost, long=True).t[-1] < conditions.duration * (1 - EQUAL):
         # The affordable run is shorter than the duration. One with a longer step, which gets further, shows how errors grow.
         step = min(LONGER * last.dt, short[0].dt)
         before = long = [conditions.probe(method, step, last.cost * last.dt / step, True)]
@@ -293,9 +294,9 @@ def _step_between(conditions: Conditions, best: Probe, coarser: float) -> tuple[
     longest = conditions.longest_step
     wanted = min(2 * best.dt, longest) if math.isinf(coarser) else math.sqrt(best.dt * coarser)
     dt = conditions.round_step(wanted)
-    if dt <= best.dt * (1 + 1e-9):
+    if dt <= best.dt * (1 + EQUAL):
         dt = conditions.round_step(wanted, up=True)
-    inside = best.dt * (1 + 1e-9) < dt < min(coarser * (1 - 1e-9), longest * (1 + 1e-9))
+    inside = best.dt * (1 + EQUAL) < dt < min(coarser * (1 - EQUAL), longest * (1 + EQUAL))
     return (best.method, dt) if inside and coarser > CLOSE * best.dt else None
 
 
@@ -303,7 +304,7 @@ def _tolerance_between(conditions: Conditions, best: Probe, coarser: float) -> t
     """Return the method with a power of ten between the tolerance of the best probe and a looser one that fails."""
     name, fine = tolerance_setting(best.method), round(math.log10(best.setting))
     power = fine + 1 if math.isinf(coarser) else (fine + round(math.log10(coarser)) + 1) // 2
-    if name is None or 10.0**power >= min(coarser, 10 * LOOSEST) * (1 - 1e-9) or power == fine:
+    if name is None or 10.0**power >= min(coarser, 10 * LOOSEST) * (1 - EQUAL) or power == fine:
         return None
     return selection.at_tolerance(best.method, name, float(f"1e{power}")), best.dt
 
@@ -343,7 +344,7 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     dt, least = conditions.round_step(last.dt * factor), per_step * _most_per_step(conditions)
     if dt < least:
         dt = conditions.round_step(least, up=True)
-    return (last.method, dt, per_step / dt) if dt < last.dt * (1 - 1e-9) else None
+    return (last.method, dt, per_step / dt) if dt < last.dt * (1 - EQUAL) else None
 
 
 def _most_per_step(conditions: Conditions) -> float:

@@ -95,7 +95,7 @@ class Case:
     def time_rows(self, measure: Measure, timings: Sequence[Timing], unit: float) -> list[Measurement]:
         """Return the row of each process; `unit` is what a call does, such as simulated seconds, so that times are per unit."""
         numbers = range(len(timings)) if len(timings) > 1 else [None]
-        return [self.time_row(measure, each.minimum / unit, each, n) for n, each in zip(numbers, timings, strict=True)]
+        return [self.time_row(measure, timing.minimum / unit, timing, n) for n, timing in zip(numbers, timings, strict=True)]
 
     def samples(self, quantity: str, t: Array, value: Array) -> Samples:
         """Return one line: values (n,) at times (n,), s."""

@@ -30,34 +30,34 @@ class Extent(IntEnum):
 
 @dataclass(frozen=True)
 class Declaration:
-    """A study as it is declared; its name is that of its file.
+    """A study as it is declared; its name is the name of its file.
 
     Attributes
     ----------
     findings
         Function that yields its rows and samples.
     extent
-        In which reports it is.
+        The shortest report that contains it.
     named
-        It also measures the engines that are named for a report, as it measures all methods.
+        True if engines named for a report are measured too, like its methods.
     apart
-        Its rows have a section of their own and are not among the tables of the scenes.
+        True if its rows have a section of their own and are not among the tables of the scenes.
     timed
-        It measures times, which need an idle machine, so that it does not run on a cluster.
+        True if it measures times, which need an idle machine, so that it does not run on a cluster.
     in_turn
-        In a full report and alone, several processes measure its times in turn.
+        True if several processes measure its times in turn, in a full report and alone.
     scenes
         Its own scenes, which a report has only if none is named; None: the scenes of the report.
     draw
         Function that draws its bodies and returns the study, from methods and keywords; None: it has scenes.
     settings, of_engines
-        The settings of a family that a bare name stands for if the study runs alone, and those of the named engines.
+        What a bare name of a family stands for if the study runs alone: its settings. `of_engines`: the same for named engines.
     in_report
-        The methods of a report that are in the study.
+        Function that selects the study's methods from the methods of a report.
     options
         Options of `conservative study` that not every study has.
-    more
-        Keywords of the study in a report.
+    report_keywords
+        Fields of the study in a report, or arguments of `draw`, that differ from their defaults.
     """
 
     findings: Maker
@@ -72,7 +72,7 @@ class Declaration:
     of_engines: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     in_report: Callable[[Sequence[Method]], tuple[Method, ...]] = tuple
     options: tuple[str, ...] = ("scenes", "methods")
-    more: tuple[tuple[str, Any], ...] = ()
+    report_keywords: tuple[tuple[str, Any], ...] = ()
 
     @property
     def name(self) -> str:

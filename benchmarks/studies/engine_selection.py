@@ -15,7 +15,7 @@ from conservative.references.environments.environment import list_environments
 from .selection import Missing
 
 ALL = "all"
-"""The name of all installed engines: those of this environment, and the newest version of each in an environment of its own."""
+"""The name of all installed engines: in this environment, and the newest version of each in an environment of its own."""
 
 
 def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
@@ -35,9 +35,9 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
+    all_names = [engine for name in names for engine in (list_installed() if name == ALL else (name,))]
     methods: list[Method] = []
-    for name in dict.fromkeys(registry.read_name(each, "engines", settings=False) for each in every):
+    for name in dict.fromkeys(registry.read_name(name, "engines", settings=False) for name in all_names):
         try:
             methods += _family(name.base, name.version).settings_in_tables()
         except MissingEngine as error:
@@ -50,7 +50,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
 
 
 def list_installed() -> tuple[str, ...]:
-    """Return the installed engines: those in this environment, the newest version of each in its own environment, and programs.
+    """Return the installed engines: in this environment, the newest version of each in its own environment, and programs.
 
     If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """
@@ -60,10 +60,9 @@ def list_installed() -> tuple[str, ...]:
             with suppress(MissingEngine):
                 here[name] = family().maker.version
     known = registry.list_engines()
-    newest = {
-        environment.engine: environment for environment in list_environments() if environment.engine in known
-    }  # older versions come first
-    apart = [each.name for name, each in newest.items() if here.get(name) != each.version]
+    # Older versions come first, so that the newest one remains.
+    newest = {environment.engine: environment for environment in list_environments() if environment.engine in known}
+    apart = [environment.name for name, environment in newest.items() if here.get(name) != environment.version]
     return (*here, *apart, *list_programs())
 
 

@@ -39,13 +39,13 @@ def draw(kind: str, n: int, seed: int = 0) -> Batch:
     J = second.sum(axis=1, keepdims=True) - second
     J /= J.mean(axis=1, keepdims=True)
     normal = (table.standard_normal((n, 4)) for table in tables[1:3])
-    R_BP, R_WB0 = (from_quaternion(each / np.linalg.norm(each, axis=1)[:, None]) for each in normal)
+    R_BP, R_WB0 = (from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]) for q in normal)
     w_WB_B0 = RATE * tables[3].standard_normal((n, 3))
     inertia = (R_BP * J[:, None]) @ R_BP.swapaxes(1, 2)
     inertia = (inertia + inertia.swapaxes(1, 2)) / 2
     parameters: dict[str, Array] = {}
     potential = None
-    if kind != "free_bodies":  # with a weight of 1 N
+    if kind != "free_bodies":  # the weight is 1 N
         direction, (low, high) = tables[4].standard_normal((n, 3)), MOMENT
         length = (20 / DURATION) ** 2 if kind == "one_body" else low + (high - low) * tables[5].random(n)
         parameters["com_B"] = direction * (length / np.linalg.norm(direction, axis=1))[:, None]

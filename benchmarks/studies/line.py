@@ -111,7 +111,7 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
 
 def cost_of_run(study: Study, case: Case, done: Success, first: bool) -> float:
     """Return the wall time, s, of a run: of a second call if the first may have included compilation."""
-    if not first or done.cost.first_call < study.longest_run / 4:
+    if not first or done.cost.first_call < study.longest_run / 4:  # compilation in so short a call skips no point
         return done.cost.first_call
     again = study.attempt(case)
-    return min(each.cost.first_call for each in (done, again) if isinstance(each, Success))
+    return min(result.cost.first_call for result in (done, again) if isinstance(result, Success))

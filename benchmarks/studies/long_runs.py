@@ -22,7 +22,8 @@ DURATIONS = 10.0
 
 def end_of(scene: Scene) -> float:
     """Return the length of a long run of a scene, s: `DURATIONS`, or up to the end of the first table that ends before."""
-    return min(scene.t_end * DURATIONS, *(max(scene.t_end, load.end) for load in scene.loads), math.inf)
+    ends = (max(scene.t_end, load.end) for load in scene.loads)
+    return min(scene.t_end * DURATIONS, *ends, math.inf)  # inf: min needs two arguments if there are no loads
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:

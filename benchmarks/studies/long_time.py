@@ -77,7 +77,7 @@ def measure_growth(study: Study, scene: Scene, method: Method, budget: float) ->
     """Yield the rows and lines of a method on a scene, whose runs take at most `budget` s."""
     turn = 2 * math.pi / float(np.linalg.norm(scene.w_WB_B0))
     case = Case(study.name, scene, method, Grid(scene.dt, 8))
-    study.attempt(case)  # may compile
+    study.attempt(case)  # a short run first: it may compile
     trajectories: list[Trajectory] = []
     affordable = TURNS[-1]
     for turns in TURNS:

@@ -47,7 +47,7 @@ STATES = ("q_w", "q_x", "q_y", "q_z", "w_x", "w_y", "w_z")
 MOST_SAMPLES = 10**6
 """Largest number of samples of one duration: three hours of a satellite are 5,400,000 steps of an engine."""
 SIGNED = "drift of "
-"""Begins the quantities of relative drifts; that of a vector is the change of its length."""
+"""Begins the quantities of relative drifts. The drift of a vector is the change of its length."""
 LARGEST = "largest drift of "
 """Begins the quantities of the largest relative drift so far, over all steps of the run, at the times of the states."""
 ERROR = "largest attitude error"
@@ -89,14 +89,14 @@ def list_runs(study: Study, scene: Scene, method: Method, drawn: bool) -> list[C
     """Return the runs of a method of which the first that succeeds is shown: ten durations if it is drawn, and one."""
     step = min(scene.t_end, (method.order and method.method_info.usual_dt) or scene.dt)
     every = math.ceil(scene.t_end / step / MOST_SAMPLES)
-    if every > 1:  # the samples of ten durations would not be those of one; and the run is long enough
+    if every > 1:  # a run of ten durations would have other samples, and one duration is long enough
         drawn = False
     ends = dict.fromkeys((*([end_of(scene)] if drawn else []), scene.t_end))
     return [Case(study.name, scene, method, grid_for(scene, step, end, every)) for end in ends]
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods in the charts: of each family those of `MethodInfo.pictures`, or else the first."""
+    """Return the methods in the charts: the settings in `MethodInfo.pictures` of each family, or else the first."""
     competitors = [method for method in methods if method.role != Role.TRUTH]
     preferred = [method for method in competitors if method in method.settings_for("pictures")]
     firsts = {method.family: method for method in reversed(competitors)}

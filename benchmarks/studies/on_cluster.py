@@ -32,7 +32,7 @@ def find_on_cluster(scheduler: str, study: Study, progress: Progress) -> Iterato
         Dask, of the extra `cluster`, is not installed.
     """
     if studies.STUDIES[study.name].timed:
-        untimed = ", ".join(name for name, each in studies.STUDIES.items() if not each.timed)
+        untimed = ", ".join(name for name, declared in studies.STUDIES.items() if not declared.timed)
         allowed = f"no scheduler for a study of times, which need an idle machine, or one of {untimed}"
         raise BadInput("scheduler", f"one for the study {study.name!r}", allowed)
     parts = [replace(study, scenes=(scene,), truth=reference) for scene in study.scenes]

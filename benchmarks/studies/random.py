@@ -7,7 +7,7 @@ same step sizes for every method with a step and the same tolerances for every a
   initial rate (10 to 20 rad of actual rotation for nine in ten of 120 bodies). Asymmetric bodies in a field amplify errors: an
   initial relative error of the rates by a factor of 10 at the median, of 19 or more on one body in ten, and of 1,400 at most.
   Over 48 rad the factor is 33 at the median and 1,400 or more on one body in twenty.
-* The time of a setting is that of the same motion, final state only, as in all studies (`time_runs`).
+* The time of a setting is the time of the same motion, final state only, as in all studies (`time_runs`).
 * Settings that cannot be the fastest are not timed, to save time: see `worth_timing`.
 
 The reference solution of each body is confirmed by an independent one (`references.truth.confirm`). A body on which they differ
@@ -66,7 +66,8 @@ MARGIN = 3.0
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run above which only every third setting of a line is measured."""
 TIME = Value(Measure.TIME, math.nan)
-UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
+"""The time of a setting that is not timed."""
+UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times the time of another setting with this error")
 
 
 def random_study(methods: tuple[Method, ...], bodies: int = BODIES, seed: int = 0, **settings: Any) -> Study:
@@ -89,8 +90,8 @@ def random_study(methods: tuple[Method, ...], bodies: int = BODIES, seed: int = 
 def settings(method: Method) -> tuple[Method, ...]:
     """Return the settings of a family, of order `ORDER` or more.
 
-    For our methods these are the candidates of the automatic choice and those with a tolerance, for engines all settings, and
-    for baselines none.
+    For our methods these are the candidates of the automatic choice and settings with a tolerance, for engines all settings,
+    and for baselines none.
     """
     variants = method.settings_for("variants")
     if method.role in (Role.OURS, Role.BASELINE):
@@ -120,10 +121,10 @@ Line = list[TimedSetting]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    every = study.drawn or (NOT_DRAWN,) * len(study.scenes)
+    drawn_of_scenes = study.drawn or (NOT_DRAWN,) * len(study.scenes)
     tell = study.count(progress, len(study.lines) + 2)
     with Processes(study.processes) as processes:
-        for scene, drawn in zip(study.scenes, every, strict=True):
+        for scene, drawn in zip(study.scenes, drawn_of_scenes, strict=True):
             tell(f"{scene.name}: truth")
             coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
             about = Case(study.name, scene, Precise(BITS), coarsest, drawn)
@@ -186,9 +187,9 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     chosen: dict[TimedSetting, None] = {}
     for side, error in itertools.product(sides.values(), DECADES):
         costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in side]
-        least = min((each for each in costs if not math.isnan(each)), default=math.nan)
-        for line, each in zip(side, costs, strict=True):
-            if each <= MARGIN * least:
+        least = min((seconds for seconds in costs if not math.isnan(seconds)), default=math.nan)
+        for line, seconds in zip(side, costs, strict=True):
+            if seconds <= MARGIN * least:
                 chosen.update((line[i], None) for i in list_deciding([p.error for p in line], error))
     return list(chosen)
 

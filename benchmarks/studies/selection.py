@@ -144,7 +144,7 @@ def series(method: Method) -> str:
 
 
 def series_setting(method: Method) -> str:
-    """Return the setting of a line in tables: that of the method without its tolerance (see `series`)."""
+    """Return the setting of a line in tables: the setting of the method without its tolerance (see `series`)."""
     setting = tolerance_setting(method)
     text = method.setting(without=setting)
     if setting is None or tolerance_setting(at_tolerance(method, setting, _default(method, setting))):

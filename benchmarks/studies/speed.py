@@ -175,13 +175,13 @@ def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measu
             budget=study.timing_budget / 4,
             shared=list({case.scene: None for case, _ in ready}),
         )
-    for key, each in timings.items():
+    for key, of_processes in timings.items():
         case, _ = ready[key]
-        yield from key[0].time_rows(key[1], each, case.grid.dt * case.grid.n_steps)
+        yield from key[0].time_rows(key[1], of_processes, case.grid.dt * case.grid.n_steps)
 
 
 def prepare_timed(case: Case, converted: bool) -> Callable[[], Any]:
-    """Return what is timed of a case, prepared: its run if samples are converted, otherwise its own loop."""
+    """Return the timed part of a case, prepared: its run if samples are converted, otherwise its own loop."""
     run = case.method.prepare(case.scene, case.grid)
     run()  # so that engines find their limits outside of the loop
     return run if converted else own_loop(run)

@@ -94,7 +94,8 @@ def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: 
         if isinstance(done, Outcome):
             outcome = done
         else:
-            kept = cut_at_failure(done.trajectory, frozenset(), Bounds(math.inf, math.inf))  # engines may lose their energy
+            # Only divergence fails: drift and orthonormality are not bounded, because engines may lose both.
+            kept = cut_at_failure(done.trajectory, frozenset(), Bounds(math.inf, math.inf))
             outcome = (detect_wrong_branch(kept, R_WB, size) or OK) if kept.ok else kept.outcome
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
@@ -104,7 +105,7 @@ def longest_step(study: Study, scene: Scene, method: Method, rate: float, R_WB: 
         case.row(Value(Measure.LONGEST_STEP, works), OK if works > 0 else outcome),
         case.row(Value(Measure.FAILING_STEP, fails), outcome, "every step works" if outcome.ok else ""),
     ]
-    return [drop_step(row) for row in rows]
+    return [drop_step(row) for row in rows]  # of the last case, whose step is not the subject of either row
 
 
 def detect_wrong_branch(trajectory: Trajectory, R_WB: Array, size: int) -> Outcome | None:

@@ -37,7 +37,7 @@ _IN_ORDER = (
     *(random, motion, paper, convergence, speed, work_precision, each_step, long_runs, long_time),
     *(stability, hard_cases, throughput),
 )
-STUDIES: Mapping[str, Declaration] = {each.STUDY.name: each.STUDY for each in _IN_ORDER}
+STUDIES: Mapping[str, Declaration] = {module.STUDY.name: module.STUDY for module in _IN_ORDER}
 """The declaration of each study by its name, in the order of a report."""
 
 

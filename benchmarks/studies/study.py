@@ -71,7 +71,7 @@ class Study:
     Attributes
     ----------
     name
-        One of those in `conservative.benchmarks.studies.studies`.
+        Name of a study in `conservative.benchmarks.studies.studies`.
     scenes, methods
         Scenes and methods. Unsupported combinations have rows with that outcome.
     quick

@@ -7,9 +7,9 @@ and for our methods also one body at a time.
 * The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Rows contain the median and the 95th
   percentile over the first `bodies` of a kind. Each body has a reference solution that an independent one confirms
   (`conservative.references.truth`); a body for which they disagree is dropped.
-* The time is that of a prepared run over the same motion, final state only, in interleaved rounds and several processes. The
-  time of the preparation has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest that
-  reaches it and the one before it, and exact solutions.
+* The time is the time of a prepared run over the same motion, final state only, in interleaved rounds and several processes.
+  The time of the preparation has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest
+  that reaches it and the one before it, and exact solutions.
 * With increasing numbers of bodies, a setting is skipped as soon as a call would exceed the time budget.
 """
 
@@ -113,7 +113,7 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Bodies of one kind, the indices (n,) of those whose errors are measured, and their exact attitudes (n, samples, 3, 3)."""
+    """Bodies of one kind, the indices (n,) of the `measured` ones, and their exact attitudes (n, samples, 3, 3)."""
 
     study: ThroughputStudy
     bodies: Batch
@@ -171,7 +171,7 @@ def find_truth(study: ThroughputStudy, scene: Scene) -> Generator[Measurement, N
             yield case.row(Value(Measure.AGREEMENT, error.agreement_rad), Outcome(OutcomeKind.SKIPPED, str(error)))
     worst = max(truths.values(), key=lambda truth: truth.agreement_rad)
     yield replace(agreement_row(study, scene, grid.dt, worst), field=scene.name, seed=study.seed)
-    return Kind(study, bodies, np.array(list(truths)), np.array([each.trajectory.R_WB for each in truths.values()]))
+    return Kind(study, bodies, np.array(list(truths)), np.array([truth.trajectory.R_WB for truth in truths.values()]))
 
 
 def _case(study: ThroughputStudy, scene: Scene, method: Method, n: int) -> Case:
@@ -192,6 +192,7 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
     one = _case(study, kind.bodies.scene, way.method, EXACT_STEPS if exact else SAMPLES)
     one = replace(one, bodies=n, way=way.text)
     for case in list_settings(one, map(_grid, STEPS[few]), TOLERANCES[few]):
+        # Clearly below the smallest error, or too slow: a finer setting does not determine a cost.
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or line[-1].spent * n > 2 * study.longest_run):
             break
         chosen = replace(way, method=case.method)
@@ -199,14 +200,14 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
         if isinstance(done, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
             if done.kind is OutcomeKind.UNSUPPORTED and tolerance_setting(way.method):
-                break  # at any tolerance
+                break  # it is unsupported at any tolerance
             continue
         _, block, cost = done
         with np.errstate(all="ignore"):  # too long a step can overflow
             off = angle_between(kind.truth, block.R_WB).max(axis=1)
         off = np.where(block.finished & np.isfinite(off), off, math.pi)
         errors = {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
-        if block.finished.all():  # otherwise a run ends early, and its time is not that of the motion
+        if block.finished.all():  # otherwise a run ends early, and its time is not the time of the motion
             line.append(BatchSetting(chosen, case, errors, cost.first_call / n, cost.prepare / n))
         values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
         yield from case.rows(values, detail=EXACT if exact else "")
@@ -217,8 +218,8 @@ def select_deciding(line: list[BatchSetting]) -> list[BatchSetting]:
     """Return the points of a line that determine the cost at an error."""
     if line and takes_exact_steps(line[0].case.method):
         return line
-    errors = [[point.errors[statistic] for point in line] for statistic in (MEDIAN, MOST)]
-    chosen = {i for each in errors for error in ERRORS for i in list_deciding(each, error)}
+    errors_of_lines = [[point.errors[statistic] for point in line] for statistic in (MEDIAN, MOST)]
+    chosen = {i for errors in errors_of_lines for error in ERRORS for i in list_deciding(errors, error)}
     return [line[i] for i in sorted(chosen)]
 
 
@@ -230,7 +231,7 @@ def time_rows(
     They are time, s per simulated second, steps per second and preparation, s, each per body.
     """
     study, ready = kind.study, dict[BatchSetting, ManyDone]()
-    for point in (replace(each, case=replace(each.case, bodies=size)) for each in points):
+    for point in [replace(point, case=replace(point.case, bodies=size)) for point in points]:
         grid, refused = keep_end(point.case.grid), refuse_long(point, size, study.longest_run)
         done = refused or attempt_many(point.way, kind.bodies[:size], grid, study.hang_limit)
         if isinstance(done, Outcome):
@@ -246,9 +247,9 @@ def time_rows(
         budget=study.timing_budget,
     )
     timed = []
-    for point, each in timings.items():
-        case, timing, prepare = point.case, each[0], ready[point][2].prepare / size
-        yield from case.time_rows(Measure.TIME, each, size * DURATION)
+    for point, of_processes in timings.items():
+        case, timing, prepare = point.case, of_processes[0], ready[point][2].prepare / size
+        yield from case.time_rows(Measure.TIME, of_processes, size * DURATION)
         if timing.outcome.ok and tolerance_setting(case.method):
             yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
         else:
@@ -284,5 +285,5 @@ STUDY = Declaration(
     settings=methodcaller("settings_for", "many"),
     in_report=family_settings,
     options=("methods", "bodies", "seed", "sizes"),
-    more=(("quick", True), ("bodies", QUICK_BODIES)),  # coarse: preparing engines takes minutes
+    report_keywords=(("quick", True), ("bodies", QUICK_BODIES)),  # coarse: preparing engines takes minutes
 )

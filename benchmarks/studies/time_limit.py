@@ -47,7 +47,7 @@ class Trial:
 def is_quick(case: Case) -> bool:
     """Return whether a case is known to be quick: it takes a fixed number of steps that call no Python functions.
 
-    Steps that call those of a scene, or a method of other people, take as long as the functions need.
+    Steps that call functions of a scene, and methods of other people, take as long as the functions need.
     """
     return isinstance(case.method, Missing) or (is_known_to_end(case.method) and not case.scene.calls_python)
 
@@ -84,7 +84,7 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False, apart: 
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
     """
-    elsewhere = isinstance(case.method, EngineMethod)  # in another process already
+    elsewhere = isinstance(case.method, EngineMethod)  # it runs in another process already
     if is_bounded(case.method) or (is_known_to_end(case.method) and not apart and not elsewhere):
         return attempt(case, skip_missing)
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))

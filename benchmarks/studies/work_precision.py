@@ -22,6 +22,7 @@ from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 TIME = Value(Measure.TIME, math.nan)
+"""The time of a point that is not timed."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -54,7 +55,7 @@ def list_cases(study: Study, scene: Scene, method: Method) -> list[Case]:
     """
     few = method.order == 1 and not isinstance(method, EngineMethod)
     grids = step_ladder.steps(scene, method)[: step_ladder.LENGTH if few else None]
-    tolerances = set(step_ladder.TOLERANCES)  # also if quick: an engine is fastest at one of them
+    tolerances = set(step_ladder.TOLERANCES)  # all of them also in a quick study, as an engine is fastest at one of them
     if setting := tolerance_setting(method):
         tolerances.add(getattr(method, setting))
     case = Case(study.name, scene, method, step_ladder.samples(scene, method))

@@ -59,7 +59,7 @@ def _describe_load(load: Any, t_end: float, probes: Array) -> Iterator[list[floa
     """Yield 1 for world axes, a table, and values at some times; values of a function of the attitude also at the probes."""
     if hasattr(load, "at"):
         yield [float(getattr(load, "frame", "body") == "world")]
-        varying = getattr(load, "of_time", load)  # of a damping
+        varying = getattr(load, "of_time", load)  # a damping can have a part of time
         value = getattr(varying, "value", None)
         if isinstance(value, tuple):
             yield from (np.ravel(item).tolist() for item in value)

@@ -92,8 +92,8 @@ class Point:
 
 def points() -> Iterator[Point]:
     """Yield the points: the settings of `MethodInfo.suite` of every registered method on every scene of the suite."""
-    every = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
-    methods = [method for method in every if method.role != Role.TRUTH]
+    selected = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
+    methods = [method for method in selected if method.role != Role.TRUTH]
     truths = remember_truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 

@@ -20,24 +20,44 @@ from conservative.scene import Scene
 
 from .solution import ANGLE, Equations, States, closed, truth
 
-FLOOR = 1e-9  # errors that round-off makes in double precision
-UNITS_OF_DIGITS = 6.0  # of what digits round, that the largest error may have
-SIGMAS = 7.0  # of noise, that the largest error may have
-ROUND_OFF = 1e-13  # of double precision, which no fit goes below
-LONGEST, NUMERICAL = 100.0, 5000.0  # rad that are explained; rad that are compared without a closed form
-TINY = 1e-11  # of noise, which is round-off
-SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0  # rad; rows; of the allowed error, that is far more
-LONGER = 30.0  # stretches of a trial motion over stretches of the exact one: a large number makes it as stiff
-PART_OF_ALLOWED = 0.01  # of the error that a program may have: what is less does not tell mistakes apart
-HUGE = 1e60  # of the largest rate: a difference that is not finite
-SENSITIVE = 1e6  # factor by which a motion may multiply an error, beyond which solutions need more digits
-HOPELESS = 30.0  # of noise, that no other first row explains
-LINEAR = 0.3  # rad, differences of motions that are taken as small
-PERTURBED = 1e-8, 1e-12  # of initial states, to see how the motion multiplies it; the second where the first is not small
-STRAIGHT, NARROWED = 0.03, 6  # of differences for slopes; trials of smaller changes
-SMALLEST_CHANGE = 1e-14  # of initial states, for slopes
-EXTENDED = 40  # trials of a fit that takes more and more rows
-FASTER = 30.0  # times the angle, that a motion multiplies small changes by near a separatrix
+FLOOR = 1e-9
+"""Smallest allowed error: double precision makes smaller ones by round-off."""
+UNITS_OF_DIGITS = 6.0
+"""Allowed error over the error that the digits of a file make."""
+SIGMAS = 7.0
+"""Allowed error over the standard deviation of the noise."""
+ROUND_OFF = 1e-13
+"""Smallest noise that fits assume: round-off in double precision."""
+LONGEST, NUMERICAL = 100.0, 5000.0
+"""Angles, rad, of the rows that are explained, and of the rows that are compared if the motion has no closed form."""
+FEWEST_FOR_NOISE = 14
+"""Smallest number of rows from which noise is estimated: differences of order 9 need several."""
+TINY = 1e-11
+"""Noise below this is round-off, and not motion."""
+SCREENS, FEWEST_SCREENED, SCREENED = (3.0, 10.0, 30.0), 12, 30.0
+"""Mistakes are first tried on some rows: of the first of these angles, rad, or 12, whose error is 30 times the allowed one."""
+LONGER = 30.0
+"""Largest number of stretches of a trial motion, relative to the exact one: a large fitted number can make a motion stiff."""
+PART_OF_ALLOWED = 0.01
+"""Noise that fits assume in answers of a program, relative to the allowed error: smaller errors do not tell mistakes apart."""
+HUGE = 1e60
+"""Replaces a difference that is not finite, relative."""
+SENSITIVE = 1e6
+"""Factor by which a motion may multiply an error. Beyond it, solutions need more digits."""
+HOPELESS = 30.0
+"""Error, in units of the noise, from which no other first row explains it."""
+LINEAR = 0.3
+"""Largest difference of motions, rad, that is treated to first order."""
+PERTURBED = 1e-8, 1e-12
+"""Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
+STRAIGHT, NARROWED = 0.03, 6
+"""Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
+SMALLEST_CHANGE = 1e-14
+"""Smallest change of initial states from which slopes are computed."""
+EXTENDED = 40
+"""Largest number of fits that take more and more rows."""
+FASTER = 30.0
+"""Growth of small changes over the angle of rotation, from which a motion is near a separatrix."""
 Solution = Callable[[Array, Array, Array, int], tuple[Array, Array]]
 """From initial attitudes (B, 3, 3), rates (B, 3), other numbers (B, k) and n to the first rows (B, n, 3, 3), (B, n, 3)."""
 
@@ -158,7 +178,7 @@ class Compared:
         return changed
 
     def first(self, angle: float, least: int) -> Compared:
-        """Return the rows in which the body turns by an angle, rad, or at least so many."""
+        """Return the rows in which the body turns by an angle, rad, or at least `least` rows."""
         return self.take(slice(0, max(least, int(np.searchsorted(self.t, self.t[0] + angle / self.scale)))))
 
     def read(self, R: Array | None, w: Array | None) -> Compared:
@@ -277,6 +297,7 @@ class Compared:
         small = np.concatenate([np.full(6, 1e-6), changed])
         n = len(self.t)
 
+        # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
             p, cost = self._improve(motion, p, k, moved, small, most)
@@ -313,7 +334,7 @@ class Compared:
             axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
             sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
             goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
-            while damping < 1e3 and not better:
+            while damping < 1e3 and not better:  # a larger damping makes steps of no use
                 step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
                 q = p.copy()
                 q[moved] += step
@@ -325,7 +346,7 @@ class Compared:
                 break
             gain = 1 - (new @ new) / (now @ now)
             p, now = q, new
-            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:
+            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
                 break
         return p, float(now @ now)
 
@@ -438,12 +459,12 @@ def exact(case: Compared) -> Solution:
 def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
     """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
 
-    It is the smallest robust estimate from differences of order 3 to 9. Of a smooth motion they fall with each order, and those
-    of noise do not.
+    It is the smallest robust estimate from differences of order 3 to 9. Differences of a smooth motion fall with each order,
+    and differences of noise do not.
     """
     noise, resolved = np.zeros(2), np.zeros(2, bool)
     for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
-        if values is None or len(t) < 14:
+        if values is None or len(t) < FEWEST_FOR_NOISE:
             continue
         x = values
         if i == 0:
@@ -456,6 +477,7 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
             weights = 1 / np.prod(gaps / np.ptp(near, axis=0), axis=1)
             weights = weights / np.sqrt((weights**2).sum(axis=0))
             d = sum(weights[k][:, None] * x[k : len(t) - order + k] for k in range(order + 1))
+            # 1.538: the median norm of three normal numbers.
             estimates.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
         noise[i] = min(estimates)
         resolved[i] = estimates[-1] > 0.5 * estimates[-3] or noise[i] < TINY

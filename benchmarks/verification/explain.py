@@ -30,13 +30,20 @@ from .mistakes.times import DROPPED, JITTERED, TIMES
 from .solution import Equations, closed, truth
 from .trials import by_habit, by_rule, compose, fits, remark_on_damping
 
-FEWEST, MOST = 100, 2500  # rows that are explained
-EFFORT = 6_000  # stretches, after which the search ends: about 20 s of an idle core
-MOST_BREAKS = 50  # of loads, if numbers are fitted
-STILL = 1e-9  # rad, or rad/s relative to the scale: of rows that stand still
-LITTLE = 0.05  # of the error: what a fitted number leaves, if an integrator explains the rest
-SHRUNK = 1e-3  # of the exact motion: a motion in other units of time that is smaller stands still
-SHOWN = 10.0  # of the allowed error: a motion in other units of time that moves less shows nothing
+FEWEST, MOST = 100, 2500
+"""Rows that are explained: at least `FEWEST`, if the file has them, and at most `MOST`, evenly chosen."""
+EFFORT = 6_000
+"""Work of a search with a `share` of 1, in stretches (`Effort`): about 20 s of an idle core."""
+MOST_BREAKS = 50
+"""Largest number of jumps and corners of the loads with which numbers are fitted."""
+STILL = 1e-9
+"""Largest change from row to row while a body stands still, rad, or of rates relative to the scale."""
+LITTLE = 0.05
+"""Largest share of the error that a fitted number may leave if an integrator explains the rest."""
+SHRUNK = 1e-3
+"""A motion in other units of time that moves by less than this share of the exact motion stands still."""
+SHOWN = 10.0
+"""A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -60,13 +67,14 @@ def diagnose(
 ) -> Diagnosis:
     """Search for the mistakes of some kinds that explain the error of a file or of the answers of a program.
 
-    A mistake explains a file if it leaves its noise or digits, and less than half of the error. Of several, the one with the
-    fewest numbers and mistakes is named, and all that leave as little. A candidate leaves less than half of the error. Mistakes
-    that make attitudes or rates worse than they are have no place in either. `quaternion` is True if the order of quaternions
-    can be wrong. The work is counted, so that the answer is the same on a busy machine.
+    A mistake explains a file if the error that remains is within the file's noise or digits and less than half of the original
+    error. Of several mistakes that leave similar errors, those with the fewest fitted numbers are named. If none explains the
+    file, candidates are those that leave less than half of the error. A mistake that makes attitudes or rates worse is not a
+    candidate. `quaternion` is True if the order of quaternions can be wrong. The work is counted, so that the answer is the
+    same on a busy machine.
     """
     whole = _before_divergence(whole)
-    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)
+    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)  # 100 rad, or 100 rows if they take longer; at most 5000 rad
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
@@ -74,10 +82,10 @@ def diagnose(
     early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
-        if not kinds & search.kinds or (len(case.t) < 4 and search.least > 3):
+        if not kinds & search.kinds or len(case.t) < search.least:
             continue
         tell(name)
-        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # and what earlier parts have left
+        case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # unused work is kept
         for explanation in search.find(early if search.whole else case, _Asked(quaternion, kinds, tuple(tried))):
             if explanation is not None:
                 tried.append(explanation)
@@ -91,20 +99,20 @@ def diagnose(
     def no_worse(explanation: Explanation) -> bool:
         return explanation.explains or bool((np.array(explanation.left) <= bounds).all())
 
-    # A mistake that makes attitudes or rates worse than they are is not a candidate.
     tried = [explanation for explanation in tried if no_worse(explanation)]
     tried.sort(key=lambda explanation: (not explanation.explains, explanation.share, explanation.keys))
     explaining = [explanation for explanation in tried if explanation.explains]
-    # Noise has all directions, and jitter lies along the motion: half of the error cannot be chance.
+    # An explanation that leaves much of an error may fit noise by chance. Jitter does not: its errors lie along the motion.
     doubtful = all(explanation.rest > PROVEN and explanation.keys != (JITTERED.key,) for explanation in explaining)
-    if case.step is None and doubtful:  # an error that noise hides says little about its cause
+    if case.step is None and doubtful:  # in a file, noise can hide the cause
         tried, explaining = [replace(explanation, explains=False) for explanation in tried], []
     if not explaining:
         notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
-        return Diagnosis([explanation for explanation in tried if explanation.share < 0.5][:3], tried, notes)
+        return Diagnosis([explanation for explanation in tried if explanation.share < HALF][:3], tried, notes)
     least = min(explanation.size for explanation in explaining)
+    # Similar errors: within three times the smallest one, or within three times the noise.
     good = [explanation for explanation in explaining if explanation.size <= 3 * max(least, 1.0)]
     fewest = min((explanation.numbers, len(explanation.keys)) for explanation in good)
     good = [explanation for explanation in good if (explanation.numbers, len(explanation.keys)) == fewest]
@@ -122,13 +130,13 @@ def _before_divergence(case: Compared) -> Compared:
     w, largest = case.data[1], float(np.linalg.norm(case.exact[1], axis=1).max())
     size = np.zeros(1) if w is None or case.step is not None else np.linalg.norm(w, axis=1)
     if not size.max() > 3 * largest > 0 or np.median(size[np.argmax(size > 3 * largest) :]) <= 3 * largest:
-        return case  # no rows, or single ones
+        return case  # no rows, or only single ones, exceed it
     case = case.take(slice(0, max(4, int(np.argmax(size > 3 * largest)))))
     return case.rescale(float(size[: len(case.t)].max()))
 
 
 def _separate(case: Compared, named: list[Explanation]) -> list[str]:
-    """Return the sentence on what would separate several mistakes that explain a file."""
+    """Return a note on the data that would separate several mistakes that explain a file."""
     motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
         apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
@@ -153,12 +161,12 @@ def _without_numbers(mistakes: Any) -> list[Any]:
     return sorted((mistake for mistake in mistakes if not mistake.numbers), key=lambda mistake: mistake.key)
 
 
-def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
+def _usable_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...]]:
     """Return the readings that the data can have: one of attitudes, one of rates, both, or one of all axes."""
     usable = [reading for reading in _without_numbers(READINGS) if fits(reading, case)]
     if not quaternion:
         usable = [reading for reading in usable if not reading.quaternions]
-    if case.from_row and case.scene.free:  # whatever the axes of the world are
+    if case.from_row and case.scene.free:  # its motion is the same in any axes of the world
         usable = [reading for reading in usable if not reading.of_world]
     of = {name: [(), *((reading,) for reading in usable if reading.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
@@ -168,12 +176,13 @@ def _apply_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ...
 def _readings(case: Compared, asked: _Asked) -> Explanations:
     """Yield other readings of attitudes and rates."""
     near = case.take(slice(0, 10))
-    for mistakes in _apply_readings(case, asked.quaternion):
+    for mistakes in _usable_readings(case, asked.quaternion):
         trial = compose(*mistakes)
         motion = trial.build(near)
         if motion is None:
             continue
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
+        # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
             yield attempt(case, trial)
 
@@ -191,7 +200,7 @@ def _changes(case: Compared, asked: _Asked) -> Explanations:
 
 
 def _nearest_first(case: Compared, trials: list[Trial]) -> list[Trial]:
-    """Return trials without numbers that make a difference, by the size of what they leave from the start of the scene.
+    """Return trials without numbers that make a difference, by the error that they leave from the start of the scene.
 
     Motions that break off are left out. Half of the work may go into this; the trials that remain follow in their order.
     """
@@ -230,6 +239,7 @@ def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
     rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
     written = Decimal(f"{rate:.17g}" if len(repr(rate)) > 18 else repr(rate))
     digits = len(written.normalize().as_tuple().digits)
+    # Half a unit of the last digit, and a little more for rounding.
     if abs(explanation.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
         return explanation
     return replace(explanation, sentence=explanation.sentence + ", which is within the digits of the scene file")
@@ -246,9 +256,10 @@ def _units(case: Compared, asked: _Asked) -> Explanations:
 
 
 def _moves(case: Compared, explanation: Explanation | None) -> bool:
-    """Return whether a motion differs from standing still: what only shrinks the motion explains nothing.
+    """Return whether a motion differs from standing still: a mistake that only shrinks the motion explains nothing.
 
-    The error of a program is proportional to what it moves, however little its tolerance tells.
+    The error of a program is proportional to its motion, so the remaining error is compared with the motion and not with the
+    tolerance of the program.
     """
     if explanation is None or explanation.made is None:
         return False
@@ -294,8 +305,8 @@ def _own_times(case: Compared, gap: float, end: float) -> Explanations:
 
 def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
     """Return the explanation by the times at which the motion from the initial state is nearest to the rows."""
-    tau, e = case.t.copy(), 1e-6 / case.scale
-    end += min(end - case.start, 50 * gap)
+    tau, e = case.t.copy(), 1e-6 / case.scale  # e: s, for slopes
+    end += min(end - case.start, 50 * gap)  # up to 50 lost rows
     flow = Equations(case.scene).flow(case.start, case.scene.R_WB0[None], case.scene.w_WB_B0[None], end + e)
 
     def sample(t: Array) -> tuple[Array, Array]:
@@ -303,7 +314,7 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
         return R[0], w[0]
 
     weights = 1 / np.repeat(case.noise, [9, 3]) ** 2
-    for _ in range(8):
+    for _ in range(8):  # Gauss-Newton for the time of each row
         d = case.differences(*sample(tau))
         v = (case.differences(*sample(tau + e)) - d) / e
         tau = tau - (d * v * weights).sum(axis=1) / ((v * v * weights).sum(axis=1) + 1e-300)
@@ -311,11 +322,13 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
         tau[0] = case.t[0]
     off = tau - case.t
     lost, size = np.rint(off / gap), float(np.sqrt(np.mean(off**2)))
+    # Times that are off by whole gaps, more and more of them, are lost rows. Times that scatter about 0 are jitter.
     if lost.max() >= 1 and np.abs(off - lost * gap).max() < 0.2 * gap and (np.diff(lost) >= 0).all():
         at = float(case.t[np.flatnonzero(lost)[0]])
         values = {"rows": float(lost.max()), "at": at}
         return explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
     if abs(float(np.mean(off))) < 0.5 * size:
+        # Every row has a time of its own: this ranks behind explanations by one or two fitted numbers.
         return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
     return None
 
@@ -342,12 +355,12 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
         return
     for rule in RULES:
         wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
-        while wanted and len(seen) < 8:
+        while wanted and len(seen) < 8:  # each try is nearer to the best number of steps, so a few are enough
             parts = wanted.pop()
             if parts in seen or not 1 <= parts <= PARTS or parts * len(case.t) > 4 * STEPS_AT_MOST:
                 continue
             seen.add(parts)
-            case.effort.spend(parts * len(case.t) / 100)
+            case.effort.spend(parts * len(case.t) / 100)  # a stretch for every 100 steps of an attitude
             fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
             rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
             turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
@@ -382,6 +395,7 @@ def _habits(case: Compared, asked: _Asked) -> Explanations:
         explanations = list[Explanation]()
         for parts in (1, 2, 5, 10) if case.step is None else (1,):
             step = case.step or float(np.median(np.diff(case.t))) / parts
+            # Up to the first row with an error (0 if there is none), and 30 rows more.
             first = case.take(slice(0, int(np.flatnonzero(case.error.max(axis=0) > case.allowed.min())[:1].sum()) + 30))
             for some in (first, case) if len(first.t) < len(case.t) and len(first.t) > 3 else (case,):
                 explanation = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
@@ -431,8 +445,9 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
     if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
         return None
-    still = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), _still(case)[1]), _still(case))[0] <= STILL
-    if mistake.from_start != still or (R is None and not rest):
+    start = _still(case)
+    stays_at_start = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), start[1]), start)[0] <= STILL
+    if mistake.from_start != stays_at_start or (R is None and not rest):
         return None
     stop = float(case.t[k])
 
@@ -449,7 +464,7 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
         return motion
 
     trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _standstill(other, mistake))
-    if R is None or mistake.from_start:  # rates alone do not show when between two rows
+    if R is None or mistake.from_start:  # rates alone do not show when, between two rows, the body stopped
         known = {number.name: stop for number in mistake.numbers}
         explanation = attempt(case, _at_numbers(trial, tuple(known.values())), known=known)
         return None if explanation is None else replace(explanation, trial=trial)
@@ -481,11 +496,12 @@ def _rows(case: Compared, asked: _Asked) -> Explanations:
         worst = float(case.error[:, places[0]].max())
         values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
         made = ROWS[-1].change(case.exact, case.data, off)
+        # Rows with any values explain much: this ranks behind all explanations by fitted numbers.
         yield explain(fine, Trial((BY_KEY["single rows"],), _nowhere), made, values, numbers=9)
 
 
 def _off_rows(error: Array) -> Any:
-    """Return which rows are off, if all others are much nearer: rows of one residue, or up to a tenth of all rows."""
+    """Return which rows are off, if all others are much nearer: every n-th row, n up to 6, or up to a tenth of all rows."""
     n = len(error)
     for period in range(2, 7):
         for first in range(period):
@@ -574,6 +590,7 @@ def fit_moments(case: Compared) -> Explanation:
     text = (
         f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {fitted} (of the body: {own})"
     )
+    # The 0 is a placeholder: the sentence is formatted later.
     explanation = explain(case, Trial((BY_KEY["other moments"],), _nowhere), made, {"text": 0.0}, numbers=len(p))
     return _possible(replace(explanation, sentence=text, values=_components(inertia(p))))
 
@@ -612,7 +629,7 @@ def _other_body(case: Compared) -> Explanation:
     mistake = BY_KEY["another body"]
     numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
     trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
-    explanation = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))
+    explanation = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))  # its sentence has no fitted number
     assert explanation is not None
     (a, b, c), (d, e, f) = (
         (made := inertia(np.array([*explanation.values.values()])))[[0, 1, 2], [0, 1, 2]],
@@ -676,7 +693,7 @@ def _several(case: Compared, asked: _Asked) -> Explanations:
         return
     moved = [(), *((mistake,) for mistake in _without_numbers((*SCENES, *EQUATIONS)) if mistake.kind in asked.kinds)]
     times = [(), *((time,) for time in TIMES if not time.numbers and fits(time, case))] if "times" in asked.kinds else [()]
-    readings = [(), *_apply_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
+    readings = [(), *_usable_readings(case, asked.quaternion)] if "readings" in asked.kinds else [()]
     ranked = []
     start = case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t)
     for first, second in product(moved, times):
@@ -706,10 +723,11 @@ def _several(case: Compared, asked: _Asked) -> Explanations:
 
 @dataclass(frozen=True)
 class Search:
-    """A part of the search: it finds explanations of some kinds with a share of the work.
+    """A part of the search, which finds explanations of some kinds.
 
-    If it `ends` the search, mistakes that explain the error end it after this part. `whole` is True for a part that takes rows
-    at any angle; `least` is the number of rows that it needs.
+    `share` is the part of `EFFORT` that is added when this part begins. If it `ends` the search, mistakes that explain the
+    error end it after this part. `whole` is True for a part that takes rows at any angle; `least` is the number of rows that it
+    needs.
     """
 
     find: Callable[[Compared, _Asked], Explanations]
@@ -721,10 +739,10 @@ class Search:
 
 
 SEARCHES = {
-    "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=2),
+    "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
-    "habits": Search(_habits, frozenset({"habits"}), 0.1, least=2),
+    "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),

@@ -15,9 +15,12 @@ from .compare import HOPELESS, Compared, Solution
 from .finding import Cause
 from .mistakes.mistake import Mistake, Number
 
-HALF, PROVEN = 0.5, 0.2  # of the error: what an explanation may leave, and what the best of them may, to be proven
-OWN_SHARE = 0.02  # of the effect of a mistake that another motion showed: what the steps of a program may change in it
-OWN_ERROR = 3.0  # of the error that a program may have: what it may leave with a mistake, whose motion is another one
+HALF, PROVEN = 0.5, 0.2
+"""Shares of the error that an explanation may leave, and that the best one may leave if noise could hide its cause."""
+OWN_SHARE = 0.02
+"""Share of the effect of a mistake, found in another motion, that the steps of a program may change."""
+OWN_ERROR = 3.0
+"""Allowed errors that a program may leave with a mistake: its steps have errors on the motion with the mistake, too."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Trial:
         return tuple(mistake.key for mistake in self.mistakes)
 
     def sentence(self, values: Mapping[str, float]) -> str:
-        """Return what is wrong, with numbers."""
+        """Return the sentences of the mistakes, with numbers."""
         return ". ".join(mistake.sentence.format(**values) for mistake in self.mistakes) + self.remark
 
 

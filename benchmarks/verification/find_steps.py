@@ -15,9 +15,16 @@ from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
 from .solution import Equations, truth
 
-CHUNK, CHUNK_EFFORT = 256, 8  # steps after which work is counted, and their work (`Effort`)
-ROWS, STEP_EFFORT = 400, 0.15  # rows that candidates are compared with, and the work of one step from all of them
-STEPS_AT_MOST, PARTS = 20_000, 2000  # steps of a method over the file, and between two rows
+CHUNK, CHUNK_EFFORT = 256, 8
+"""Steps after which work is counted, and their work (`Effort`)."""
+ROWS, STEP_EFFORT = 400, 0.15
+"""Largest number of rows that candidates are compared with, and the work of one step from all of them."""
+STEPS_AT_MOST, PARTS = 20_000, 2000
+"""Largest numbers of steps of a method, over the file and between two rows."""
+CANDIDATES = 5
+"""Number of methods that run from the first row."""
+FIRST_STEPS = 2000
+"""Steps of a first run, which shows that most candidates are wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,7 @@ class Slope:
 
 
 def march(case: Compared, method: Step, parts: int) -> Solution:
-    """Return the motion by a method with so many steps between two rows, which are equally far apart."""
+    """Return the motion by a method with `parts` steps between two rows, which are equally far apart."""
     equations = Equations(case.scene)
     weight = weigh(case.scene)
     f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
@@ -75,12 +82,12 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
 
 
 def by_step(integrator: Integrator, parts: int) -> Trial:
-    """Return the trial of an integrator with so many steps between two rows."""
+    """Return the trial of an integrator with `parts` steps between two rows."""
     return Trial((integrator,), lambda case: march(case, integrator.step, parts))
 
 
 def count_gaps(case: Compared) -> Any:
-    """Return the numbers of the rows, counted in the least distance of two."""
+    """Return the times of the rows since the start, as whole numbers of the smallest distance of two rows."""
     return np.rint((case.t - case.start) / np.diff(case.t).min()).astype(int)
 
 
@@ -98,7 +105,7 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
     if numbers[-1] > 2 * STEPS_AT_MOST or numbers[0] > 0 or len(case.t) < 3:
         return
     case = case.take(slice(0, int(np.searchsorted(numbers, STEPS_AT_MOST))))
-    if np.ptp(np.diff(count_gaps(case))) > 0:  # rows of which only some were written
+    if np.ptp(np.diff(count_gaps(case))) > 0:  # some rows are missing
         return
     for ranking in (RowByRow, Linearised):
         if ranking is Linearised or (all(x is not None for x in case.data) and Equations(case.scene).steady):
@@ -119,13 +126,14 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
         ((*linear.best(method.step), method.key, method) for method in INTEGRATORS), key=lambda candidate: candidate[:3]
     )
     proven = False
-    for left, parts, _, integrator in ranked[:5]:
+    for left, parts, _, integrator in ranked[:CANDIDATES]:
+        # Few rows do not rule out a method. After an explanation, others are tried only if they leave about as little.
         if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
             continue
         if case.effort.over:
             return
         for count in sorted({parts, *linear.others(integrator.step, parts)}, key=lambda n: abs(n - parts)):
-            for most in (2000, STEPS_AT_MOST):  # steps
+            for most in (FIRST_STEPS, STEPS_AT_MOST):
                 some = case.take(slice(0, max(4, most // count)))
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion

@@ -131,7 +131,7 @@ class Verification:
     reason
         What decides the verdict, without the verdict: "48 of 48 motions, order 2.00, 70 of 70 pairs".
     notes
-        Sentences on what was not used, not compared, or assumed.
+        Sentences on data that was not used or not compared, and on assumptions.
     details
         Values that belong to the kind of the subject, such as the quantities of a recording.
     """

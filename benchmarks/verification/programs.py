@@ -1,8 +1,8 @@
-"""Verification of what integrates motions: programs, engines and methods.
+"""Verification of programs, engines and methods, which integrate motions.
 
 Each exact motion is a recording of the subject: its samples are compared with the exact solution, at |w| h = 0.01 rad. An error
-within the tolerance of the declared order is right. Near the tolerance the motion is run again with half the step, and right is
-an error that falls as the declared order says. The mistakes that explain the motions that fail are found by the search for
+within the tolerance of the declared order is right. An error near the tolerance is checked again with half the step: it is
+right if it falls as the declared order says. The mistakes that explain the motions that fail are found by the search for
 recordings.
 
 Programs and engines are given bodies in principal axes, so their motions are compared in these axes.
@@ -46,11 +46,11 @@ PATIENCE = 30.0
 ROWS = 40
 """Largest number of samples of a motion, for the search."""
 NEAR = 3.0
-"""Errors up to so many tolerances are right if they fall with the step as the declared order says."""
+"""Largest error, in tolerances, that is right if it falls with the step as the declared order says."""
 FEW = 3
-"""A mistake explains at least so many motions. If fewer fail, an error that falls with the step is an error of the method."""
+"""Smallest number of motions that a mistake must explain. If fewer fail, an error that falls with the step is the method's."""
 HANGS = 2
-"""Motions of a program that does not answer, after which the others are not run."""
+"""Number of motions without an answer, after which the others are not run."""
 SLOPE = 0.5
 """Largest difference between the order and the exponent with which an error falls."""
 FINE = PARTS[-1]
@@ -58,9 +58,11 @@ FINE = PARTS[-1]
 LADDER = (1, 2, 5, 10)
 """Steps in 0.1 rad at which the order is measured."""
 GENERIC = 5
-"""Motions that the order is measured on: free bodies with three different moments."""
+"""Largest number of motions that the order is measured on: free bodies with three different moments."""
 RESOLVED = {"f64": 1e-11, "f32": 1e-4}
 """Smallest errors, rad, that show an order, above round-off in each precision."""
+ASYMPTOTIC = 0.3
+"""Largest error, rad, that shows an order: larger ones do not fall with a power of the step."""
 ROUNDS = 5
 """Largest number of motions that are searched for mistakes."""
 CANDIDATES = 6
@@ -68,7 +70,7 @@ CANDIDATES = 6
 REFITS = 4
 """Largest number of motions that make the numbers of a mistake more precise."""
 CLEAR = 2.0
-"""Power of ten of the error over the tolerance of the motion that is searched first: small enough for fits."""
+"""The search begins with the motion whose error is nearest to 10^`CLEAR` tolerances: clear, but small enough for fits."""
 ALIKE, ROUNDED = 3.0, 1e-9
 """Mistakes explain equally well if they leave shares within this factor; smaller shares are rounding."""
 LEAST = 0.1
@@ -123,8 +125,9 @@ def in_principal_axes(motion: Motion) -> Motion:
 
 
 def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) -> Ran:
-    """Return a motion run with so many steps in 0.1 rad. Raise `Unsupported`."""
-    every = motion.steps * parts
+    """Return a motion run with `parts` steps in 0.1 rad. Raise `Unsupported`."""
+    every = motion.steps * parts  # steps between two samples of the motion
+    # The search works on more samples: `thin` for each of the motion's, evenly spaced, and at most `ROWS` in all.
     thin = max(n for n in range(1, every + 1) if every % n == 0 and n * motion.samples <= max(ROWS, motion.samples))
     grid = Grid(motion.step / parts, every * motion.samples, every // thin)
     scene, ended = motion.scene, ""
@@ -174,9 +177,9 @@ def run_motions(
     `unsupported` returns why a scene is not supported, None if it is.
     """
     ran, reasons = list[Ran](), dict[str, str]()
-    for every in load():
-        tell(every.name)
-        motion = in_principal_axes(every) if principal else every
+    for original in load():
+        tell(original.name)
+        motion = in_principal_axes(original) if principal else original
         allowed = np.array(tolerance(motion, order, single))
         if sum(run.hangs for run in ran) == HANGS:
             reasons[motion.name] = f"it did not answer in {HANGS} motions before"
@@ -191,7 +194,7 @@ def run_motions(
     return Answers(solve, ran, reasons, order, single)
 
 
-def _falls(answers: Answers, ran: Ran) -> float:
+def _slope_if_right(answers: Answers, ran: Ran) -> float:
     """Return the exponent with which the error falls from the step to half of it; 0 if it is below the declared order."""
     with suppress(Unsupported):
         again = run_motion(answers.solve, ran.motion, ran.allowed, 2 * FINE)
@@ -203,13 +206,13 @@ def _falls(answers: Answers, ran: Ran) -> float:
 def measure_order(answers: Answers) -> float:
     """Return the exponent with which errors of free bodies fall with the step, the median of some motions; nan if unknown.
 
-    Of each motion the shortest two steps count whose errors are above round-off.
+    The slope of a motion is the slope between its two finest steps whose errors are above round-off.
     """
     slopes, floor = [], RESOLVED["f32" if answers.single else "f64"]
-    free = [run for run in answers.ran if not run.motion.features and np.diff(np.sort(run.motion.scene.body.moments)).min() > 0]
+    free = [run for run in answers.ran if not run.motion.features and _is_generic(run.motion)]
     for run in free[:GENERIC]:
         errors = [float(run_motion(answers.solve, run.motion, run.allowed, n).error[0]) for n in LADDER]
-        good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < 0.3]
+        good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < ASYMPTOTIC]
         if len(good) > 1:
             (a, first), (b, last) = good[-2:]
             slopes.append(math.log(first / last) / math.log(b / a))
@@ -250,7 +253,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
         least = min(candidate.share for candidate in good)
         equal = [candidate for candidate in good if candidate.share <= ALIKE * max(least, ROUNDED)]
         names, before = best.motions, named.get(keys := tuple(candidate.explanation.keys for candidate in equal))
-        # Numbers of the first search stand: it had the motions that show them best.
+        # Keep the numbers fitted first: that motion shows them best.
         explanations = before.explanations if before else tuple(candidate.explanation for candidate in equal)
         named[keys] = Named(explanations, (*(before.motions if before else ()), *names))
         for name in names:
@@ -277,7 +280,7 @@ class Applied:
 
     @property
     def rank(self) -> tuple[int, int, int]:
-        """What explains more is better, then fewer fitted numbers, then fewer mistakes."""
+        """The key of the order: a mistake that explains more is better, then fewer fitted numbers, then fewer mistakes."""
         return self.score, -self.explanation.numbers, -len(self.explanation.keys)
 
 
@@ -302,7 +305,7 @@ def _apply(explanation: Explanation, failing: Sequence[Ran], right: Sequence[Ran
 
 
 def _is_generic(motion: Motion) -> bool:
-    """Return whether the three principal moments differ."""
+    """Return whether the three principal moments differ by more than a thousandth of the largest."""
     moments = np.sort(motion.scene.body.moments)
     return bool((np.diff(moments) > 1e-3 * moments[-1]).all())
 
@@ -313,15 +316,16 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     near = {
         run.motion.name: slope
         for run in answers.failing
-        if (few or run.ratio <= NEAR) and not run.ended and (slope := _falls(answers, run))
+        if (few or run.ratio <= NEAR) and not run.ended and (slope := _slope_if_right(answers, run))
     }
     failing = [run for run in answers.failing if run.motion.name not in near]
     named = explain_motions(failing, [run for run in answers.ran if run not in failing])
-    named = [group for group in named if len(group.motions) >= min(FEW, len(failing))]  # what one motion shows is chance
+    # A mistake that explains a single motion may do so by chance.
+    named = [group for group in named if len(group.motions) >= min(FEW, len(failing))]
     explained = {name: group for group in named for name in group.motions}
-    # What converges as it declares, and is no known mistake, has a large error constant.
+    # A motion that converges at the declared order, and that no known mistake explains, has a large error constant.
     rest = [run for run in failing if run.motion.name not in explained and not run.ended]
-    near |= {run.motion.name: slope for run in rest if (slope := _falls(answers, run))}
+    near |= {run.motion.name: slope for run in rest if (slope := _slope_if_right(answers, run))}
     failing = [run for run in failing if run.motion.name not in near]
     order, lower = math.nan, dict[str, str]()
     if failing and len(explained) < len(failing) / 2:
@@ -331,15 +335,15 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     for run in answers.ran:
         name = run.motion.name
         k = int(np.argmax(run.error / run.allowed))
-        value = float(run.error[k]), float(run.allowed[k]), ("rad", "of the largest rate")[k], "order"
+        measured = float(run.error[k]), float(run.allowed[k]), ("rad", "of the largest rate")[k], "order"  # of a `Finding`
         if run not in failing:
             detail = f"{_above(run.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
-            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=detail))
+            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *measured, detail=detail))
         elif name in lower:
-            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *value, detail=lower[name]))
+            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *measured, detail=lower[name]))
         else:
             causes = tuple(explanation.cause for explanation in explained[name].explanations) if name in explained else ()
-            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *value, causes=causes, detail=run.ended))
+            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *measured, causes=causes, detail=run.ended))
     findings += [
         Finding(subject, "motions", name, Verdict.NOT_TESTED, detail=reason) for name, reason in answers.unsupported.items()
     ]
@@ -433,7 +437,7 @@ def verify_method(
 
 
 def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
-    """Return what decides the verdict, with the number of cases of each check that are right."""
+    """Return the reason of the verdict, with the number of cases of each check that are right."""
     parts = []
     for check in dict.fromkeys(finding.check for finding in findings):
         some = [finding for finding in findings if finding.check == check and finding.verdict is not Verdict.NOT_TESTED]
@@ -492,8 +496,8 @@ def verify_program(
     except (UnusableProgram, IntegrationFailed) as failure:
         findings.append(protocol.unusable(subject, failure))
         return Verification(subject, "program", findings, findings[-1].detail)
-    every = [*findings, *verification.findings]
-    return replace(verification, findings=every, reason="; ".join(filter(None, [verification.reason, *(_wrong(findings))])))
+    both = [*findings, *verification.findings]
+    return replace(verification, findings=both, reason="; ".join(filter(None, [verification.reason, *(_wrong(findings))])))
 
 
 def _wrong(findings: Sequence[Finding]) -> list[str]:

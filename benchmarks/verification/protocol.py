@@ -78,7 +78,7 @@ def times(subject: str, method: EngineMethod) -> Iterator[Finding]:
     if problem:
         yield Finding(subject, "times", "", Verdict.WRONG, detail=f"{text}: {problem}")
         return
-    rest = math.inf  # of a request, beside the call
+    rest = math.inf  # shortest time of a request without its call
     for _ in range(20):
         start = perf_counter()
         inside = float(worker.ask("time", run=run, calls=1)["seconds"])
@@ -89,7 +89,7 @@ def times(subject: str, method: EngineMethod) -> Iterator[Finding]:
 
 
 def _measure(worker: Worker, run: int) -> tuple[str, str]:
-    """Return what is wrong with the time of a long request, or "", and a sentence with its numbers."""
+    """Return the fault in the time of a long request, or "", and a sentence with its numbers."""
     calls, wall, seconds = 1, 0.0, 0.0
     while wall < PACE and calls < 1e6:
         calls, start = 4 * calls, perf_counter()

@@ -22,8 +22,10 @@ from conservative.scene import Scene
 
 States = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
-NODES, ANGLE, SWEEPS = 32, 2.0, 60  # of a stretch: Chebyshev points, first length, rad, and Picard's iterations at most
-SMALLEST, TAIL = 1e-6, 3e-15  # stretches, relative to the first, that are not halved again; last coefficients of a good one
+NODES, ANGLE, SWEEPS = 32, 2.0, 60
+"""Of a stretch: Chebyshev points, first length in rad, and largest number of Picard's iterations."""
+SMALLEST, TAIL = 1e-6, 3e-15
+"""Shortest stretch that is halved again, relative to the first one, and largest last coefficients of a good stretch."""
 _EPS = 2.0**-52
 
 _X = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
@@ -169,7 +171,7 @@ class Equations:
                 left -= 1
                 after = breaks[0] if breaks else math.inf
                 b = min(a + length, after, end)
-                b = min(after, end) if min(after, end) - b < 0.01 * length else b
+                b = min(after, end) if min(after, end) - b < 0.01 * length else b  # no tiny stretch at the end
                 half = (b - a) / 2
                 try:
                     Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half, self.tolerance)
@@ -188,6 +190,7 @@ class Equations:
                 y, a = Y[..., -1], b
                 y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
                 before = breaks.pop(0) if a == after else before
+                # Between 22 and 34 iterations the length stays.
                 length *= 1.25 if sweeps < 22 else 0.8 if sweeps > 34 else 1.0
         return made
 
@@ -234,6 +237,7 @@ def _sweep(slope: Callable[[Array], Array], y: Array, half: float, tolerance: fl
     for sweep in range(1, SWEEPS):
         new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
         change, Y = float(np.abs(new - Y).max()) / size, new
+        # Converged, or no longer converging near round-off, or diverged.
         if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
             return Y, sweep
         last = change

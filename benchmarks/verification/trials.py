@@ -26,8 +26,10 @@ from .mistakes.scenes import SceneMistake
 from .mistakes.times import Time
 from .solution import Equations, truth
 
-SLOWEST, FASTEST = 0.5, 1.1  # times are scaled by at least, and at most
-AHEAD = 8  # steps that a motion runs ahead of a habit
+FASTEST = 1.1
+"""Largest factor of times."""
+AHEAD = 8
+"""Number of steps that the exact motion first runs ahead of a habit."""
 _DEFAULTS = {field.name: field.default for field in fields(Equations) if field.name not in ("scene", "tolerance", "most")}
 
 
@@ -89,12 +91,12 @@ def _build(mistakes: Sequence[Mistake], case: Compared) -> Solution | None:
         return equations_of(moved, case.scene, dict(zip((number.name for number in numbers), p, strict=True)),
                             tolerance=exactly.tolerance, most=exactly.most)  # fmt: skip
 
-    probe = np.array([number.start + 0.5 for number in numbers])  # at the start the scene does not change
+    probe = np.array([number.start + 0.5 for number in numbers])  # with the numbers of the start the scene does not change
     if any(mistake.numbers and mistake.change(case.scene, *(number.start + 0.5 for number in mistake.numbers)) is None
            for mistake in mistakes if isinstance(mistake, SceneMistake)) or equations(probe) is None:  # fmt: skip
         return None
     plain = exact(case) if not moved and time is None else None
-    flows: list[Any] = []  # of a start that is not fitted: other times of the same motion
+    flows: list[Any] = []  # if the start is not fitted, trials are other times of one motion
 
     def read(reading: Reading, p: Array, R: Array, w: Array, back: bool) -> tuple[Array, Array]:
         if not reading.numbers:
@@ -154,7 +156,7 @@ def _at_times(
 
 
 def by_rule(rule: Rule, parts: int) -> Trial:
-    """Return the trial of a rule that integrates attitudes from exact rates, with so many steps between two rows."""
+    """Return the trial of a rule that integrates attitudes from exact rates, with `parts` steps between two rows."""
 
     def build(case: Compared) -> Solution | None:
         if case.data[0] is None:

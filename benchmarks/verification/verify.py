@@ -29,7 +29,7 @@ Tell = Callable[[float, str], object]
 
 
 class Kind(StrEnum):
-    """What a subject is."""
+    """Kinds of subjects."""
 
     RECORDING = "recording"
     METHOD = "method"
@@ -66,6 +66,7 @@ def kind_of(text: str) -> Kind:
     if path.is_file():
         if path.suffix.lower() in MODELS:
             return Kind.MODEL
+        # Some file systems mark all files as executable, data too.
         return (
             Kind.PROGRAM
             if os.access(path, os.X_OK) and not path.suffix.lower().startswith((".csv", ".json"))
@@ -223,7 +224,7 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
         return
     try:
         first, *others = list[Any](select([text]))
-    except UnusableProgram:  # which is a finding
+    except UnusableProgram:  # it becomes a finding
         yield verify_program(text, program, checks, pairs, tell)
         return
     rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]

@@ -184,10 +184,10 @@ def plan_versions(versions: Sequence[Version], settings: Iterable[str], scene_na
         family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
         settings = tuple(settings_text(method) for method in family.settings_in_tables())
     methods = [tuple(registry.method(f"{engine}@{version.name}:{setting}") for setting in settings) for version in versions]
-    every = tuple(method for row in methods for method in row)
+    all_methods = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
-    taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in every))
-    study = Study("track", scenes if scene_names else taken, every, quick=True)
+    taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in all_methods))
+    study = Study("track", scenes if scene_names else taken, all_methods, quick=True)
     return tuple(EngineSide(version, row, study) for version, row in zip(versions, methods, strict=True))
 
 

@@ -357,7 +357,7 @@ def _moves(was: Row, now: Row) -> bool:
 
 def _moved(was: Row, now: Row) -> Change:
     """Return the change to another motion, with its cause."""
-    before = f"{error_of(was):.3g} rad from that of the scene" if was.values else f"without values ({was.outcome})"
+    before = f"{error_of(was):.3g} rad from the motion of the scene" if was.values else f"without values ({was.outcome})"
     size = f"{error_of(now):.3g} rad from it" if now.values else f"without values ({now.outcome})"
     cause = now.cause if now.mistake not in ("", was.mistake) else "No known mistake explains it"
     return Change(RowName(now.scene, now.method, MOTION), before, f"{size}. {cause}")
@@ -408,8 +408,8 @@ def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) ->
         for text in dict.fromkeys(outcome.reason for outcome in ends):
             scenes.setdefault(f"{line.setting}: not supported ({text})", []).append(line.scene)
         if was and was.cause:
-            still = "in both versions" if now and now.mistake == was.mistake else "not any more"
-            scenes.setdefault(f"{line.setting}: {was.cause} ({still})", []).append(line.scene)
+            when = "in both versions" if now and now.mistake == was.mistake else "not any more"
+            scenes.setdefault(f"{line.setting}: {was.cause} ({when})", []).append(line.scene)
     for text, names in scenes.items():
         yield f"{text}: {', '.join(dict.fromkeys(names))}"
 

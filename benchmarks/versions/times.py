@@ -128,12 +128,12 @@ def compare_times(
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
     """Return the times of rows from a number of processes, and from more for rows whose interval contains the limit."""
-    every: Times = {row: [] for row in rows}
+    measured: Times = {row: [] for row in rows}
     for _ in range(MOST_TURNS):
         for row, times in clock.measure(rows, processes).items():
-            every[row] += times
-        rows = [row for row in rows if ratio_of(every[row]).open]
-    return every
+            measured[row] += times
+        rows = [row for row in rows if ratio_of(measured[row]).open]
+    return measured
 
 
 class Clock:
@@ -146,7 +146,7 @@ class Clock:
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
         """Return the times of rows from a number of processes."""
-        every: Times = {row: [] for row in rows}
+        measured: Times = {row: [] for row in rows}
         for turn in range(processes if rows else 0):
             for side in self._sides:
                 side.close()
@@ -156,17 +156,17 @@ class Clock:
                 if row in self.failures:
                     continue
                 try:
-                    every[row].append(self._shortest(row, turn))
+                    measured[row].append(self._shortest(row, turn))
                 except IntegrationFailed as failure:
                     self.failures[row] = str(failure.outcome)
-        return every
+        return measured
 
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
         if row not in self._work:
             scene, n, spent = registry.scene(row[0]), 16, 0.0
             most = grid_for(scene, scene.dt).n_steps
-            while True:  # to all steps of the scene, or the first ones of a slow method
+            while True:  # until the run has all steps of the scene, or takes `LONGEST`
                 run = self._sides[0].timed(*row, min(n, most))
                 run.wall_time(1)
                 spent = max(min(run.wall_time(1) for _ in range(5)), 1e-9)
@@ -200,7 +200,7 @@ def ratio_of(times: Sequence[tuple[float, float]]) -> Ratio:
     if len(times) < 2 or not np.isfinite(times).all():
         return Ratio(math.nan, math.nan, math.nan, len(times))
     logs = np.log(np.array(times)).T
-    low, high = interval(logs, 2 * CONFIDENCE - 1, _difference)
+    low, high = interval(logs, 2 * CONFIDENCE - 1, _difference)  # `CONFIDENCE` is the confidence of one end
     return Ratio(math.exp(_difference(logs)), math.exp(low), math.exp(high), len(times))
 
 

@@ -120,7 +120,7 @@ class Checkout(Environment):
         """Return the hashes of the files in the command line of each program."""
         programs = read_programs(self.folder / "conservative.toml").values()
         files = {program.name: [Path(word) for word in program.words if Path(word).is_file()] for program in programs}
-        return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in every) for name, every in files.items()}
+        return {name: tuple(hashlib.sha256(file.read_bytes()).hexdigest() for file in parts) for name, parts in files.items()}
 
 
 def build_version(name: str, command: str, folder: Path) -> Version:
@@ -140,7 +140,7 @@ def build_version(name: str, command: str, folder: Path) -> Version:
         last = (done.stdout.split("\n")[-2:] or [""])[0]
         got = f"{command!r}, which ends with exit code {done.returncode} for {name} ({last})"
         raise BadInput("build", got, "a command that builds each version")
-    if not (place / "conservative.toml").exists():  # of before the programs were registered
+    if not (place / "conservative.toml").exists():  # a version from before the programs were registered
         shutil.copy(project_file(), place)
     environment = Checkout("conservative", VERSION, place, "", ())
     return Version(name if key else place.name, key or commit(place, mark_changes=True), environment)

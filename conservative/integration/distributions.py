@@ -32,7 +32,7 @@ def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
     """
     n, count = R_WB.shape[:2]
     stored = getattr(R_WB, "chunks", None)
-    fitting = max(1, _BLOCK // (72 * count))
+    fitting = max(1, _BLOCK // (72 * count))  # a matrix has 72 bytes
     size = stored[0] * max(1, fitting // stored[0]) if stored else fitting
     for start in range(0, n, size):
         block = np.asarray(R_WB[start : start + size])

@@ -98,13 +98,14 @@ def _read_inertia(value: Array) -> Array:
     tensors = value if value.ndim == 3 else value[:, :, None] * np.eye(3)
     with np.errstate(all="ignore"):
         skew = np.abs(tensors - np.swapaxes(tensors, 1, 2)).max(axis=(1, 2))
+        # Limits within the limits of `RigidBody`, which decides on the other bodies.
         good = _are_in_range(tensors) & (skew <= 1e-13 * np.abs(tensors).max(axis=(1, 2)))
         moments = np.full((len(tensors), 3), -1.0)
         moments[good] = np.linalg.eigvalsh(tensors[good])
     fine = good & (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
     with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # one warning for all is below
         _refuse_first("inertia", value, ~fine, RigidBody)  # its checks are exact, and accept most of them
-    moments[~good] = np.linalg.eigvalsh(tensors[~good])  # of molecules
+    moments[~good] = np.linalg.eigvalsh(tensors[~good])  # accepted by `RigidBody`, such as molecules
     impossible = find_impossible(moments)
     if impossible.any():
         warnings.warn(ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum())), stacklevel=4)

@@ -87,8 +87,8 @@ def integrate_many(
         in memory. The returned ensemble reads them from there, as `open_ensemble(path)` does later.
     resume
         True if the folder may contain some blocks of the same run. Missing and damaged blocks are then computed. The result is
-        the same, byte for byte, as without an interruption. Functions of the scene have to be such that they can be
-        compared (`conservative.identity`).
+        the same, byte for byte, as without an interruption. Functions of the scene have to be comparable
+        (`conservative.identity`).
     client
         A `dask.distributed.Client`, on whose workers the blocks run instead of threads of this process.
 
@@ -101,7 +101,7 @@ def integrate_many(
     NotWritten
         The folder cannot be written, or the disk is full. Finished blocks stay there.
     ImpossibleInertia, LargeEnsemble
-        Warnings: no mass distribution has an inertia; the samples take more than 1 GB of memory, without a `path`.
+        Warnings: an inertia that no mass distribution has; the samples take more than 1 GB of memory, without a `path`.
     MissingExtra
         Zarr (extra `ensembles`) or Dask (extra `cluster`) is not installed.
     MissingEngine

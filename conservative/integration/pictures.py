@@ -65,6 +65,7 @@ def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
     unit, length = time_unit(float(t[-1]))
     data = pd.DataFrame({"t": t / length, "low": low, "middle": middle, "high": high})
     positive = low[low > 0]
+    # Three decades or more need a logarithmic axis.
     wide = len(positive) == len(low) and high.max() > 1000 * positive.min()
     scale = alt.Scale(type="log" if wide else "linear")
     base = alt.Chart(data, width=_WIDTH, height=_HEIGHT).encode(x=alt.X("t:Q", title=f"time, {unit}"))
@@ -137,6 +138,7 @@ def _rings(extent: float) -> list[Any]:
     ring, order = np.meshgrid(angles, np.arange(len(turn)), indexing="ij")
     x, y = np.outer(radii, np.sin(turn)), np.outer(radii, np.cos(turn))
     lines = pd.DataFrame({"x": x.ravel(), "y": y.ravel(), "order": order.ravel(), "ring": ring.ravel()})
+    # Labels of rings that are too close would overlap.
     apart = np.append(np.diff(radii) > 0.15 * extent, True)[: len(radii)]
     angles, radii = angles[apart], radii[apart]
     labels = pd.DataFrame({"x": 0 * radii, "y": radii, "label": [f"{short_power(f'{angle:g}')}°" for angle in angles]})

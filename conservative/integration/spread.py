@@ -96,15 +96,15 @@ def spread(
     ------
     BadInput
         A deviation is invalid, or relative to zero; the potential has no such number; the scene's inertia does not belong to a
-        mass distribution, or a turning field has the same inertia; n or seed is not an integer in range, or n bodies do not
-        fit in memory.
+        mass distribution, or the potential is a turning field with the scene's inertia; n or seed is not an integer in range;
+        or n bodies do not fit in memory.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     count, most = positive_integer("n", n), most_samples() * SAMPLE_BYTES // START_BYTES
     if count > most:
         raise BadInput("n", describe(n), f"up to {most:.3g}, which fit in memory, {START_BYTES} bytes each")
-    checked: object = seed
+    checked: object = seed  # callers may pass another type than annotated
     if isinstance(checked, bool) or not isinstance(checked, Integral) or checked < 0:
         raise BadInput("seed", describe(seed), "an integer of 0 or more")
     starts = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
@@ -193,13 +193,13 @@ def _draw_rates(scene: Scene, n: int, value: object, seed: int) -> Array:
     return scene.w_WB_B0 + deviation * drawn
 
 
-def _draw_shares(seed: int, name: str, shape: tuple[int, ...], deviation: float) -> Array:
-    """Return shares (n, ...), normally distributed about 1. Shares of 0 or less are drawn again."""
-    shares, again = 1 + deviation * _stream(seed, name).standard_normal(shape), 0
-    while (wrong := shares <= 0).any():
+def _draw_factors(seed: int, name: str, shape: tuple[int, ...], deviation: float) -> Array:
+    """Return factors (n, ...), normally distributed about 1. Factors of 0 or less are drawn again."""
+    factors, again = 1 + deviation * _stream(seed, name).standard_normal(shape), 0
+    while (wrong := factors <= 0).any():
         again += 1
-        shares[wrong] = 1 + deviation * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
-    return shares
+        factors[wrong] = 1 + deviation * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
+    return factors
 
 
 def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
@@ -209,7 +209,7 @@ def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
     if planes.min() < -_ROUND_OFF * moments.max():
         got = f"a spread for principal moments {moments.tolist()}"
         raise BadInput("inertia", got, "moments of a body: none is larger than the sum of the others")
-    varied = planes * _draw_shares(seed, "inertia", (n, 3), deviation)
+    varied = planes * _draw_factors(seed, "inertia", (n, 3), deviation)
     drawn = varied.sum(axis=1, keepdims=True) - varied
     return drawn if np.array_equal(R_BP, np.eye(3)) else (R_BP * drawn[:, None, :]) @ R_BP.T
 
@@ -225,7 +225,7 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
     if relative:
         deviation *= _find_size(argument, value, centre, "its unit")
         if not centre.ndim:
-            return np.asarray(centre * _draw_shares(seed, argument, (n,), _read_share(argument, value)))
+            return np.asarray(centre * _draw_factors(seed, argument, (n,), _read_share(argument, value)))
     numbers = centre + deviation * _stream(seed, argument).standard_normal((n, *centre.shape))
     potential: Any = scene.potential
     if centre.ndim and np.allclose(getattr(replace(potential, **{name: 2 * centre}), name), centre, rtol=1e-12):

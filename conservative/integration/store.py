@@ -112,7 +112,7 @@ class Store:
                     return False
         try:
             return self.checksums is None or int(self.checksums[first // self.record["block"]]) == self._find_checksum(first)
-        except Exception:  # of Zarr, for a chunk that it cannot decode
+        except Exception:  # Zarr cannot decode a chunk
             return False
 
     def _chunks_of(self, array: Any, first: int) -> Iterator[Path]:
@@ -242,7 +242,7 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
     if handle is None:
         raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own")
     try:
-        for leftover in place.rglob("*.partial"):  # of a chunk, after a kill
+        for leftover in place.rglob("*.partial"):  # a kill leaves a part of a chunk
             files.remove(leftover)
         yield _open(place, record, "r+")
     finally:
@@ -416,7 +416,8 @@ def open_store(path: str | Path) -> Store:
     place = Path(path).absolute()
     record = read_record(place, "the folder of an ensemble that integrate_many has written")
     store, n = _open(place, record, "r"), record["bodies"]
-    there = {int(file.name) * record["block"] for file in (place / "outcome" / "c").glob("[0-9]*")}  # of any number of blocks
+    # Only present files are listed, because there may be any number of blocks.
+    there = {int(file.name) * record["block"] for file in (place / "outcome" / "c").glob("[0-9]*")}
     left = n - sum(min(record["block"], n - first) for first in there if first < n and store.is_there(first))
     if left > 0:
         got = (

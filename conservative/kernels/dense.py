@@ -37,8 +37,9 @@ SHORTEST, LONGER = 2.0**-30, 4.0
 class Frame(NamedTuple):
     """Conversion of states to samples.
 
-    `axes` are the rows of the rotation from axes D to world axes, `R_BP` those from principal to body axes, () if they are the
-    same. `units` are factors of the rates. `spin` is () or, in a non-spinning frame, the omitted rate, rad/s.
+    `axes` are the rows of the rotation from axes D to world axes, `R_BP` the rows of the rotation from principal to body axes,
+    () if these are the same. `units` are factors of the rates. `spin` is () or, in a non-spinning frame, the omitted rate,
+    rad/s.
     """
 
     axes: Any

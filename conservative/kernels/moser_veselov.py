@@ -160,7 +160,7 @@ def own_quaternion(k, at):
 
 @kernel
 def store(row, p, k, at, left, q_out, L_out):
-    """Write a state: its momentum and its quaternion, turned in the world by what is constant."""
+    """Write a state: its momentum and its quaternion, turned in the world by a constant rotation."""
     record(row, product(left, own_quaternion(k, at)), (p.A1 * at.c, p.A2 * at.s, p.A3 * at.d), q_out, L_out)
 
 

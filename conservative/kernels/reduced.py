@@ -1,6 +1,8 @@
 """The paper's step in three unknowns, and the loop of steps, stages and samples around it.
 
-The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal axes, attitude q a quaternion, scalar first:
+The unknown is a = h w*/2, the Cayley vector of half the turn of a step of length h. w* is the mean rate in body axes, and tau*
+the torque of the step in world axes. J and L are in principal axes, the attitude q is a quaternion, scalar first, Q is its
+matrix, and ' the transpose:
 
     J a + a x (J a) = (h/2) (L0 + (h/2) (T - a x T))          T = Q0' tau*
     q1 = q0 (1, a) / sqrt(1 + a.a)
@@ -12,8 +14,9 @@ Q1 (L1 + r1) = Q0 (L0 + r0) without a torque, and w* is unchanged.
 
 Round-off of L1 with a mean other than 0 becomes a drift after 10^6 steps. If L1 - L0 is computed from a rounded a and rounded
 constants such as 4/h, the mean is 10^-20 of the energy per step. `final_correction` therefore solves the equation for w*, whose
-residual has the size of L1 - L0 instead of L. L1 follows from its other side. The round-off left to an asymmetric body has no
-mean, in fields neither, so errors grow with the square root of the number of steps. Steps of symmetric bodies can repeat it.
+residual has the size of L1 - L0 instead of L. L1 follows from its other side. The round-off that remains in an
+asymmetric body has no mean, with or without a field, so errors grow with the square root of the number of steps. In symmetric
+bodies it can repeat from step to step.
 
 The arithmetic is a chain of dependent operations, so its length counts, not their number. The first guess and its
 tangent do not need L: the processor works on them while it waits for the L of the last step.
@@ -22,7 +25,7 @@ The equation has several solutions at large steps. The step is the solution on t
 Newton's result is trusted if its few corrections stay near the first guess. Otherwise `continue_branch` follows the branch.
 
 Many bodies take the same steps in the same arithmetic: each is a lane with a field and moments of its own (`march_lanes`). A
-lane whose solution is not trusted is solved for alone. A lane without a solution on the continuous branch stops, and its body
+lane whose solution is not trusted is solved separately. A lane without a solution on the continuous branch stops, and its body
 is run again alone. Neither changes a bit of its neighbours' results.
 """
 
@@ -42,7 +45,6 @@ from .compiler.vector import (
     choose,
     cross,
     dot,
-    every,
     fill_like,
     fuse,
     inverse,
@@ -52,17 +54,19 @@ from .compiler.vector import (
     times,
     turn,
 )
+from .compiler.vector import every as all_lanes
 from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
 from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes, record_supply
 
 FAILURE = "no continuous solution"
 """Reason that a step fails."""
 PAUSE = 2**17
-"""Stages between two calls of handlers of signals; one that `continue_branch` solves counts as DEAR of them."""
-DEAR = 64
+"""Stages between two calls of handlers of signals."""
+EXPENSIVE = 64
+"""Stages that a stage solved by `continue_branch` counts as."""
 MAX_ITERATIONS = 30
 FEW = 4
-"""Newton is trusted with at most so many corrections."""
+"""Largest number of corrections after which Newton's result is trusted."""
 NEAR, NEAR_TANGENT, NEAR_ZERO = 0.25, 0.01, 1e-4
 """Newton is trusted when |a - guess|^2 <= NEAR |a|^2 + NEAR_ZERO; NEAR_TANGENT replaces NEAR for a guess on the tangent of the
 branch."""
@@ -75,8 +79,12 @@ SMOOTH = 0.04
 ROWS = 33
 """Numbers of a body's state: q (4), L (3), what their sums lost (4, 3), how many solutions fit on each other, and the last six
 of them (18), newest first."""
+HEAD = 18
+"""Numbers of the state before the older solutions: all of it, up to the newest solution."""
 PAST, ROOM = 5, 30
 """Solutions that are kept in a ring, from the second newest on, and its rows: all of them are there twice."""
+OLDER = 3 * PAST
+"""Numbers of the solutions in the ring."""
 
 
 class Model(NamedTuple):
@@ -207,42 +215,42 @@ def add_twice(total, u, rest):
 
 
 @small
-def newton_solve(h, J, field, rotor, q, L, carry, guess, near, tolerance):
+def newton_solve(h, J, field, rotor, q, L, carry, guess, near, largest_square):
     """Return (a, L1, its carry, corrections made, size of the last, whether to trust it), from a first guess of a.
 
     Newton's answer is trusted where it takes at most `FEW` corrections, stays near the guess (`near`), and the determinant of
     the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
     A correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER that
-    one, if s^3 <= the relative error asked for, which is given as the square of s: `tolerance`. Stopping where a residual is
-    small enough instead would leave an error of one sign, and the energy would drift.
+    one, if s^3 <= the relative error asked for: if s^2 <= `largest_square`, which is that error to the power 2/3. Stopping
+    where a residual is small enough instead would leave an error of one sign, and the energy would drift.
 
     With lanes, the loop runs until the last body is done; a lane that is done does not change, so that its result
     does not depend on its neighbours. After one correction the answer is as near to the guess as that correction is small.
     """
-    rows, over = invert(tangent(h, J, field, rotor, q, guess))
+    rows, determinant_inverse = invert(tangent(h, J, field, rotor, q, guess))
     correction = apply(rows, residual(h, J, field, rotor, q, L, guess))
     a = subtract(guess, correction)
     square = dot(correction, correction)
-    enough = square <= tolerance * (dot(a, a) + REST)
+    enough = square <= largest_square * (dot(a, a) + REST)
     iterations, close = 1, enough
-    while iterations < FEW and not every(enough):
-        new_rows, new_over = invert(tangent(h, J, field, rotor, q, a))
+    while iterations < FEW and not all_lanes(enough):
+        new_rows, new_inverse = invert(tangent(h, J, field, rotor, q, a))
         correction = apply(new_rows, residual(h, J, field, rotor, q, L, a))
         a = choose(enough, a, subtract(a, correction))
         rows = choose(enough, rows, new_rows)
-        over = choose(enough, over, new_over)
+        determinant_inverse = choose(enough, determinant_inverse, new_inverse)
         square = dot(correction, correction)
         aa, away = dot(a, a) + REST, subtract(a, guess)
-        enough = enough | (square <= tolerance * aa)
+        enough = enough | (square <= largest_square * aa)
         close = dot(away, away) <= near * aa + NEAR_ZERO
         iterations += 1
     a, L, carry = final_correction(h, J, field, rotor, q, L, carry, rows, a)
     # The determinant of the tangent is positive at a = 0. On the continuous branch it cannot change its sign.
-    return a, L, carry, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
+    return a, L, carry, iterations + 1, math.sqrt(square), enough & close & (determinant_inverse > 0.0)
 
 
 @kernel
-def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
+def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, largest_square):
     """Return the results of `newton_solve`, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
 
     Each guess is on the tangent of the branch. Where the branch ends before h, the size is the residual's at that end,
@@ -257,7 +265,7 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
             add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, rotor, q, L)
         )
         solution, L1, carry1, iterations, size, trusted = newton_solve(
-            hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, tolerance
+            hs, J, field, rotor, q, L, carry, guess, NEAR_TANGENT, largest_square
         )
         corrections += iterations
         if not trusted:
@@ -277,7 +285,7 @@ def continue_branch(h, J, J_inverse, field, rotor, q, L, carry, tolerance):
 
 @small
 def forcing(h, field, rotor, q, L, a):
-    """Twice the derivative by h of the right side of the equation for a, L0 + h (T - a x T)."""
+    """Twice the derivative by h of the right side of the equation for a, with the rotor there: L0 - a x r + h (T - a x T)."""
     if rotor is not None:
         L = subtract(L, cross(a, rotor))
     if field is None:
@@ -293,7 +301,7 @@ def find_solution(h, J, J_inverse, field, rotor, q, L):
     for _ in range(MAX_ITERATIONS):
         correction = apply(inverse_tangent(h, J, field, rotor, q, a), residual(h, J, field, rotor, q, L, a))
         a = subtract(a, correction)
-        if dot(correction, correction) <= 1e-24 * (dot(a, a) + REST):
+        if dot(correction, correction) <= 1e-24 * (dot(a, a) + REST):  # relative 1e-12: it converges quadratically
             return True
     return False
 
@@ -311,7 +319,7 @@ def march(model, coefficients, workspace):
     lengths = coefficients.lengths
     # After a Newton correction of size d, one more with the same tangent (`final_correction`) leaves an error of about d^3.
     # Squares of d are compared.
-    tolerance = coefficients.tolerance ** (2.0 / 3.0)
+    largest_square = coefficients.tolerance ** (2.0 / 3.0)
     record(0, model.q, model.L, q_out, L_out)
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0), no_supply(field))
     record_supply(0, state[4], L_out)
@@ -323,7 +331,7 @@ def march(model, coefficients, workspace):
         first = at[0]
         last = end_of_block(first - 1, n_steps, left)
         at, row, more, size, state, history = take_steps(
-            lengths, n_steps, last, every, J, J_inverse, field, rotor, tolerance, at, row, state, history, q_out, L_out
+            lengths, n_steps, last, every, J, J_inverse, field, rotor, largest_square, at, row, state, history, q_out, L_out
         )
         corrections += more
         step, stage = at
@@ -335,7 +343,7 @@ def march(model, coefficients, workspace):
             now = at_step(field, t, h)
             mean, half = step_rotor(field, rotor, t, h)
             L, L_carry = react(L, L_carry, half)
-            a, L1, L1_carry, more, size, solved = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, tolerance)
+            a, L1, L1_carry, more, size, solved = continue_branch(h, J, J_inverse, now, mean, q, L, L_carry, largest_square)
             corrections += more
             if not solved:
                 elsewhere = find_solution(h, J, J_inverse, now, mean, q, L)
@@ -345,7 +353,7 @@ def march(model, coefficients, workspace):
             q, q_carry = turn_attitude(a, q, q_carry)
             # The history lacks this stage, so its solutions are no longer the last ones at equal distances.
             at, state, history = (step, stage + 1), (q, q_carry, L, L_carry, supplied), no_history()
-            left -= DEAR
+            left -= EXPENSIVE
         left -= step - first
         if left <= 0 < pause:
             left = block
@@ -363,7 +371,9 @@ def enter(*loose):
 
 
 @kernel
-def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolerance, at, row, state, history, q_out, L_out):
+def take_steps(
+    lengths, n_steps, last, every, J, J_inverse, field, rotor, largest_square, at, row, state, history, q_out, L_out
+):
     """Take steps from a step and stage on, up to step `last` or a stage whose solution is not trusted; return where that is.
 
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
@@ -381,7 +391,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, rotor, tolera
             # L stays as it is before the stage: if the solution is not trusted, `march` solves the stage from there.
             M, M_carry = react(L, L_carry, half)
             a = guess_ahead(past) if smooth >= 6 else explicit_guess(h, J_inverse, now, mean, q, M)
-            a, M, M_carry, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, tolerance)
+            a, M, M_carry, iterations, size, trusted = newton_solve(h, J, now, mean, q, M, M_carry, a, NEAR, largest_square)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry, supplied), (smooth, past)
@@ -472,8 +482,8 @@ def put(v, i, x):
 
 
 @kernel
-def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, trusted, finished, first):
-    """Solve for the lanes that are not trusted, one by one; return solutions and momenta of all with what they lost.
+def solve_alone(h, J, J_inverse, field, q, L, carry, largest_square, a, L1, carry1, trusted, finished, first):
+    """Solve for the lanes that are not trusted, one by one; return solutions and momenta of all, with their carries.
 
     A body without a solution is brought to rest, where it needs no further work, and noted in `finished`.
     """
@@ -486,7 +496,7 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, t
             own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
             own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
             own_a, own_L1, own_carry1, _, _, exists = continue_branch(
-                h, own[0], own[1], own[2], None, own[3], own[4], own[5], tolerance
+                h, own[0], own[1], own[2], None, own[3], own[4], own[5], largest_square
             )
             if not exists:
                 finished[first + i] = False
@@ -496,44 +506,47 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, L1, carry1, t
 
 
 @entry
-def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n_steps, every_step, q_out, L_out, finished):
+def march_lanes(
+    lengths, tolerance, moments, gravity_moment, states, room, done, last, n_steps, every_step, q_out, L_out, finished
+):
     """Take the steps after `done` up to `last` of n_steps: of all bodies, WIDTH at a time.
 
-    lengths (stages,) are the parts of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses; moment
-    (3, n) the moment of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is memory for the work. Samples
-    go to q_out (n, samples, 4) and L_out (n, samples, 3), and `finished` (n,) becomes False if a body has no solution.
+    lengths (stages,) are the parts of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses;
+    gravity_moment (3, n) the moment of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is memory for the
+    work. Samples go to q_out (n, samples, 4) and L_out (n, samples, 3), and `finished` (n,) becomes False if a body has no
+    solution.
     """
     n, stages = moments.shape[1], len(lengths)
-    tolerance = tolerance ** (2.0 / 3.0)
+    largest_square = tolerance ** (2.0 / 3.0)
     all_moments, all_states = moments.reshape(-1), states.reshape(-1)
     ring, q_flat, L_flat, samples = room.reshape(-1), q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
     for i in range(0, n, WIDTH):
         J_and_inverse = load_rows(all_moments, i, n, 6, WIDTH)
         J, J_inverse = J_and_inverse[:3], J_and_inverse[3:]
-        if moment is None:
+        if gravity_moment is None:
             field = None
         else:
-            x, y, z = load_rows(moment.reshape(-1), i, n, 3, WIDTH)
+            x, y, z = load_rows(gravity_moment.reshape(-1), i, n, 3, WIDTH)
             field = UniformField(x, y, z)
-        state = load_rows(all_states, i, n, 18, WIDTH)
+        state = load_rows(all_states, i, n, HEAD, WIDTH)
         q, L, q_carry, L_carry, smooth, newest = state[:4], state[4:7], state[7:11], state[11:14], state[14], state[15:]
-        older = load_rows(all_states, i + 18 * n, n, 15, WIDTH)
+        older = load_rows(all_states, i + HEAD * n, n, OLDER, WIDTH)
         save_rows(ring, 0, WIDTH, older)
-        save_rows(ring, 15 * WIDTH, WIDTH, older)
+        save_rows(ring, OLDER * WIDTH, WIDTH, older)
         zero = fill_like(0.0, smooth)
         place, row, until_sample = 0, done // every_step, every_step - done % every_step
         for step in range(done + 1, last + 1):
             for stage in range(stages):
                 h = lengths[stage]
                 enough = smooth >= 6.0
-                past = load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH)
+                past = load_rows(ring, 3 * place * WIDTH, WIDTH, OLDER, WIDTH)
                 a = guess_ahead((newest, past[:3], past[3:6], past[6:9], past[9:12], past[12:]))
-                if not every(enough):
+                if not all_lanes(enough):
                     a = choose(enough, a, explicit_guess(h, J_inverse, field, None, q, L))
-                a, L1, L1_carry, _, _, trusted = newton_solve(h, J, field, None, q, L, L_carry, a, NEAR, tolerance)
-                if not every(trusted):
+                a, L1, L1_carry, _, _, trusted = newton_solve(h, J, field, None, q, L, L_carry, a, NEAR, largest_square)
+                if not all_lanes(trusted):
                     a, L1, L1_carry = solve_alone(
-                        h, J, J_inverse, field, q, L, L_carry, tolerance, a, L1, L1_carry, trusted, finished, i
+                        h, J, J_inverse, field, q, L, L_carry, largest_square, a, L1, L1_carry, trusted, finished, i
                     )
                     smooth = choose(trusted, smooth, zero)
                 if stages == 1:
@@ -550,4 +563,4 @@ def march_lanes(lengths, tolerance, moments, moment, states, room, done, last, n
                 record_lanes(i, row, samples, q, q_flat)
                 record_lanes(i, row, samples, L, L_flat)
         save_rows(all_states, i, n, q + L + q_carry + L_carry + (smooth,) + newest)
-        save_rows(all_states, i + 18 * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH))
+        save_rows(all_states, i + HEAD * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, OLDER, WIDTH))

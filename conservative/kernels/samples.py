@@ -1,4 +1,4 @@
-"""Samples in body axes out of what kernels store: quaternions and momenta in principal axes."""
+"""Samples in body axes from the results of kernels: quaternions and momenta in principal axes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ BLOCK = 2**18
 def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
     """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from the first n of q (., 4), of any length, and L (., 3), at times t (.,).
 
-    `spin` is None, or what the frame of q lacks of the body's rate about its third axis, with 1/J3; `R_BP` is None where
-    principal and body axes are the same. Either leaves out its products. Returns how many of the first are finite.
+    `spin` is None, or the rate about the third axis, rad/s, by which the body turns relative to the frame of q, and 1/J3.
+    `R_BP` is None if principal and body axes are the same. Without them, their products are left out. Return the number of
+    samples before the first one that is not finite.
     """
     finite = 0
     done, n = 0, len(R_WB)

@@ -18,8 +18,12 @@ from .protocol import Result, Workspace, find_ends, loosen, record
 from .reduced import Model
 from .symplectic import torque
 
-FAILURE = "no solution within 100 corrections"  # of generalised-alpha
-PAUSE = 2**13  # steps between two calls of handlers of signals
+MOST_CORRECTIONS = 100
+"""Largest number of corrections of a step of generalised-alpha."""
+FAILURE = f"no solution within {MOST_CORRECTIONS} corrections"
+"""Reason that a step of generalised-alpha fails."""
+PAUSE = 2**13
+"""Steps between two calls of handlers of signals."""
 MUNTHE_KAAS, CROUCH_GROSSMAN, GENERALIZED_ALPHA, BUSS, GYROSCOPIC, SPIERS, SPIERS_RATES = range(7)
 ROUND_OFF, NEARLY, REST = 1e-30, 1e-20, 1e-4
 """The solver stops at the first squared correction, relative to squared accelerations and REST, or where corrections below the
@@ -97,7 +101,7 @@ def alpha_step(alpha, h, t, J, field, q, w, rate, a):
         a1 = add(scale(share, x), scale(1.0 / (1.0 - alpha_m), subtract(scale(alpha_f, rate), scale(alpha_m, a))))
         w1 = add(w, scale(h, add(scale(1.0 - gamma, a), scale(gamma, a1))))
         q1 = product(q, exponential(scale(h, add(w, scale(h, add(scale(0.5 - beta, a), scale(beta, a1)))))))
-        if size <= ROUND_OFF or (last <= NEARLY and size >= last) or corrections == 100:
+        if size <= ROUND_OFF or (last <= NEARLY and size >= last) or corrections == MOST_CORRECTIONS:
             return q1, w1, x, a1, corrections, size
         corrections += 1
         L1 = times(J, w1)

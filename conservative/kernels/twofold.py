@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from . import kernel
 
-SPLIT = 134217729.0  # 2^27 + 1
+SPLIT = 134217729.0
+"""2^27 + 1, which divides a float into two halves of 26 bits (Veltkamp)."""
 
 
 @kernel

@@ -45,7 +45,7 @@ MOST_TRIES, REJECTED, MOST_LONG = 5_000, 0.1, 100_000
 """Largest number of steps that are tried if more than this share is rejected, which shows that a function is smooth nowhere:
 180,000 calls of a function, some seconds. Otherwise the motion is long, and more steps are possible."""
 FIRST_TRIES, BEYOND = 1_000, 10.0
-"""After so many tries, the walk also ends if the whole motion would take this many times `MOST_TRIES` at the same rate."""
+"""After `FIRST_TRIES` tries, the walk also ends if the whole motion would take `BEYOND` times `MOST_TRIES` at the same rate."""
 SAME = 1e-12
 """A sample that is closer to a break point, relative to the time, is at it."""
 ROUGH = 3e-3

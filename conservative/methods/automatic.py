@@ -177,6 +177,7 @@ def cut_tolerance(method: Projected, grid: Grid, error: float, estimate: Estimat
             return None
         factor = 1e-2
         if math.isfinite(last.estimate.error):
+            # The error is about proportional to the tolerance. A quarter leaves a margin.
             factor = min(0.3, max(1e-5, last.share(error) / last.estimate.error / 4))
         return Projected(tolerance=max(LEAST_TOLERANCE, factor * last.method.tolerance)), grid
 

@@ -100,7 +100,7 @@ class MoserVeselov(Method):
             raise BadInput("dt", f"{grid.dt:g}, |w| dt = {turn:.3g} rad", f"a step with |w| dt < {rule}: below {bound:.6g} s")
         try:
             return self._prepare(scene, grid)
-        except BadInput:  # in units of our own
+        except BadInput:  # its numbers are in our own units
             raise BadInput("dt", f"{grid.dt:g}, for which {self.name} has no step", "a shorter step") from None
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:

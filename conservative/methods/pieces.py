@@ -2,7 +2,8 @@
 
 A run consists of pieces between break points: whole steps, and parts of a step before, between and after points. Each is a run
 of the kernel with its own start, step and clock (`conservative.potentials.load.Loaded`). The samples stay on the grid: a
-piece says whether its steps are whole, and which samples it fills, because a part can be as long as a step and one step too.
+piece says whether its steps are whole, and which samples it fills, because its length does not show this: a part of a step can
+be as long as a step.
 
 A part of a step is divided into more steps, the shorter the steps of the grid are. Otherwise runs with different steps would be
 the same between two points that are close, and their difference would say nothing about their errors.
@@ -73,8 +74,8 @@ def list_pieces(grid: Grid, breaks: Array) -> list[Piece]:
 
 
 def count_parts(grid: Grid, inside: int) -> int:
-    """Return the number of steps into which each part of a step is divided, with so many break points inside of the run."""
-    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # fewer than four times the steps
+    """Return the number of steps into which each part of a step is divided, with `inside` break points in the run."""
+    return min(MOST_PARTS, math.ceil(grid.n_steps / (inside + 1)))  # a run has fewer than four times the steps of the grid
 
 
 def count_most_steps(grid: Grid, breaks: Array) -> int:
@@ -117,6 +118,7 @@ def march_pieces(
         several = len(rows) > 1
         to_q, to_L = (samples[rows.start - 1 : rows.stop] for samples in (q, L)) if several else ends
         every = n // len(rows) if several else n
+        # The fields of `Result`: steps done, stages, corrections, evaluations, size, elsewhere.
         result = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L)
         stages, corrections, size = stages + result[1], corrections + result[2], result[4]
         evaluations = None if result[3] is None else (evaluations or 0) + result[3]

@@ -179,7 +179,7 @@ def find_cheapest(
 ) -> tuple[Method, float]:
     """Return the method with the least work for an attitude error, rad, up to t_end, s, and the step that it needs, s.
 
-    `methods` are by default the `candidates` of the scene. The choice is for runs of so many bodies. If the motion is not
+    `methods` are by default the `candidates` of the scene. The choice is for runs of `bodies` bodies. If the motion is not
     smooth, the method is adaptive, and the step the distance of samples.
     """
     if not methods and trials.scene.smoothness(t_end).noise:
@@ -220,7 +220,7 @@ def adaptive_spacing(t_end: float) -> float:
 
 
 def begin(method: Method, scene: Scene, error: float, t_end: float, bodies: float = 1.0) -> Candidate:
-    """Return a candidate before its first trial run, for an attitude error, rad, of runs of so many bodies to t_end, s.
+    """Return a candidate before its first trial run, for an attitude error, rad, of runs of `bodies` bodies to t_end, s.
 
     The first step is likely to be short enough, or as short as the time of a trial allows. It is at most half the duration, and
     the longest that is worth trying, which it is if steps call Python and their cost is unknown. If accuracy does not depend on

@@ -46,7 +46,7 @@ class Substepped(Method):
     method_info: ClassVar[MethodInfo] = MethodInfo(
         report=(),
         structure=lambda method: method.inner.method_info.structure(method.inner),
-        supports=Reduced.method_info.supports,  # by default
+        supports=Reduced.method_info.supports,  # of the default inner method
     )
 
     def __post_init__(self) -> None:

@@ -160,9 +160,9 @@ def find_obstacle(scene: Scene) -> str | None:
     """Return why a scene's field is not supported, or None."""
     potential = static_part(scene.potential)
     if potential is not None and not hasattr(potential.kernel_field(scene.body.R_BP), "series"):
-        return "it is for fields with a recurrence, which functions have not"
+        return "it is for fields with a recurrence, which functions do not have"
     if isinstance(scene.potential, Turning):
         axis = potential.axis_W
         if axis is None or abs(axis @ scene.potential.orbit.normal_W) > RIGHT_ANGLE:
-            return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
+            return "it is for fields that turn about an axis at right angles to their own, such as the field of a satellite"
     return None

@@ -45,7 +45,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         field = kernel.Free(np.linalg.norm(L, axis=1))
     else:
         field = field.in_units(energy_unit)
-        if isinstance(field, UniformField):  # of symmetric bodies the moment is along the axis but for round-off
+        if isinstance(field, UniformField):  # the moment of a symmetric body is along its axis, except for round-off
             field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
     # The third of the axes D is along the field, or along the momentum of a free body. An axis that all bodies share has
     # stride 0 and is converted once.

@@ -332,9 +332,8 @@ def nearby_scene(scene: Scene, by: float = ROUNDED) -> Scene:
     body, w = scene.body, scene.w_WB_B0
     diagonal = np.array_equal(body.R_BP, np.eye(3))
     sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
-    equal = [
-        _SIGNS[0][int(np.argmax(body.moments == moment))] for moment in body.moments
-    ]  # equal moments stay equal, such as a rod's
+    # Equal moments stay equal, such as a rod's.
+    equal = [_SIGNS[0][int(np.argmax(body.moments == moment))] for moment in body.moments]
     signs = np.diag(equal) if diagonal else _AXES_TOO
     moved = body.R_BP @ (by * sizes * signs) @ body.R_BP.T
     return replace_unchecked(

@@ -35,7 +35,7 @@ class GradientField(NamedTuple):
 
     def finite_torque(self, q: Any, a: Any) -> Any:
         """Return T = e x (M G ubar) and its derivative. M changes the product by dm; u, evaluated at -a, changes by -du."""
-        e = in_body(q, self.e)  # at the start of the step; the mean over the step is M' e, and M' is M at -a
+        e = in_body(q, self.e)  # e is at the start of the step; its mean over the step is M' e, and M' is M at -a
         u, du = halfway(scale(-1.0, a), e)
         m, dm = halfway(a, apply(self.rows, u))
         changes = (halfway(a, apply(self.rows, scale(-1.0, column)))[0] for column in du)

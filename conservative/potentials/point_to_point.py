@@ -59,7 +59,7 @@ class PointField:
         A = scale(n, r)
         m, dm = halfway(a, self.b)
         s, v = swing(a, self.b)
-        # Sums of the constant b with rounded numbers would always drop the same of its digits, and the mean would not be 0.
+        # Sums of the constant b with rounded numbers would always lose the same digits of b: an error whose mean is not 0.
         x0 = tuple(fuse(-n, y, x) for x, y in zip(self.b, r, strict=True))
         x1 = tuple(fuse(2.0 * s, y, x) for x, y in zip(x0, v, strict=True))
         slope, change = self.divided(dot(x0, x0), dot(x1, x1))

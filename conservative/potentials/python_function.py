@@ -19,7 +19,7 @@ from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 """Attitude, along no axis, at which functions are tried."""
 _LATER = 0.7, 0.07, 0.007, 0.0007
-"""Times, s, at the first of which functions of time are tried that have a value there: a recording may be shorter."""
+"""Times, s. Functions of time are tried at 0 and at the first of these at which they have a value: a recording may be short."""
 _DIFFERENCE = 1e-5
 """Step of the finite differences that the gradient is compared with."""
 _AGREEMENT = 1e-4

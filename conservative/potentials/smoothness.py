@@ -28,16 +28,16 @@ ATTITUDE, OTHER = (read_only(rotation_about(axis, angle)) for axis, angle in (((
 """Attitudes of a scan, along no axis: a torque may be 0 in symmetric ones. A jump or corner at `ATTITUDE` belongs to the time
 if there is one at `OTHER` as well; otherwise it belongs to the attitude."""
 STEEP = 10.0
-"""An interval may have a jump if it changes the value by so many times the change of a neighbour. The same ratio of second
+"""An interval may have a jump if it changes the value by this multiple of the change of a neighbour. The same ratio of second
 differences is for corners."""
 MOST_JUMPS, MOST_CORNERS = 1000, 4096
 """More of them are noise."""
 LEAST_BEND = 1e-10
 """Second differences of a scan that are smaller, relative to the largest value, are not corners."""
 NARROW, ZOOM = 1e-11, 8
-"""Corners are found to this share of t_end, by dividing an interval into so many parts again and again."""
+"""Corners are found to this share of t_end, by dividing an interval into `ZOOM` parts again and again."""
 WORST, CLOSER = 8, 1024
-"""Noise is looked for in so many of the worst blocks, and each interval there is divided into so many parts."""
+"""Noise is searched in the worst blocks: their number, and the parts of each interval there."""
 NARROWER = 64
 """Ratio of the two spacings at which second differences are compared. From the wide spacing to the narrow one, they fall with
 its square in a smooth function, with its first power at a corner, and not at all in noise."""

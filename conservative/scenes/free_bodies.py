@@ -62,7 +62,7 @@ def _flight(
 def offset_brick(t_end: float = 6.0) -> Scene:
     """Return the brick with its body frame off its centre of mass, which is at rest: free flight without gravity.
 
-    The exact centre of mass does not move. That of an engine drifts if its free joint couples translation and rotation.
+    The exact centre of mass does not move. In an engine it drifts if the free joint couples translation and rotation.
     """
     body, rates = MassDistribution(12.0, (0.3, -0.2, 0.4), _BRICK), (0.0, 0.05, 10.0)
     source, v_WB0 = "Krenk & Nielsen, 5.1, in another frame", np.cross(body.com_B, rates)

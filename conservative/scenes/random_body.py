@@ -51,7 +51,7 @@ RATE = (0.3, 3.0)
 ARM = (0.1, 1.0)
 GAP = (0.2, 3.0)
 ENERGY = (0.1, 30.0)
-"""Log-uniform ranges: J3/J1; kg m^2; rad/s; m; g of the anchor; initial kinetic energy over the range of the field's."""
+"""Log-uniform ranges: J3/J1; kg m^2; rad/s; m; g of the anchor; initial kinetic energy over the range of the field's energy."""
 OFF_AXIS = 0.1
 """Smallest component of a direction along each principal axis."""
 TURN = 12.0

@@ -26,7 +26,7 @@ ENGINE = {
     "module": "CyRK",
     "oldest": "0.20",
     "settings": {"method": "DOP853", "rtol": 1e-12},
-    "orders": dict.fromkeys(("DOP853", "Vern8", "Vern7", "Tsit5", "RK45", "RK23")),
+    "orders": dict.fromkeys(("DOP853", "Vern8", "Vern7", "Tsit5", "RK45", "RK23")),  # None: the solver chooses its steps
     "tolerance": "rtol",
     "fields": FIELDS,
     "method_info": {"variants": ("", "Vern8", "Vern7", "Tsit5"), "suite": ("", "rtol=1e-9")},
@@ -42,7 +42,8 @@ def prepare(given):
     def run():
         y, steps, status = solve(address, start, given.method, times, body, given.rtol)
         samples = np.full((len(times), 7), np.nan)
-        samples[: len(y)] = y[: len(times)]
+        samples[: len(y)] = y[: len(times)]  # a failed run returns fewer rows
+        # The reason is read only if samples are not finite.
         return {"q": samples[:, :4], "w": samples[:, 4:], "steps": steps, "reason": f"CyRK's status is {status}"}
 
     return run

@@ -37,7 +37,7 @@ def prepare(given):
     parts = [body, *(skeleton.createWeldJointAndBodyNodePair(body)[1] for _ in halves(given)[1:])]
     for part, (mass, inertia) in zip(parts, halves(given), strict=True):
         part.setInertia(dart.dynamics.Inertia(mass, given.com, inertia))
-    if description_of(given) == "world":
+    if description_of(given) == "world":  # with another body, which must not change the motion
         far = dart.dynamics.Skeleton("far")
         far.createFreeJointAndBodyNodePair()
         world.addSkeleton(far)
@@ -48,7 +48,7 @@ def prepare(given):
         joint.setPositions(dart.dynamics.FreeJoint.convertToPositions(place))
     else:
         joint.setPositions(dart.dynamics.BallJoint.convertToPositions(given.R0))
-    if given.free:  # its coordinates are no rates in body axes unless the attitude is the identity
+    if given.free:  # rates of its coordinates are rates in body axes only at the identity
         joint.setRelativeSpatialVelocity(np.concatenate([given.w0, np.zeros(3)]), body)
     else:
         joint.setVelocities(given.w0)

@@ -64,7 +64,7 @@ def prepare(given):
     )
     _load(mbs, body, given)
     outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
-    sampled = len(given.steps) > 2
+    sampled = len(given.steps) > 2  # sensors are needed only for samples between start and end
     sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
     mbs.Assemble()
     settings = _settings(exu, given)

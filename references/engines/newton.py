@@ -89,7 +89,7 @@ def prepare(given):
             for name in ("body_q", "body_qd", "joint_q", "joint_qd"):
                 getattr(state, name).assign(getattr(start, name))
         if given.solver in WITH_MEMORY:
-            solver.reset(states[0], flags=0)  # which leaves the state
+            solver.reset(states[0], flags=0)  # 0: the state itself stays
         q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
         done = 0
         for sample, count in enumerate(given.steps.tolist()):

@@ -43,7 +43,7 @@ def prepare(given):
 
     def begin():
         skeleton.setPositions(place)
-        skeleton.setVelocities(rates)  # in body axes
+        skeleton.setVelocities(rates)  # nimble's rates are in body axes
 
     def read():
         return {"R": body.getWorldTransform().rotation(), "w_W": body.getAngularVelocity()}

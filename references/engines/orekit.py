@@ -29,7 +29,8 @@ def prepare(given):
     from org.orekit.utils import AngularCoordinates
 
     frame, date = FramesFactory.getGCRF(), AbsoluteDate.ARBITRARY_EPOCH
-    # A rotation of Hipparchus turns the frame, not the vector: the rotation of R_WF converts from world to F components.
+    # A quaternion of Hipparchus turns the frame, not the vector: with q0 of R_WF, unchanged, the rotation converts from world
+    # to F components, as an attitude of Orekit does. False: q0 is normalised already.
     turn, spin = Rotation(*given.q0.tolist(), False), Vector3D(*given.w0.tolist())
     start = Attitude(date, frame, AngularCoordinates(turn, spin, Vector3D.ZERO))
     axes = zip(given.moments.tolist(), (Vector3D.PLUS_I, Vector3D.PLUS_J, Vector3D.PLUS_K), strict=True)

@@ -58,7 +58,7 @@ def prepare(given):
             body = body.can_sleep(False).allow_fast_rotation(True)
         if description_of(given) == "damping":
             body = body.linear_damping(0.0).angular_damping(0.0)
-        if description_of(given) == "world":
+        if description_of(given) == "world":  # with another body, which must not change the motion
             world.add_body(rp.RigidBody.dynamic(translation=(1000, 200, 30)).additional_mass(3.0).build())
         handle = world.add_body(body.build())
         if not given.free:
@@ -76,7 +76,7 @@ def prepare(given):
             return {"q": (turn.w, turn.i, turn.j, turn.k), "w_W": (rate.x, rate.y, rate.z)}
 
         samples = sample(given, world.step, read)
-        samples["q"][0], samples["w_W"][0] = given.q0, given.w0_W  # in double precision
+        samples["q"][0], samples["w_W"][0] = given.q0, given.w0_W  # the start in double precision
         return samples
 
     run.renew = build

@@ -59,7 +59,7 @@ def prepare(given):
     entity = sapien.Entity()
     entity.add_component(body)
     if not given.free:
-        joint = sapien.physx.PhysxDriveComponent(body)  # with the world
+        joint = sapien.physx.PhysxDriveComponent(body)  # a drive without a second body holds it to the world
         for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
             lock(0, 0)
         entity.add_component(joint)
@@ -79,5 +79,5 @@ def prepare(given):
         body.wake_up()
 
     run = stepped(given, begin, system.step, lambda: {"q": body.get_pose().q, "w_W": body.get_angular_velocity()})
-    run.owner = scene  # of the body
+    run.owner = scene  # the body lives as long as its scene
     return run

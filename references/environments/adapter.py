@@ -143,8 +143,8 @@ class AdapterMethod(Method):
     data: ClassVar[EngineData]
     precision: str
     if TYPE_CHECKING:
-
-        def __init__(self, *settings: Any, **named: Any) -> None: ...  # of a class that `method_class` returns
+        # The constructor of the classes that `method_class` returns.
+        def __init__(self, *settings: Any, **named: Any) -> None: ...
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

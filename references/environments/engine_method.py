@@ -65,7 +65,7 @@ class EngineMethod(AdapterMethod):
     @property
     def environment(self) -> Environment:
         """The environment. Raises `MissingEnvironment`, or `OtherVersion` of a program."""
-        own: Environment | None = getattr(self.adapter, "environment", None)  # of a program
+        own: Environment | None = getattr(self.adapter, "environment", None)  # only programs have one
         if own is None:
             return find_environment(read_name(self.family).base, self.version)
         if self.version not in ("", own.version):

@@ -66,7 +66,7 @@ class Environment:
     folder
         The virtual environment, the folder of `node_modules`, or the folder of the compiled program.
     runtime
-        Name and version of what runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
+        Name and version of the program that runs the engine, such as `Python 3.11.4` or `Node 20.20.2`.
     packages
         All installed packages, as `name==version`.
     kind
@@ -101,8 +101,8 @@ class Environment:
             Another memory limit in bytes. Only Linux limits memory.
         """
         memory, own = memory or physical_memory() // 4 * 3, self.kind.variables(self.folder)
-        every = None if own is None else {**own, **(variables or {})}
-        return Worker(self.kind.command(self.folder), temporary_folder(), every, memory)
+        environment = None if own is None else {**own, **(variables or {})}
+        return Worker(self.kind.command(self.folder), temporary_folder(), environment, memory)
 
     def write(self) -> None:
         """Write the record, which turns a folder into an environment."""

@@ -36,7 +36,8 @@ from .pip import normal_name, resolve_wheel
 from .programs import find_program, register
 from .uv_command import UvFailed, run_uv
 
-_EPOCH = "315532800"  # 1980, the first date in zip files, so that the same sources give the same wheel
+_EPOCH = "315532800"
+"""Date of files in a wheel, s: 1980, the first date in zip files. The same sources then give the same wheel."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from ..worker import program
 from .kind import Distribution, EnvironmentKind, Lock, Source, version_key
 from .uv_command import UvFailed, run_uv
 
-_PYTHONS = ("3.14", "3.13", "3.12", "3.11", "3.10", "3.9")  # those that the worker supports
+_PYTHONS = ("3.14", "3.13", "3.12", "3.11", "3.10", "3.9")
+"""Versions of Python that the worker supports, newest first."""
 _COMPILE = ("pip", "compile", "--quiet", "--no-header", "--format", "pylock.toml", "--generate-hashes")
 
 

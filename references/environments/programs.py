@@ -115,17 +115,18 @@ def program_class(program: Program, limit: float = START_LIMIT) -> type[EngineMe
     """Return the class of a program, started for its description within a limit in s. Raise `UnusableProgram` if that fails."""
     module: Any = ModuleType(program.name, f"{program.name}, a program.")
     environment = Environment(program.name, "", Path(shlex.join(program.words)), "", (), OwnProgram(program.words))
-    every = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
+    defaults = {"package": program.name, "module": "", "fields": [kind.__name__ for kind in FIELDS]}
     try:
         greeting = worker_of(environment).greet(limit)
         engine = greeting.get("engine", {})
         _check_description(engine)
-        module.ENGINE = {**every, **{FORMER.get(name, name): value for name, value in engine.items()}}
+        module.ENGINE = {**defaults, **{FORMER.get(name, name): value for name, value in engine.items()}}
         module.environment = replace(environment, version=str(greeting["version"]))
         module.__file__ = program.words[0]
         made = engine_class(module)
-        ["" in made.data.formats, *(method.order for method in made.settings_for("variants"))]  # for their exceptions
-    except Exception as error:  # of the program, or of its description, which can be wrong in any way
+        # These raise if the description is wrong.
+        ["" in made.data.formats, *(method.order for method in made.settings_for("variants"))]
+    except Exception as error:  # a program, or its description, can be wrong in any way
         raise UnusableProgram(program, error) from None
     return made
 
@@ -150,7 +151,7 @@ def read_program(text: str, name: str = "", project: bool = False) -> Program:
     file = project_file() if project else user_file()
     try:
         words = [text] if Path(text).is_file() else shlex.split(text)
-    except ValueError as error:  # a quote without another one
+    except ValueError as error:  # a quote that is not closed
         raise BadInput("command", f"{text!r} ({error})", _COMMAND) from None
     if not words:
         raise BadInput("command", repr(text), _COMMAND)

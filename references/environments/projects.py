@@ -1,7 +1,7 @@
 """Environments of versions of a project, such as a package that registers a method: of a commit, a folder or a wheel.
 
     FOLDER/wheels/KEY/      the wheel of a version; KEY is its commit or its hash
-    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is the package's
+    FOLDER/NAME/KEY/        its environment (see `environment`); NAME is the name of the package
 
 FOLDER is `projects` next to the folder of engines. Wheels and environments stay there, so that the base of many comparisons is
 built once. The other packages of an environment have their current versions: if these have changed, it is created again.
@@ -32,6 +32,7 @@ from .pip import Pip, normal_name, resolve_wheel, versions_in
 KEPT = 8
 """Largest number of environments of a project. The least recently used ones are removed."""
 US, PACKAGE = "conservative", "conservative-rotation"
+"""The names by which this package is imported and installed."""
 _WHEEL = re.compile(r"([A-Za-z0-9_.]+)-[0-9][^-]*(-[^-]+){3,4}\.whl")
 
 

@@ -37,14 +37,14 @@ def cross(a: Vector, b: Vector) -> Vector:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def halves_in_double(R: Matrix) -> tuple[complex, complex]:
-    """Return `halves` in double precision."""
-    alpha, beta = halves(R)
+def cayley_klein_in_double(R: Matrix) -> tuple[complex, complex]:
+    """Return `cayley_klein` in double precision."""
+    alpha, beta = cayley_klein(R)
     return complex(alpha), complex(beta)
 
 
-def halves(R: Matrix) -> tuple[Number, Number]:
-    """Return alpha = q0 + i q3 and beta = q1 + i q2 of a rotation (Shepperd 1978)."""
+def cayley_klein(R: Matrix) -> tuple[Number, Number]:
+    """Return the Cayley-Klein parameters of a rotation, alpha = q0 + i q3 and beta = q1 + i q2 (Shepperd 1978)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     squares = [1 + trace, *(1 + 2 * R[i, i] - trace for i in range(3))]
     largest = max(range(4), key=lambda i: squares[i])
@@ -69,12 +69,12 @@ def root(square: Number) -> Number:
     return mp.sqrt(max(square, mp.mpf(0)))
 
 
-def unit(value: Number) -> Number:
-    """Return a number in [0, 1], which `value` leaves only by round-off."""
+def clamp_to_unit(value: Number) -> Number:
+    """Return `value` within [0, 1], which it leaves only by round-off."""
     return min(max(value, mp.mpf(0)), mp.mpf(1))
 
 
-def from_halves(alpha: Any, beta: Any) -> Array:
+def from_cayley_klein(alpha: Any, beta: Any) -> Array:
     """Return rotations (n, 3, 3) of quaternions of any length, given as alpha = q0 + i q3 and beta = q1 + i q2, each (n,).
 
     Theta functions give these Cayley-Klein parameters (Klein & Sommerfeld, Theorie des Kreisels, I.2).
@@ -134,7 +134,7 @@ class Phase:
 
 
 def rotation_phase(start: Number, rate: Number) -> Phase:
-    """Return the clock of an angle, rad."""
+    """Return the phase of an angle, rad, whose period is 2 pi."""
     return Phase(start, rate, 2 * mp.pi)
 
 
@@ -161,14 +161,14 @@ def _two_sum(a: Any, b: Any) -> tuple[Array, Array]:
 
 def _two_product(a: float, b: Array) -> tuple[Array, Array]:
     """Return a b and its rounding error (Dekker)."""
-    a_high, a_low = _halves(np.asarray(a))
-    b_high, b_low = _halves(b)
+    a_high, a_low = _split(np.asarray(a))
+    b_high, b_low = _split(b)
     product = a * b
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-def _halves(a: Array) -> tuple[Array, Array]:
+def _split(a: Array) -> tuple[Array, Array]:
     """Return a as a sum of two numbers of 26 bits (Veltkamp)."""
-    shifted = 134217729.0 * a
+    shifted = 134217729.0 * a  # 2^27 + 1
     high = shifted - (shifted - a)
     return high, a - high

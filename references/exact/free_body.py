@@ -24,9 +24,9 @@ from .digits import (
     Phase,
     Vector,
     as_array,
+    cayley_klein_in_double,
     cross,
-    from_halves,
-    halves_in_double,
+    from_cayley_klein,
     mp,
     multiply,
     rotation_phase,
@@ -79,7 +79,7 @@ def free_motion(start: InitialState) -> Solution:
     x, y, z = (component / size for component in L)
     k = 1 / (1 + z)
     R_lP0 = mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])
-    q_Wl, q_PB = halves_in_double(start.attitude * R_BP * R_lP0.T), halves_in_double(R_BP.T)
+    q_Wl, q_PB = cayley_klein_in_double(start.attitude * R_BP * R_lP0.T), cayley_klein_in_double(R_BP.T)
     argument, turn = Phase(v0, omega, 2 * lattice.K), rotation_phase(-mp.arg(phase.value_and_slope(v0)[0]), mu)
     shape, inverse_J = np.array([float(x / size) for x in largest]), np.array([float(1 / x) for x in J])
     parts, axes = jacobi(lattice), as_array(R_BP)
@@ -92,6 +92,6 @@ def free_motion(start: InitialState) -> Solution:
         m = np.stack([flip * cn, flip * sn, dn], axis=-1) * shape
         chi = turn.phasor(t) * Points(phase.lattice, v).theta(phase)
         q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
-        return from_halves(*multiply(multiply(q_Wl, q_lP), q_PB)), (m * (float(size) * inverse_J)) @ axes.T
+        return from_cayley_klein(*multiply(multiply(q_Wl, q_lP), q_PB)), (m * (float(size) * inverse_J)) @ axes.T
 
     return at

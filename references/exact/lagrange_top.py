@@ -32,15 +32,15 @@ from .digits import (
     Number,
     Phase,
     as_array,
+    cayley_klein,
+    cayley_klein_in_double,
+    clamp_to_unit,
     cross,
-    from_halves,
-    halves,
-    halves_in_double,
+    from_cayley_klein,
     mp,
     multiply,
     root,
     rotation_phase,
-    unit,
 )
 from .start import SYMMETRIC, InitialState, Solution
 from .theta import Lattice, Points, Quotient, jacobi, quotient
@@ -103,7 +103,7 @@ def top(start: InitialState, moment_B: Array, axis_B: Array) -> Top:
     lever = (axis.T * moment)[0]
     R_BP = frame(axis * mp.sign(lever), axes[:, third - 2])
     w1, w2, w3 = start.rates(R_BP)
-    alpha, beta = halves(start.attitude * R_BP)
+    alpha, beta = cayley_klein(start.attitude * R_BP)
     return Top(abs(lever) / J1, J3 * w3 / J1, w3, mp.mpc(w1, w2), alpha, beta, R_BP)
 
 
@@ -175,8 +175,8 @@ def nutation_phase(start: Top, roots: Nutation) -> Phase:
     """Return v as a function of time."""
     u, u1, u2, u3, v = start.u, roots.u1, roots.u2, roots.u3, mp.mpf(0)
     if u1 != u2:
-        sn = root(unit((u - u1) / (u2 - u1)))
-        v = sn * mp.elliprf(unit((u2 - u) / (u2 - u1)), unit((u3 - u) / (u3 - u1)), 1)
+        sn = root(clamp_to_unit((u - u1) / (u2 - u1)))
+        v = sn * mp.elliprf(clamp_to_unit((u2 - u) / (u2 - u1)), clamp_to_unit((u3 - u) / (u3 - u1)), 1)
     rising = (mp.conj(start.across) * start.w).imag >= 0  # u' >= 0
     return Phase(v if rising else -v, mp.sqrt(start.k * (u3 - u1) / 2), 2 * roots.lattice.K)
 
@@ -206,12 +206,12 @@ def top_motion(start: Top) -> Solution:
     )
     parts = zip(shapes, rates, values, slopes, strict=True)
     alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
-    R_BP, q_PB = as_array(start.R_BP), halves_in_double(start.R_BP.T)
+    R_BP, q_PB = as_array(start.R_BP), cayley_klein_in_double(start.R_BP.T)
 
     def at(t: Array) -> tuple[Array, Array]:
         v, odd = argument.reduce(t)
         points = Points(lattice, v)
-        R_WB = from_halves(*multiply((alpha(t, points), beta(t, points)), q_PB))
+        R_WB = from_cayley_klein(*multiply((alpha(t, points), beta(t, points)), q_PB))
         across = float(w_scale) * (1 - 2 * odd) * w(t, points)
         w_P = np.stack([across.real, across.imag, np.full_like(across.real, float(start.spin))], axis=-1)
         return R_WB, w_P @ R_BP.T

@@ -11,7 +11,7 @@ import numpy as np
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .digits import Matrix, Vector, as_array, cross, from_halves, mp, rotation_phase
+from .digits import Matrix, Vector, as_array, cross, from_cayley_klein, mp, rotation_phase
 
 _PARALLEL = mp.mpf(10) ** -130
 """Sine of an angle that is round-off: principal axes have 150 digits."""
@@ -90,7 +90,7 @@ def steady_turn(start: InitialState) -> Solution:
 
     def at(t: Array) -> tuple[Array, Array]:
         half = half_turn.phasor(t)
-        turn = from_halves(half.real + 1j * z * half.imag, (x + 1j * y) * half.imag)
+        turn = from_cayley_klein(half.real + 1j * z * half.imag, (x + 1j * y) * half.imag)
         return R_WB0 @ turn, np.broadcast_to(start.w_WB_B0, (*t.shape, 3)).copy()
 
     return at

@@ -20,7 +20,8 @@ from conservative.attitude import Array
 
 from .digits import ComplexArray, Number, mp
 
-_BITS_KEPT = 600  # of a series, relative to its first term: more than `mp` has
+_BITS_KEPT = 600
+"""Terms of a series are kept down to this many bits below the first one: more than `mp` has."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,6 +162,7 @@ def _heights(axes: EngineAxes) -> tuple[float, float]:
     l3, L3 = float(axes.R_WF0[2] @ (axes.J * axes.w0)), J3 * float(axes.w0[2])
     energy = J1 * float(axes.w0[:2] @ axes.w0[:2]) / 2 + M * n
     cubic = np.polysub(2 * J1 * np.polymul([-1, 0, 1], [-M, energy]), np.polymul([-L3, l3], [-L3, l3]))
+    # 1e-6: `roots` splits a double root by the root of round-off.
     roots = np.roots(cubic)
     turning = np.sort(roots[(np.abs(roots.imag) < 1e-6) & (np.abs(roots) < 1)].real)
     ends = np.concatenate([[-1.0], turning, [1.0]])

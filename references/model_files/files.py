@@ -94,7 +94,7 @@ def _keep_default(match: re.Match[bytes]) -> bytes:
 def read_bytes(path: Path) -> bytes:
     """Return the content of an ordinary file. Raise `Unread` for another one and for one larger than `LARGEST`."""
     if path.exists() and not path.is_file():
-        raise Unread("it is no ordinary file")
+        raise Unread("it is not an ordinary file")
     if (size := path.stat().st_size) > LARGEST:
         raise Unread(f"{size / 2**20:.0f} MiB, more than {LARGEST / 2**20:.0f} MiB")
     return path.read_bytes()
@@ -134,7 +134,7 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
     try:
         mesh: Any = trimesh.load_mesh(BytesIO(data), file_type=kind)  # without a resolver of other files
         vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces)
-    except Exception as error:  # of trimesh, for which any bytes are a mesh
+    except Exception as error:  # trimesh takes any bytes for a mesh
         raise refuse(path, f"the mesh {name!r}, which cannot be read ({type(error).__name__}: {error})", allowed) from None
     if not (len(faces) and np.isfinite(vertices).all()):
         raise refuse(path, f"the mesh {name!r} without triangles or with vertices that are not finite", allowed)
@@ -142,7 +142,7 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
 
 
 def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
-    """Return the root of an MJCF file with the content of the files that it includes, and files that it needs and has not.
+    """Return the root of an MJCF file with the content of the files that it includes, and the names of missing files.
 
     Raise `BadInput` if an included file is not there or outside the folders, and if it is included twice.
     """
@@ -158,7 +158,7 @@ def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
             return None
 
     if "namespace" in root.attrib:
-        raise refuse(path, "a namespace, which MJCF has not", "a file of MJCF without xmlns")
+        raise refuse(path, "a namespace, which MJCF does not have", "a file of MJCF without xmlns")
     while (element := next(root.iter("include"), None)) is not None:
         place = look(element.get("file", ""), True) or path
         if place.resolve() in seen:

@@ -131,7 +131,7 @@ def _brax(path, kind):
     model = _choose(kind, mjcf=mjcf.load_mjmodel)(path)
     option = model.opt
     option.gravity[:], option.wind[:], option.density, option.viscosity = 0, 0, 0, 0
-    option.integrator, option.cone, option.impratio = 0, 0, 1  # of steps and contacts; it refuses others
+    option.integrator, option.cone, option.impratio = 0, 0, 1  # the defaults of steps and contacts; Brax refuses others
     for values in (model.dof_armature, model.dof_damping, model.jnt_stiffness):
         values[:] = 0
     system = mjcf.load_model(model).replace(mj_model=None)
@@ -151,7 +151,7 @@ def _pinocchio(path, kind):
     model = build(path) if kind == "mjcf" else build(path, pin.JointModelFreeFlyer())
     data, place = model.createData(), np.roll(PLACE, 3)  # zeros and a quaternion, scalar last
     model.gravity.linear = np.zeros(3)
-    for name in ("armature", "rotorInertia", "damping", "friction"):  # of the joint, some only in some versions
+    for name in ("armature", "rotorInertia", "damping", "friction"):  # of the joint; not every version has all of them
         if hasattr(model, name):
             setattr(model, name, np.zeros(model.nv))
     return lambda v, force: pin.aba(model, data, place, v, force) + _linear(np.cross(v[3:], v[:3]))  # it is spatial

@@ -144,7 +144,7 @@ def _shell(kind: str, sizes: Any, pose: Array, density: float) -> list[Piece]:
     if kind == "sphere":
         mass, second = density * 4 * math.pi * sides[0] ** 2, sides**2 / 3
     else:
-        areas = 2 * np.prod(sides) / sides  # of both faces normal to each axis
+        areas = 2 * np.prod(sides) / sides  # both faces normal to each axis
         mass, second = density * areas.sum(), (areas.sum() / 12 + areas / 6) / areas.sum() * sides**2
     return [Piece(mass, np.zeros(3), mass * (second.sum() * np.eye(3) - np.diag(second))).place(pose)]
 

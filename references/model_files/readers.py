@@ -203,7 +203,7 @@ def _sentences(path: Path) -> Iterator[None]:
 
 
 def _read(model: Model, search: Sequence[Path]) -> None:
-    """Fill a model with what both readers say about its body. Raise `BadInput` if it cannot be read."""
+    """Fill a model with the results of both readers for its body. Raise `BadInput` if it cannot be read."""
     path, kind = model.path, model.kind
     references = {
         "urdf": ("urdfdom in Pinocchio", "pin", "Pinocchio", partial(_urdfdom, path)),

@@ -36,6 +36,7 @@ class Body:
 
 Bodies = list[Body]
 FREE = "the joints of {} are left out: it is checked as a free body"
+"""Note on a body that joints move or hold."""
 PLAIN = {"type": "free", **dict.fromkeys(("armature", "damping", "stiffness", "frictionloss"), "0"), "limited": "false"}
 """The joint of a free body in MJCF, against defaults of the file. More engines know it than <freejoint>."""
 MOST = 1000
@@ -99,7 +100,7 @@ def _links_of(path: Path, model: Any, folder: Path, search: Sequence[Path], seve
         except Unread as error:
             missing[str(error)] = None
     meshes = ", ".join([*missing][:1] + [f"and {len(missing) - 1} more"] * (len(missing) > 1))
-    # Not on a floating joint, because engines then have a massless root.
+    # Engines get a copy of a body on a floating joint: with the file itself they would have a root without mass.
     one_free = set(groups) == {next(iter(links), "")} and not moving
     alone = one_free and not (several or held or elsewhere or meshes)
     notes = ["engines get a copy of the file without meshes: it needs " + meshes] if meshes else []
@@ -200,7 +201,7 @@ def _place_for(folder: Path, path: Path, suffix: str) -> Path:
 
 
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
-    """Return the bodies of an MJCF file: those in the world, and those on joints."""
+    """Return the bodies of an MJCF file: bodies in the world, and bodies on joints."""
     root, missing = inline(path, search)
     spec, entries = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
 
@@ -208,7 +209,7 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
         inherited = element.get("childclass", inherited)
         for child in element:
             if child.tag == "body":
-                if world or _moves(child):
+                if world or _joints_of(child):
                     entries.append((child, child.get("childclass", inherited)))
                 walk(child, inherited, False)
             elif child.tag in ("frame", "replicate"):
@@ -216,8 +217,10 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
     for worldbody in root.findall("worldbody"):
         walk(worldbody, "main", True)
-    free = all(len(_moves(body)) <= 1 and all(joint.get("type") == "free" for joint in _moves(body)) for body, _ in entries)
-    alone = len(entries) == 1 and free and bool(_moves(entries[0][0])) and not missing
+    free = all(
+        len(_joints_of(body)) <= 1 and all(joint.get("type") == "free" for joint in _joints_of(body)) for body, _ in entries
+    )
+    alone = len(entries) == 1 and free and bool(_joints_of(entries[0][0])) and not missing
     notes = [f"engines get a copy without {name!r}, which is not in the file's folder or a search path" for name in missing[:1]]
     for compiler in root.findall("compiler") * (not alone):
         if float(compiler.attrib.pop("settotalmass", "-1")) > 0:
@@ -247,7 +250,7 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     return bodies
 
 
-def _moves(body: Any) -> list[Any]:
+def _joints_of(body: Any) -> list[Any]:
     """Return the joints of a body of MJCF; a <freejoint> gets its type."""
     for joint in body.findall("freejoint"):
         joint.set("type", "free")
@@ -260,7 +263,7 @@ def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]
     The other meshes get their absolute path.
     """
     for part in list(body.iter("body", "joint", "freejoint", "site", "camera", "light")):
-        if part is not body and (part.tag != "body" or _moves(part)):
+        if part is not body and (part.tag != "body" or _joints_of(part)):
             part.getparent().remove(part)
     options = {key: value for compiler in root.findall("compiler") for key, value in compiler.attrib.items()}
     for geom in list(body.iter("geom")):

@@ -72,6 +72,7 @@ class Stage:
 
         world = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
         R = world[:3, :3] / np.linalg.norm(world[:3, :3], axis=0)
+        # Sheared or mirrored axes: the nearest rotation.
         if np.abs(R.T @ R - np.eye(3)).max() > 1e-5 or np.linalg.det(R) < 0:
             u, _, vt = np.linalg.svd(world[:3, :3])
             R = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
@@ -121,7 +122,7 @@ class Stage:
         return (axes * np.array(moments, float)) @ axes.T * self.kilogram * self.metre**2
 
     def authored(self, prim: Any) -> tuple[float | None, float | None, Array | None, Array | None]:
-        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for what it does not have.
+        """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for a missing one.
 
         A density that is not positive is not one, by OpenUSD. Nor is such a mass, if the body has colliders.
         """

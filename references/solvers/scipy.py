@@ -39,7 +39,8 @@ _COMPILED: dict[str, dict[str, Any]] = {
     **{"BDF": {"name": "vode", "method": "bdf", "with_jacobian": True}, "Adams": {"name": "vode", "method": "adams"}},
 }
 """Settings of `scipy.integrate.ode` for its integrators that are like ours."""
-_SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
+_SMALLEST_RTOL = 2.3e-14
+"""Smallest relative tolerance, 100 rounding units. SciPy raises smaller ones to this one, with a warning."""
 
 Derivative = Callable[[float, Array], Array]
 
@@ -220,7 +221,7 @@ class Ode(Settings):
     def march(self, f: Derivative, span: tuple[float, float], y: Array, t: Array, longest: float) -> tuple[Array, Any, str]:
         start, end = span
         solver, states, work = self._make(f, longest), list[Array](), np.zeros(2, int)
-        restarts = self.integrator in ("DOP853", "RK45")  # at each sample, with its counters
+        restarts = self.integrator in ("DOP853", "RK45")  # these start again at each sample, and so do their counters
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the same as its status
             if end - start >= self.slow:

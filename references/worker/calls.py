@@ -59,7 +59,7 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     """
     by_value: list[str] = []
     folder = ""
-    with suppress(OSError):  # of a working directory that was removed
+    with suppress(OSError):  # the working directory was removed
         folder = os.getcwd()  # noqa: PTH109  # links are not resolved
     while True:
         kept = [_bytes_of(value, tuple(by_value)) for value in shared]

@@ -30,7 +30,7 @@ from conservative.posix import end_group, life_line, limit_resources, session_op
 from . import program
 
 START_LIMIT = 120.0
-"""Time in seconds that a program may take to start, on however busy a machine."""
+"""Time in seconds that a program may take to start, also on a busy machine."""
 TIME_LIMIT = 600.0
 """Time limit of a request in seconds, unless `time_limit` sets another."""
 LARGEST_ANSWER = 1 << 30
@@ -38,11 +38,15 @@ LARGEST_ANSWER = 1 << 30
 LARGEST_FILE = 1 << 28
 """Largest file in bytes that a program with a memory limit may write, including its output."""
 _LONGEST_LINE = 300
-_ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")  # above a stack, of Python and of Node
-_PATIENCE = 2.0  # s, for a program to end when its input closes
-_LONGEST_WAIT = 1e6  # s
+_ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")
+"""Beginnings of the lines above a stack, of Python and of Node."""
+_PATIENCE = 2.0
+"""Time, s, for a program to end after its input closes."""
+_LONGEST_WAIT = 1e6
+"""Longest time of a timer, s."""
 _LARGEST = 1.7976931348623157e308
-_CAN_WAIT = hasattr(select, "poll")  # not on Windows, where a thread ends a late process and so the waiting for it
+_CAN_WAIT = hasattr(select, "poll")
+"""True if waiting can have a limit. On Windows a thread ends a late process, which also ends the wait."""
 _READ, _WRITE, _PART = (select.POLLIN, select.POLLOUT, select.PIPE_BUF) if _CAN_WAIT else (0, 0, 1 << 16)
 
 _limit: ContextVar[float] = ContextVar("limit", default=TIME_LIMIT)

@@ -182,7 +182,8 @@ def _split(numbers: Message, rows: list[str]) -> list[Message]:
 def _wall_time(run: Any, calls: int) -> float:
     renew: Callable[[], None] | None = getattr(run, "renew", None)
     loop = getattr(run, "loop", run)
-    if inner := getattr(getattr(run, "own_loop", loop), "wall_time", None):  # of another process, without the exchange with it
+    # A run in another process measures its loop itself, without the exchange with it.
+    if inner := getattr(getattr(run, "own_loop", loop), "wall_time", None):
         return float(inner(calls))
     if renew is None:
         start = perf_counter()

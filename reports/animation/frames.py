@@ -30,9 +30,10 @@ MOST = 1e6
 ERROR = "attitude error, rad"
 LIMITS: dict[str, tuple[float, float]] = {ERROR: (1e-3, 0.1)}
 """Largest values that are good, and fair, of the attitude error; for drifts they are 1e-10 and 1e-3."""
-FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")  # +x, -x, +y, -y, +z, -z
+FACES = ("#d55e00", "#f2b48a", "#0072b2", "#8fc4e8", "#e0a800", "#f7e3a1")
+"""Colours of the faces +x, -x, +y, -y, +z, -z."""
 COLOURS = {"faces": FACES, "arrow": "#009e73", "trace": "#cc3399", "outline": "#808890", "ink": "#202428"}
-COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # of the momentum and of the energy
+COLOURS |= {"sphere": "#9fb3c8", "ellipsoid": "#f4efe6"}  # the surfaces of equal momentum and of equal energy
 GRADES = {"good": "#cdebd8", "fair": "#fbe9b7", "bad": "#f8cfc8"}
 """Backgrounds of numbers by their grade, as in player.css."""
 
@@ -193,7 +194,7 @@ def longest(trajectories: Sequence[Trajectory]) -> float:
     right = [trajectory for trajectory in trajectories if trajectory.ok]
     for trajectory in right or trajectories:
         turned = np.cumsum(np.diff(trajectory.t) * np.linalg.norm(trajectory.w_WB_B[1:], axis=1))
-        within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # of the angle that `make_panels` takes from a mean rate
+        within = np.count_nonzero(turned <= 0.99 * MOST_FRAMES * TURN)  # `make_panels` computes this angle from a mean rate
         ends.append(math.inf if within == len(turned) else float(trajectory.t[within]))
     return max(ends, default=math.inf)
 
@@ -274,7 +275,7 @@ def _solid_of(moments: Array, com_P: Array) -> Solid:
 
 
 def legend(panels: Sequence[Panel], truth: int | None) -> list[tuple[str, str]]:
-    """Return colour and text of what the panels draw."""
+    """Return colour and text of the lines in the panels."""
     solids = {panel.solid.shape: f"{panel.solid.shape} of the same moments" for panel in panels}
     entries = [*((FACES[0], text) for text in solids.values()), (str(COLOURS["arrow"]), "angular momentum")]
     entries.append((str(COLOURS["trace"]), "axis of the body, and the trace of its end"))

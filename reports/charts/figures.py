@@ -35,7 +35,7 @@ _ENGINE_COLOURS = tuple(
 LABELS_AT = 0.86
 """Place of the label of a guide, from its first end to its second."""
 LABEL = (0.1, 0.04)
-"""Width and height of the label of a guide, as shares of those of a chart."""
+"""Width and height of the label of a guide, relative to the chart."""
 _GROWTHS = (("∝ √t", 0.5), ("∝ t", 1.0))
 """Growth of an error whose parts are random, and of one whose parts have the same direction."""
 _KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
@@ -83,7 +83,7 @@ def _guides(ends: pd.DataFrame, x: alt.X, y: alt.Y) -> list[alt.Chart]:
     lines = base.mark_line(strokeDash=[3, 3], strokeWidth=1, color=PALETTE["grey"], clip=True).encode(detail="text:N")
     logs: Any = ends.set_index("text").apply(np.log).groupby("text")
     first, second = logs.first(), logs.last()
-    places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # at the ends they would run into an axis
+    places = np.exp(first + LABELS_AT * (second - first)).reset_index()  # labels at the ends would run into an axis
     halo, plain = ({"stroke": "white", "strokeWidth": 3}, {"color": PALETTE["grey"]})  # over lines of the grid
     labels = [alt.Chart(places).mark_text(align="left", dx=8, dy=9, fontSize=10, **style) for style in (halo, plain)]
     return [lines, *(label.encode(x=x, y=y, text="text:N") for label in labels)]
@@ -150,9 +150,11 @@ def signed_drift(drifts: pd.DataFrame) -> Any:
         ends = part["drift"].min(), part["drift"].max()
         largest = max(-ends[0], ends[1])
         powers = [10.0**k for k in range(-12, 13, 3)]
-        if 0 < largest < powers[0]:  # of round-off alone: one number on each side
+        if 0 < largest < powers[0]:
             decade = math.floor(math.log10(largest))
+            # Round-off alone: one number on each side.
             powers = [max(power for power in (float(f"{digit}e{decade}") for digit in (1, 2, 5)) if power <= largest)]
+        # Ticks up to ten times beyond the ends, so that each side has one.
         ticks = [-p for p in powers if -p >= 10 * ends[0]] + [0.0] + [p for p in powers if p <= 10 * ends[1]]
         axis = alt.Axis(
             title="relative change", values=ticks, labelExpr="datum.value == 0 ? 'exact' : format(datum.value, '~e')"
@@ -237,7 +239,7 @@ def order_guides(errors: pd.DataFrame, fit_ends: pd.DataFrame) -> pd.DataFrame:
         np.diff(np.log(ends["error"])).item() / np.diff(np.log(ends["dt"])).item() for _, ends in fit_ends.groupby("name")
     ]
     rows, width, height, before = [], dt.max() - dt.min(), error.max() - error.min(), (math.inf, math.inf)
-    for order in sorted({round(slope) for slope in slopes if slope >= 0.5}):
+    for order in sorted({round(slope) for slope in slopes if slope >= 0.5}):  # orders of 1 or more
         run = min(width, height / order)
         place = LABELS_AT * run / width, LABELS_AT * order * run / height
         if all(abs(a - b) < size for a, b, size in zip(place, before, LABEL, strict=True)):

@@ -26,7 +26,7 @@ _CIRCLES = [np.roll(_CIRCLE[::4], shift, axis=1) for shift in range(3)]
 def polhode(scene: Scene) -> Array | None:
     """Return the polhode of a free body, closed (n, 3), in principal axes and the momentum's length; None for another scene.
 
-    It is where the sphere of the momentum meets the ellipsoid of the energy, an ellipse seen along the axis that it is around.
+    The sphere of the momentum meets the ellipsoid of the energy there. Seen along the axis that it surrounds, it is an ellipse.
     """
     if not scene.free or scene.body.rotor_momentum is not None:
         return None
@@ -34,7 +34,7 @@ def polhode(scene: Scene) -> Array | None:
     momentum = scene.body.momentum(scene.w_WB_B0) @ axes
     start, inverse = momentum / np.linalg.norm(momentum), 1 / moments
     energy = float(inverse @ start**2)
-    around = 2 if energy < inverse[1] else 0  # of the largest moment, or the smallest
+    around = 2 if energy < inverse[1] else 0  # the axis of the largest moment, or of the smallest
     others = [axis for axis in range(3) if axis != around]
     gaps = np.abs(inverse[others] - inverse[around])
     if not gaps.all():  # the momentum rests in a body of revolution that turns across its axis, or in a sphere
@@ -95,7 +95,8 @@ def _dots(across: Array, up: Array, colour: str, opacity: float) -> Spec:
 
 
 def _line(colour: str, width: float, opacity: float) -> Spec:
-    return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}  # of points: their own
+    # Points keep their own order.
+    return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}
 
 
 def _split(curve: Array) -> list[tuple[Array, bool]]:

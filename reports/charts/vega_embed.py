@@ -79,13 +79,13 @@ def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420) -> list[S
     whole: Spec = specification(chart)
     if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
-            unit.pop("title", None)  # the caption of the figure says it
+            unit.pop("title", None)  # it is in the caption of the figure
     parameters = [{"name": HIDDEN, "value": []}, *whole.get("params", ())]
     return [_panel(panel, whole, tooltip, height) | {"params": parameters} for panel in _panels(whole, {})]
 
 
 def _panels(spec: Spec, shared: Spec) -> Iterator[Spec]:
-    """Yield the panels of a picture, each with the data that Altair has lifted to what holds it."""
+    """Yield the panels of a picture, each with its data, which Altair can move to the part around it."""
     shared = {"data": spec["data"]} if "data" in spec else shared
     parts = _parts(spec)
     if parts is None:

@@ -195,5 +195,5 @@ def _compare(options: dict[str, Any]) -> Document:
 
     with TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         base, latest = prepare(options["against"]), prepare(head)
-        with progress() as step:
-            return build(compare_projects(base, latest, tell=step, explain=find_causes, **asked), made, prices)
+        with progress() as tell:
+            return build(compare_projects(base, latest, tell=tell, explain=find_causes, **asked), made, prices)

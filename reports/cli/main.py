@@ -68,7 +68,7 @@ def _as_click(error: Exception) -> Exception:
     if isinstance(error, BadInput | MissingEngine | MissingExtra | PotentialFailed | TorqueFailed):
         return _UserError(text)
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        sys.stdout = io.StringIO()  # or Python tries again to write the rest at its end
+        sys.stdout = io.StringIO()  # otherwise Python tries again to write the rest when it ends
         return _UserError(f"stdout: got {error.strerror!r}; expected a file, pipe or terminal that accepts all output")
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 

@@ -20,8 +20,8 @@ from .options import Command, FilePath, epilog, json_option, option, require_rep
 def motions(out: Path, force: bool, as_json: bool) -> None:
     """Write 48 short motions as JSON and CSV, with tolerances and the mistakes that each motion reveals.
 
-    The files equal those of references/motions to the last digit. The command computes all solutions again in multi-precision,
-    and measures all tolerances again with right programs of all designs, which takes some minutes.
+    The files equal the files of references/motions to the last digit. The command computes all solutions again in
+    multi-precision, and measures all tolerances again with right programs of all designs, which takes some minutes.
     """
     from conservative.benchmarks.verification.motions import files
 

@@ -192,7 +192,7 @@ class OutputCommand(Command):
             if isinstance(param.type, Output) and (path := ctx.params.get(str(param.name))) is not None:
                 for name, mark in param.type.marks.items():
                     require_replaceable(path / name, mark, str(param.name), force, taken)
-                    place = os.path.normcase(os.path.realpath(path / name))  # also of a file that does not exist yet
+                    place = os.path.normcase(os.path.realpath(path / name))  # the file may not exist yet
                     if written.setdefault(place, str(param.name)) != param.name and not is_special(path / name):
                         got = f"{str(path / name)!r}, the file of --{written[place]}"
                         raise BadInput(str(param.name), got, "another file")
@@ -350,7 +350,7 @@ def output_files(out: Path | None, names: Iterable[str], /, **options: Path | No
                 context, stream = opened[name]
                 make = made_by[name] or partial(text, document, name.rpartition(".")[2])
                 try:
-                    with suppress(_NotMade), context:  # on the disk before the next one is drawn
+                    with suppress(_NotMade), context:  # each file is on the disk before the next one is drawn
                         made = attempt(f"The file {str(places[name][0])!r}", make)
                         if isinstance(made, Paragraph):
                             failures.append(made.text)

@@ -77,7 +77,7 @@ def recommend(
 
         return picture_file(charts.picture(recommendation), path)
 
-    with progress(f"looking for methods and settings for an attitude error of {error:g} rad on {scene}") as step:
+    with progress(f"looking for methods and settings for an attitude error of {error:g} rad on {scene}") as tell:
         from conservative import registry  # imports take a second, in which the title is shown
         from conservative.benchmarks.recommendation.recommend import ask
         from conservative.benchmarks.recommendation.recommend import recommend as answer
@@ -87,7 +87,7 @@ def recommend(
         names = split_names("engines", engines) or None
         question = ask(registry.scene(scene), error, t_end, names, cost_limit, time_limit)
         with output_files(out, FILES, picture=picture) as write:
-            recommendation = answer(question, step)
+            recommendation = answer(question, tell)
             document = build(recommendation, scene, verbose)
             document = write(document, svg=draw, picture=lambda: draw(picture))
     show(document, as_json)

@@ -94,8 +94,8 @@ def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     plan = plan_report(scenes, methods, split_list("engines", options.pop("engines")), **options)
     if not resume and (unfinished := find_unfinished(out)):
         click.echo(f"{unfinished}: replacing an unfinished report. With --resume its studies are not measured again.", err=True)
-    with progress() as step:
-        document = work.write(plan, out, step, resume)
+    with progress() as tell:
+        document = work.write(plan, out, tell, resume)
     if as_json:
         click.echo((out / MANIFEST).read_text(encoding="utf-8"))
     else:

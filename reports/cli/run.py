@@ -27,6 +27,7 @@ from .options import (
 )
 
 SAMPLES = "t (s),R_WB_11,"
+"""Beginning of a file of samples."""
 FILES = {"run.csv": SAMPLES, "run.json": '"drift": {'}
 """The files of `--out`, and how each is recognized."""
 
@@ -91,8 +92,8 @@ def run(
     if len(names) > 1 and (out is not None or any(files.values())):
         raise click.UsageError("Files hold the samples of one method; name one.")
     waiting = progress() if len(names) > 1 else show_waiting(": ".join([scene, *names]))
-    with output_files(out, FILES, **files) as write, waiting as step:
-        summaries, trajectory = work.run_methods(scene, names, dt, t_end, truth, step, error)
+    with output_files(out, FILES, **files) as write, waiting as tell:
+        summaries, trajectory = work.run_methods(scene, names, dt, t_end, truth, tell, error)
         document = build(summaries)
         document = write(
             document,

@@ -124,8 +124,8 @@ def study(
         )
         made = provenance().facts
         announce(f"study {name.replace('_', ' ')}")
-        with progress() as step:
-            measured = measure_study(planned, step, scheduler)
+        with progress() as tell:
+            measured = measure_study(planned, tell, scheduler)
         document = build(name, measured, made)
         failed = failed_parts(document.blocks)
 

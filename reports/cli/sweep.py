@@ -118,9 +118,9 @@ def sweep(
         planned = work.plan(scene, starts, varied, method=names, path=out, client=client, **options)
         if out is not None:
             click.echo(f"Writing {planned.size} to {out}: {starts:,} bodies, {planned.samples} samples each", err=True)
-        with progress() as step:
-            ensemble, times = work.run_sweep(planned, step)
-            step(1.0, "summary and picture")
+        with progress() as tell:
+            ensemble, times = work.run_sweep(planned, tell)
+            tell(1.0, "summary and picture")
             summary = work.summarize(planned, ensemble, times)
             summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
             document = write(build(summary), picture=lambda: picture_file(ensemble.plot(), picture))

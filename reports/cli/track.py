@@ -90,7 +90,7 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     from ..sections.verified_engines import changes
     from ..terminal.progress import progress
 
-    def tell(what: str) -> None:
+    def echo(what: str) -> None:
         click.echo(what, err=True)
 
     engine, first, _ = read_name(engine, "engine", settings=False)
@@ -110,16 +110,16 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         newest = newest_releases(engine, last, source) if last else ()
         wanted = [*versions, *(version for version in newest if version not in versions)]
         require_several([*wanted, *([str(against)] if against is not None else [])])
-        environments = install_releases(engine, wanted, source, tell)
+        environments = install_releases(engine, wanted, source, echo)
         if against is not None:
-            tell(f"installing {against}")
+            echo(f"installing {against}")
             environments += (install_build(engine, against, source).environment,)
         sides = plan_versions([Version(environment.version, "", environment) for environment in environments], settings, scenes)
-        with progress() as step:
-            compared = compare_engine(sides, step)
-        with progress() as step:
+        with progress() as tell:
+            compared = compare_engine(sides, tell)
+        with progress() as tell:
             verified = (
-                [(side.version.name, list(verify_methods(side.methods, step, checks))) for side in sides] if checks else []
+                [(side.version.name, list(verify_methods(side.methods, tell, checks))) for side in sides] if checks else []
             )
         answer = build(compared, against is not None, made, changes(verified) if checks else None)
         answer = write(answer)

@@ -155,17 +155,17 @@ def verify(
         from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
 
         names = [str(CATALOGUE)]
-    every = [subject.kind for subject in expand(names)]
-    kinds, alone = set(every), every == [Kind.RECORDING]
+    kinds_in_order = [subject.kind for subject in expand(names)]
+    kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **values}, kinds)
     if picture is not None and not alone:
-        raise BadInput("picture", f"{len(every)} subjects", "one recording")
+        raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
     left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
-    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as step:
-        verifications = verify(names, tell=step, **options)
+    with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as tell:
+        verifications = verify(names, tell=tell, **options)
         made = {
             "csv": lambda: section.findings_text(verifications),
             "errors.csv": lambda: section.errors_text(verifications),
@@ -212,7 +212,7 @@ def facts() -> dict[str, str]:
 
 
 def draw(verifications: Sequence[Verification], path: Path | None = None) -> bytes:
-    """Return errors and drifts of a recording over time beside what is allowed, in the format of a file, by default SVG."""
+    """Return errors and drifts of a recording over time, with their limits, in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures

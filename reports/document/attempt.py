@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def attempt(what: str, make: Callable[[], T], then: str = "") -> T | Paragraph:
-    """Return what a function makes, or the sentence that it failed, followed by the sentence `then`.
+    """Return the result of a function, or the sentence that it failed, followed by the sentence `then`.
 
     Files that cannot be written raise `NotWritten`.
     """

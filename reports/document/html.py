@@ -22,8 +22,8 @@ from .. import animation
 from . import contrast
 from .model import AT_FIRST, Cell, Document, Motion, Section, Style, Table, walk
 
-MOST_ROWS = 600_000
-"""Largest length of the packed measurements in a page; longer ones are only in measurements.csv, next to the page."""
+LONGEST_PACKED = 600_000
+"""Largest length of the packed measurements in a page, characters; longer ones are only in measurements.csv."""
 WIDEST = 1.35
 """Largest ratio in the drawing of an interval, and the reciprocal of the smallest."""
 
@@ -38,7 +38,7 @@ def render(document: Document) -> str:
     linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
     if charts := {figure.name: list(figure.panels) for figure in document.figures if figure.panels}:
-        # With replacements for the colours that have too little contrast on a light or dark page.
+        # Some colours have too little contrast on a light or a dark page and are replaced there.
         colours = contrast.colours_in(json.dumps(charts))
         papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
         instead = {name: contrast.stand_ins(colours, paper) for name, paper in papers.items()}
@@ -47,10 +47,10 @@ def render(document: Document) -> str:
     if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
         scripts["datatables"] = _datatables()
     rows = document.data.get("rows", ()) if isinstance(document.data, Mapping) else ()
-    has_rows = any(isinstance(block, Section) and block.source for block in blocks)  # of measurements.csv, next to the page
+    has_rows = any(isinstance(block, Section) and block.source for block in blocks)  # a table from measurements.csv
     if rows and has_rows:
         packed = pack(json.dumps([list(rows[0]), *(list(row.values()) for row in rows)], separators=(",", ":")))
-        if len(packed) <= MOST_ROWS:
+        if len(packed) <= LONGEST_PACKED:
             scripts["rows"] = packed
     player = Markup(animation.script()) if any(isinstance(block, Motion) for block in blocks) else ""
     template = environment.get_template("page.html.j2")

@@ -77,7 +77,7 @@ def curves(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def _names(rows: pd.DataFrame) -> pd.Series[str]:
-    """Return the names of lines; that of the exact motion does not depend on the solver, of which some scenes have several."""
+    """Return the names of lines. The exact motion has one name, although some scenes have several solvers for it."""
     return rows["line"].where(rows["role"] != Role.TRUTH, EXACT)
 
 
@@ -117,8 +117,9 @@ def fits(errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(rows: pd.DataFrame) -> pd.Series[float]:
-    """Return the observed order of each method by its name, without those whose standard error is above `SURE`."""
-    order, error = (of_measure(rows, each).groupby("method")["value"].last() for each in (Measure.ORDER, Measure.ORDER_STDERR))
+    """Return the observed order of each method by its name, if its standard error is at most `SURE`."""
+    measures = Measure.ORDER, Measure.ORDER_STDERR
+    order, error = (of_measure(rows, measure).groupby("method")["value"].last() for measure in measures)
     return order[~(error.reindex(order.index) > SURE)]
 
 

@@ -124,8 +124,8 @@ def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.D
 def largest_drifts(run: pd.DataFrame, scene: Scene) -> dict[str, float]:
     """Return the largest drift of each invariant of a scene in the rows of a run, NaN if there is none.
 
-    The drift of a balance is that with the work and impulse of the method, as everywhere, or with those of the truth if the
-    method does not sum them.
+    The drift of a balance includes the work and impulse that the method sums, or of the reference solution if the method does
+    not sum them.
     """
     values = run[run["measure"] == Measure.DRIFT_MAX.text].groupby("quantity")["value"].max()
     found = {}

@@ -45,7 +45,7 @@ def points(
     -------
     pd.DataFrame
         Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see `classes`),
-        dt, error (rad), time (s per simulated second) and times (those of each process); each line coarse to fine. An error
+        dt, error (rad), time (s per simulated second) and times (of each process); each line coarse to fine. An error
         below the resolution of the reference solution is raised to it.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)
@@ -113,7 +113,7 @@ def names_in_turn(picture: pd.DataFrame) -> tuple[str, ...]:
     turns = (MethodClass.GENERAL, MethodClass.ENGINE, MethodClass.SOLVER)
     sides = [[name for _, name in ranked if classes[name] == kind] for kind in turns]
     rest = [name for _, name in ranked if classes[name] not in turns]
-    return tuple([name for each in zip_longest(*sides) for name in each if name] + rest)
+    return tuple([name for names in zip_longest(*sides) for name in names if name] + rest)
 
 
 def _rank(line: pd.DataFrame) -> tuple[int, float]:

@@ -150,9 +150,7 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
         raise BadInput("resume", f"no {str(fresh.path)!r}", "the folder --out of a report that was interrupted")
     for scene in plan.scenes:
         if unknown := scene.identity.unknown:
-            got = (
-                f"True, for the scene {scene.name!r} with {unknown}, which cannot be compared with that of the earlier process"
-            )
+            got = f"True, for the scene {scene.name!r} with {unknown}, which cannot be compared with the earlier scene"
             raise BadInput("resume", got, "no --resume, to start again, or scenes made of numbers, tables and pure functions")
     command, before, results = read(path)
     if different := list(differences(before, json.loads(json.dumps(fresh.terms)))):

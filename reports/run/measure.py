@@ -25,7 +25,7 @@ from conservative.pickling import NotTransferable
 from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import kill_workers
 
-from ..terminal.progress import Step, announce
+from ..terminal.progress import Tell, announce
 from .checkpoint import VERIFICATION, Checkpoint, Part
 from .plan import Plan
 from .provenance import Provenance
@@ -58,11 +58,11 @@ class Measurements:
     @classmethod
     def of(cls, findings: Iterable[Part]) -> Measurements:
         """Return the tables of the findings of studies, and those on engines."""
-        every = list(findings)
+        results = list(findings)
         return cls(
-            measurement.frame(row for row in every if isinstance(row, Measurement)),
-            measurement.samples_frame(line for line in every if isinstance(line, Samples)),
-            tuple(part for part in every if isinstance(part, Verified)),
+            measurement.frame(row for row in results if isinstance(row, Measurement)),
+            measurement.samples_frame(line for line in results if isinstance(line, Samples)),
+            tuple(part for part in results if isinstance(part, Verified)),
         )
 
     def content(self, source: Provenance) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def records(table: pd.DataFrame) -> list[dict[str, object]]:
     ]
 
 
-def compile_kernels(plan: Plan, step: Step) -> None:
+def compile_kernels(plan: Plan, tell: Tell) -> None:
     """Compile the kernels of a plan side by side if none is stored yet. Otherwise each is compiled when it is needed.
 
     Each process takes two steps with all methods that share a kernel, so that no kernel is compiled twice.
@@ -108,30 +108,30 @@ def compile_kernels(plan: Plan, step: Step) -> None:
         try:
             for i, future in enumerate(as_completed(futures), start=1):
                 future.result()
-                step(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
+                tell(0.0, f"compilation of kernels, for the first time: {i} of {len(cases)}")
         except BaseException:  # such as an interrupt, which does not reach the threads
             while wait(futures, 0.1).not_done:
                 kill_workers()  # again, because a thread may just be starting one
             raise
 
 
-def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
+def measure(plan: Plan, tell: Tell, checkpoint: Checkpoint) -> Measurements:
     """Return rows and samples in the order of the plan.
 
-    Studies in the checkpoint are not measured again, others are added to it. `step` is called with the finished share.
+    Studies in the checkpoint are not measured again, others are added to it. `tell` is called with the finished share.
     """
-    compile_kernels(plan, step)
+    compile_kernels(plan, tell)
     for i, study in enumerate(plan.studies):
         if study.name in checkpoint.results:
             continue
         title = f"study {i + 1} of {len(plan.studies)}, {study.name.replace('_', ' ')}"
         announce(title)
 
-        def tell(share: float, what: str, i: int = i, title: str = title) -> None:
-            step((i + share) / len(plan.studies), f"{title}: {what}")
+        def tell_part(share: float, what: str, i: int = i, title: str = title) -> None:
+            tell((i + share) / len(plan.studies), f"{title}: {what}")
 
-        checkpoint.store(study.name, studies.findings(study, tell))
+        checkpoint.store(study.name, studies.findings(study, tell_part))
     if VERIFICATION in checkpoint.names and VERIFICATION not in checkpoint.results:
         announce("verification of engines")
-        checkpoint.store(VERIFICATION, verify_methods(plan.engines, lambda share, what: step(1.0, f"verification: {what}")))
+        checkpoint.store(VERIFICATION, verify_methods(plan.engines, lambda share, what: tell(1.0, f"verification: {what}")))
     return Measurements.of(finding for name in checkpoint.names for finding in checkpoint.results[name].findings)

@@ -128,8 +128,8 @@ def plan_report(
     if bodies is None:
         bodies = 0 if names or (methods and not full) else kind.bodies
     chosen = selection.scenes(names) if names else selection.scenes()
-    every = selection.methods(methods or None, skip_missing) if whole or (bodies and not few) else ()
-    compared = every if whole else selection.main_methods(skip_missing)
+    all_methods = selection.methods(methods or None, skip_missing) if whole or (bodies and not few) else ()
+    compared = all_methods if whole else selection.main_methods(skip_missing)
     named = engine_selection.select_engines(engines, skip_missing) if engines else ()
     if not skip_missing:
         for method in (*compared, *named):
@@ -142,7 +142,7 @@ def plan_report(
             return ()
         if declared.draw and few:
             return tuple(method for method in compared if method.name in FEW_METHODS)
-        mine = every if declared.draw else compared
+        mine = all_methods if declared.draw else compared
         return declared.in_report(tuple(dict.fromkeys((*mine, *named))) if declared.named else mine)
 
     made: list[Study] = []
@@ -151,7 +151,8 @@ def plan_report(
             continue
         limit = kind.time_limit if time_limit is None and not (named and declared.named) else time_limit
         extent = {"skip_missing": skip_missing, "bodies": bodies, "seed": seed} if declared.draw else shared
-        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent, **dict(declared.more)}
+        settings = {"quick": quick or (few and declared.draw is not None), "time_limit": limit, **extent}
+        settings |= dict(declared.report_keywords)
         study = declared.plan(taken, () if declared.scenes else chosen, kind.processes, **settings)
         if declared.draw and few:
             study = replace(study, scenes=study.scenes[:FEW_BODIES], drawn=study.drawn[:FEW_BODIES])

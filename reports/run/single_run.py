@@ -31,7 +31,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..document.cells import angle
-from ..terminal.progress import Step
+from ..terminal.progress import Tell
 
 SAMPLES = 1_000_000
 """Largest number of samples. Shorter runs store every step."""
@@ -102,7 +102,7 @@ def run_methods(
     dt: float | None,
     t_end: float | None,
     truth: bool | None,
-    step: Step,
+    tell: Tell,
     target: float | None = None,
 ) -> tuple[list[dict[str, Any]], Trajectory]:
     """Return the summary of each method on a scene, with its errors, and the trajectory of the last one.
@@ -127,7 +127,7 @@ def run_methods(
     for run in planned:
         _ = run.method.label  # raises `MissingEngine`
     for number, run in enumerate(planned):
-        step(number / len(planned), run.typed)
+        tell(number / len(planned), run.typed)
         if run.refusal:
             summaries.append(run.refused(scene))
             continue
@@ -264,7 +264,7 @@ def find_better(truth: Trajectory, grid: Grid, stride: int, scene_name: str, t_e
     end = min(float(truth.t[-1]), scene.t_end if t_end is None else t_end)
     try:
         choice = run_chosen(scene, one.TARGET, end, end)[0].choice
-        assert choice is not None  # of `integrate(error=)`
+        assert choice is not None  # `integrate(error=)` always has one
         parts = math.ceil(grid.dt / choice.dt * (1 - ROUNDING))
         if grid.n_steps * parts > MOST_TRIED:
             return None
@@ -337,7 +337,7 @@ def bounded_grid(scene: Scene, dt: float | None, t_end: float | None) -> Grid:
 def summarize_chosen(trajectory: Trajectory) -> dict[str, Any]:
     """Return the description of a run whose method was chosen for an error."""
     choice = trajectory.choice
-    assert choice is not None  # of `integrate(error=)`
+    assert choice is not None  # `integrate(error=)` always has one
     asked = {"error": choice.error, "estimate": choice.estimate, "reached": choice.reached}
     return summarize(trajectory, choice.method, choice.dt) | {"choice": asked}
 

@@ -29,7 +29,7 @@ from conservative.methods.trials import parts_for, trials_of
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
-from ..terminal.progress import Step
+from ..terminal.progress import Tell
 from .single_run import COMPARED, LARGE, find_errors, read_error, run_on
 
 KINDS = ("attitude", "rate", "inertia")
@@ -137,8 +137,8 @@ def plan(
     return Sweep(scene, starts, options, varied, seed, samples, steps)
 
 
-def run_sweep(sweep: Sweep, step: Step) -> tuple[Ensemble, Summary]:
-    """Return the ensemble of a sweep, and its times. `step` is called with the finished share and the rate in words.
+def run_sweep(sweep: Sweep, tell: Tell) -> tuple[Ensemble, Summary]:
+    """Return the ensemble of a sweep, and its times. `tell` is called with the finished share and the rate in words.
 
     Raises
     ------
@@ -151,9 +151,9 @@ def run_sweep(sweep: Sweep, step: Step) -> tuple[Ensemble, Summary]:
         nonlocal last
         last = progress
         steps = f", {rate_text(progress.rate * sweep.steps)} steps/s" if sweep.steps else ""
-        step(progress.done / progress.total, f"{rate_text(progress.rate)} bodies/s{steps}")
+        tell(progress.done / progress.total, f"{rate_text(progress.rate)} bodies/s{steps}")
 
-    step(0.0, "preparing: a first run compiles")
+    tell(0.0, "preparing: a first run compiles")
     begin = perf_counter()
     try:
         with warnings.catch_warnings():

@@ -12,7 +12,7 @@ from conservative.benchmarks.verification.finding import Cause, Finding, Verdict
 from conservative.benchmarks.verification.verify import verify
 from conservative.method import Method
 
-from ..terminal.progress import Step
+from ..terminal.progress import Tell
 
 CHECKS = ("motions", "order", "repeatability", "pairs")
 """Checks of engines in a report; see `conservative verify --only`."""
@@ -26,19 +26,19 @@ class Verified:
     findings: tuple[Finding, ...]
 
 
-def verify_methods(methods: Sequence[Method], step: Step, checks: Sequence[str] = CHECKS) -> Iterator[Verified]:
+def verify_methods(methods: Sequence[Method], tell: Tell, checks: Sequence[str] = CHECKS) -> Iterator[Verified]:
     """Yield the findings on each method; a missing engine was not tested."""
     for i, method in enumerate(methods):
 
-        def tell(share: float, what: str, i: int = i) -> None:
-            step((i + share) / len(methods), what)
+        def tell_part(share: float, what: str, i: int = i) -> None:
+            tell((i + share) / len(methods), what)
 
         findings: tuple[Finding, ...]
         if isinstance(method, Missing):
             findings = (Finding(method.name, checks[0], "", Verdict.NOT_TESTED, detail=str(method.error)),)
         else:
             findings = tuple(
-                finding for verification in verify(method, only=checks, tell=tell) for finding in verification.findings
+                finding for verification in verify(method, only=checks, tell=tell_part) for finding in verification.findings
             )
         yield Verified(names_of(method), findings)
 

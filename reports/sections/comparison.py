@@ -106,7 +106,7 @@ def build(
 
 
 def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
-    """Return the rows: failed ones first, then those with the largest change of time."""
+    """Return the rows: failed ones first, then by the change of time, largest first."""
     standings = [(standing_of(line, violations), line) for line in comparison.lines]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:

@@ -63,9 +63,9 @@ def _page(measured: Measured, family: str, versions: Sequence[str], scenes: dict
             caption = f"{scene.name}: {scene.t_end:g} s at dt = {scene.dt:g} s, against the exact motion"
             blocks.append(Table(["setting", *COLUMNS], [comparison_cells(row, COLUMNS) for row in shown], caption))
     blocks.append(Section("Since which version", _since(family, versions, scenes)))
-    found = [each for each in measured.measurements.verified if each.names["engine"] == family]
-    if found:
-        blocks.append(attempt("The section 'verification'", partial(verified_engines.section, found)))
+    verified = [setting for setting in measured.measurements.verified if setting.names["engine"] == family]
+    if verified:
+        blocks.append(attempt("The section 'verification'", partial(verified_engines.section, verified)))
     blocks.append(Section("Repeat it", [Paragraph(command) for command in _commands(measured, family, versions)]))
     blocks.append(Section("What its authors can say", [Paragraph(OBJECT)]))
     name = _title(family, newest)
@@ -85,16 +85,18 @@ def _sentence(row: EngineRow) -> str:
 
 
 def _since(family: str, versions: Sequence[str], scenes: dict[str, list[EngineRow]]) -> list[Block]:
-    """Return from which measured version on the errors are those of the newest one, and the errors of all versions."""
+    """Return the first measured version whose errors equal the errors of the newest one, and the errors of all versions."""
     if len(versions) == 1:
         command = f"`conservative track {family} --last 3` finds the version since which an error changed."
         return [Paragraph(f"Only {versions[0] or 'one version'} was measured here. {command}")]
     kinds, items, tables = (AS_INSTALLED, AT_ITS_BEST), list[Item](), list[Block]()
     for scene, rows in scenes.items():
-        every = [chosen(rows, family, version) for version in versions]
-        shown = [{kind: row for row in each for kind in kinds if row.taken in (kind, "both")} for each in every]
+        of_versions = [
+            {kind: row for row in chosen(rows, family, version) for kind in kinds if row.taken in (kind, "both")}
+            for version in versions
+        ]
         for kind in kinds:
-            errors = [each[kind].error if kind in each else math.nan for each in shown]
+            errors = [by_kind[kind].error if kind in by_kind else math.nan for by_kind in of_versions]
             same = [abs(error - errors[0]) <= SAME * errors[0] for error in errors]  # False for NaN
             if same[0]:
                 count = (*same, False).index(False)
@@ -104,9 +106,9 @@ def _since(family: str, versions: Sequence[str], scenes: dict[str, list[EngineRo
                     text += f", {angle(errors[count])} rad in {versions[count]}"
                 items.append(Item(text, scene))
         body = list[Row]()
-        for version, each in zip(versions, shown, strict=True):
-            found = [each.get(kind) for kind in kinds]
-            cells = [cell for row in found for cell in ((row.setting, row.cells["error, rad"]) if row else (DASH, DASH))]
+        for version, by_kind in zip(versions, of_versions, strict=True):
+            both = [by_kind.get(kind) for kind in kinds]
+            cells = [cell for row in both for cell in ((row.setting, row.cells["error, rad"]) if row else (DASH, DASH))]
             body.append([_title(family, version), *cells])
         header = ["version", *(name for kind in kinds for name in (kind, "error, rad"))]
         tables.append(Table(header, body, f"{scene}: versions"))
@@ -123,4 +125,4 @@ def _commands(measured: Measured, family: str, versions: Sequence[str]) -> list[
     scenes = shlex.quote(",".join(plan.arguments.get(scene.name, scene.name) for scene in plan.scenes))
     command = f"conservative report --methods reduced --scenes {scenes} --engines {','.join(names)}" + " --quick" * plan.quick
     commands = [command, f"conservative verify {' '.join(names)}"]
-    return [f"`{each}`" for each in [*[f"conservative engines install {install}"] * bool(install), *commands]]
+    return [f"`{line}`" for line in [*[f"conservative engines install {install}"] * bool(install), *commands]]

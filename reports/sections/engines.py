@@ -76,10 +76,10 @@ COLUMNS = (
 class EngineRow:
     """One setting of one engine on one scene: such as family `exudyn`, version `1.13.6` and setting `RK44`.
 
-    The outcome is that of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
+    `outcome` is the outcome of the run at the scene's step, or of its timing. `error` is its largest attitude error, rad, and
     `second_time` the wall time, s, of a simulated second at an error of `ERROR`; NaN if not measured or not reached. `series`
     is its line of steps or tolerances. `as_installed` is true if only the step is set, `best` if no setting of the engine has
-    a smaller error. `cells` are those of `COLUMNS` by name, except "taken".
+    a smaller error. `cells` are the cells of `COLUMNS` by name, except "taken".
     """
 
     family: str
@@ -187,7 +187,7 @@ def engine_rows(measured: Measured, scene: str) -> list[EngineRow]:
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}
     timed = {str(name): rows for name, rows in points[points["error"] <= SAME_MOTION].groupby("series", sort=False)}
     rows = [_engine_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
-    best: dict[str, EngineRow] = {}  # of each engine: the smallest error, then the shortest time
+    best: dict[str, EngineRow] = {}  # the best row of each engine: the smallest error, then the shortest time
     known = (row for row in rows if not math.isnan(row.error))
     for row in sorted(known, key=lambda row: (row.error, math.isnan(row.second_time), row.second_time)):
         best.setdefault(row.engine, row)
@@ -202,7 +202,8 @@ def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Ma
     ends = pd.concat([of_measure(rows, measure) for measure in (Measure.ATTITUDE_MAX, Measure.TIME)])
     outcome = next((outcome for outcome in outcomes(ends) if not outcome.ok), OK)
     usable = with_outcome(of_measure(line, Measure.ATTITUDE_MAX), OutcomeKind.OK)
-    expected, error, bits = (_value(rows, each) for each in (Measure.ORDER_EXPECTED, Measure.ATTITUDE_MAX, Measure.PRECISION))
+    measures = Measure.ORDER_EXPECTED, Measure.ATTITUDE_MAX, Measure.PRECISION
+    expected, error, bits = (_value(rows, measure) for measure in measures)
     longest_step, step_time = float(usable[usable["value"] <= USABLE]["dt"].max()), _value(rows, Measure.TIME_PER_STEP)
     if math.isnan(expected):  # it chooses its steps
         longest_step = step_time = math.nan

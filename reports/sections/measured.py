@@ -64,9 +64,9 @@ class Measured:
     @cached_property
     def points(self) -> pd.DataFrame:
         """Errors and times on the scenes (see `rows.points`), and the time per `sample`, s."""
-        every = points.points(self.rows)
+        all_points = points.points(self.rows)
         intervals = {scene.name: scene.t_end / SAMPLES for scene in self.plan.scenes}
-        return every.assign(sample=every["time"] * every["scene"].map(intervals).astype(float))
+        return all_points.assign(sample=all_points["time"] * all_points["scene"].map(intervals).astype(float))
 
     @cached_property
     def every_step(self) -> dict[str, EachStep | None]:

@@ -27,7 +27,7 @@ HEAD = ["engine", "pair", "moments, kg m²", "mass, kg", "centre, m; g, m/s²", 
 
 
 def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
-    """Return what differs, its reduced descriptions and scripts, and a table by pair and body for each engine."""
+    """Return the pairs that differ, their reduced descriptions and scripts, and a table by pair and body for each engine."""
     some = [finding for finding in findings if isinstance(finding, PairFinding)]
     engines = dict.fromkeys(finding.subject for finding in some)
     groups = _grouped([finding for finding in some if finding.verdict is Verdict.WRONG])
@@ -87,7 +87,7 @@ def _cell(finding: PairFinding) -> Cell:
 
 def _reduced(finding: PairFinding) -> list[str]:
     body = finding.first
-    assert body is not None  # of a pair that differs
+    assert body is not None  # a pair that differs has both descriptions
     moments, com, rates = (", ".join(map(number, values)) for values in (np.diag(body.inertia), body.com, body.w0))
     field = f"{com}; {number(body.gravity)}" if body.gravity else DASH
     scale = number(finding.scale) if finding.scale else DASH

@@ -225,22 +225,22 @@ def _means(reached: pd.DataFrame, bodies: int) -> pd.DataFrame:
 
 def sentence(ratios: Iterable[RandomRatios]) -> str:
     """Return the side that reaches `MIDDLE` faster, in the geometric mean over the bodies of all fields."""
-    every = Ratios(tuple(c for part in ratios if part.engine == ANY and part.error == MIDDLE for c in part.speed_ratios))
+    pooled = Ratios(tuple(c for part in ratios if part.engine == ANY and part.error == MIDDLE for c in part.speed_ratios))
     goal = f"{tolerance(MIDDLE)} rad"
-    if not every.both:
+    if not pooled.both:
         return f"On no random body do our integrators and an engine both reach {goal}."
-    sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if every.ratio >= 1 else -1]
-    low, high = every.interval if len(every.both) >= FEW else (math.nan, math.nan)
-    ends = sorted((low, high) if every.ratio >= 1 else (1 / low, 1 / high)) if not math.isnan(low) else []
+    sides = ["our fastest general integrator", "the fastest engine or solver"][:: 1 if pooled.ratio >= 1 else -1]
+    low, high = pooled.interval if len(pooled.both) >= FEW else (math.nan, math.nan)
+    ends = sorted((low, high) if pooled.ratio >= 1 else (1 / low, 1 / high)) if not math.isnan(low) else []
     parts = ["geometric mean", *([f"interval {' to '.join(map(factor, ends))}"] if ends else [])]
-    if slower := [1 / speed_ratio.ratio for speed_ratio in every.both if speed_ratio.lost]:
+    if slower := [1 / speed_ratio.ratio for speed_ratio in pooled.both if speed_ratio.lost]:
         parts.append(f"an engine or solver is faster on {len(slower)}, by up to {factor(max(slower))} times")
     else:
-        parts.append(f"single bodies: {factor(every.worst)} to {factor(every.best)}")
-    if every.open:
-        parts.append(f"{every.open} are open")
-    if missed := len(every.speed_ratios) - len(every.both):
+        parts.append(f"single bodies: {factor(pooled.worst)} to {factor(pooled.best)}")
+    if pooled.open:
+        parts.append(f"{pooled.open} are open")
+    if missed := len(pooled.speed_ratios) - len(pooled.both):
         parts.append(f"{missed} more are not reached by both")
-    bodies = "one random body" if len(every.both) == 1 else f"{len(every.both)} random bodies"
-    times = f"{factor(max(every.ratio, 1 / every.ratio))} times as fast as {sides[1]} ({'; '.join(parts)})."
+    bodies = "one random body" if len(pooled.both) == 1 else f"{len(pooled.both)} random bodies"
+    times = f"{factor(max(pooled.ratio, 1 / pooled.ratio))} times as fast as {sides[1]} ({'; '.join(parts)})."
     return f"On {bodies} in fields, {sides[0]} reaches {goal} {times}"

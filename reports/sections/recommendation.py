@@ -64,7 +64,7 @@ def build(recommendation: Recommendation, scene: str, verbose: bool) -> Document
 
 
 def answer_lines(recommendation: Recommendation, scene: str) -> Iterator[str]:
-    """Yield what to use for a scene, by its name or file: the fastest setting, its command, and the fastest engine."""
+    """Yield the recommendation for a scene, by its name or file: the fastest setting, its command, and the fastest engine."""
     conditions, winners = recommendation.conditions, recommendation.winners
     best, engine = winners["cheapest"], winners["cheapest_engine"]
     if best is None or best.best is None:

@@ -111,7 +111,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
 def brief(
     measured: Measured, points: Mapping[str, pd.DataFrame], summaries: Callable[[], Mapping[str, summary.Summary]]
 ) -> Iterator[Block]:
-    """Yield what the terminal shows: a table of each scene, and sentences."""
+    """Yield the lines for the terminal: a table of each scene, and sentences."""
     for scene in measured.plan.scenes:
         table = partial(closing.scene_table, measured.scene_rows, points[scene.name], scene, bool(measured.plan.named))
         yield attempt(f"The table of {scene.name}", table)

@@ -44,11 +44,11 @@ def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
         return None
     own_loop = pd.concat([stored[~stored["name"].isin(engines["name"])], engines])
     interval = float(rows["dt"].max())
-    every = f"every {interval:.3g} s"
+    interval_text = f"every {interval:.3g} s"
     runs = {
-        f"{every} stored": stored,
-        f"{every} stored, engines without conversion": own_loop,
-        f"{every}, final state only": final,
+        f"{interval_text} stored": stored,
+        f"{interval_text} stored, engines without conversion": own_loop,
+        f"{interval_text}, final state only": final,
     }
     return EachStep(interval, runs)
 

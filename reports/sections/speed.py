@@ -64,10 +64,10 @@ def _sentence(subject: str, points: pd.DataFrame) -> str:
 def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
     full = {motion: points for motion, points in pictures.items() if len(points)}
-    every = joined(full.values())
+    curves = joined(full.values())
     legend = []
-    for line in names_in_turn(every):
-        family, kind = every.loc[every["name"] == line, ["family", "class"]].iloc[0]
+    for line in names_in_turn(curves):
+        family, kind = curves.loc[curves["name"] == line, ["family", "class"]].iloc[0]
         dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
         legend.append(LegendEntry(line, colours({line: family})[line], path, dash))
     panels = []

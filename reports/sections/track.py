@@ -96,7 +96,7 @@ def build(
             if transition.changes
         ],
     }
-    checks = []  # of each setting, scene and pair of consecutive versions
+    checks = []  # one for each setting, scene and pair of consecutive versions
     for transition in transitions:
         text, name = (
             changes_text(transition),

@@ -115,7 +115,7 @@ def errors_text(verifications: Sequence[Verification]) -> str:
 
 
 def summary(verification: Verification) -> list[Block]:
-    """Return what decides the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
+    """Return the reasons of the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
     if verification.kind in OWN:
         return list(OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
@@ -148,7 +148,7 @@ def _pairs(verification: Verification) -> tuple[list[Finding], list[Finding]]:
 
 
 def mistakes(findings: Iterable[Finding]) -> Items:
-    """Return the wrong cases by what explains them, the explanation of the most cases first."""
+    """Return the wrong cases by their explanations, largest groups first."""
     wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
     groups = sorted(grouped(wrong, lambda finding: (finding.check, named_by(finding))), key=lambda group: -len(group[1]))
     items = [Item(explanation(some[0]), _named(check, _cases_of(some)), True) for (check, _), some in groups]
@@ -198,7 +198,7 @@ def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[
 
 
 def named_by(finding: Finding) -> str:
-    """Return the key of what explains a finding; a finding without a mistake is explained by its detail."""
+    """Return the keys of the mistakes that explain a finding, or else its detail."""
     return "; ".join(cause.key for cause in finding.causes) or finding.detail
 
 
@@ -209,7 +209,7 @@ def _cases_of(findings: Sequence[Finding]) -> str:
 
 
 def _remarks(findings: Sequence[Finding]) -> Items:
-    """Return why cases are undecided, and what is remarkable about right ones; the sentence of the verdict has the order."""
+    """Return why cases are undecided, and remarks on right ones. The order is in the sentence of the verdict instead."""
     remarkable = (
         finding for finding in findings if finding.verdict is Verdict.RIGHT and finding.detail and finding.check != "order"
     )
@@ -224,7 +224,7 @@ def numbers(findings: Sequence[Finding]) -> list[str]:
 
 
 def _counts(verification: Verification) -> Table | None:
-    """Return the number of cases by check and verdict; None of a subject with one case."""
+    """Return the number of cases by check and verdict; None for a subject with one case."""
     body = [[check, *numbers(some)] for check, some in grouped(verification.findings, lambda finding: finding.check)]
     return Table(["check", *SIGNS], body, "Cases") if len(verification.findings) > 1 else None
 
@@ -250,7 +250,7 @@ def _verdict(verdict: Verdict) -> Cell:
 
 
 def _check(subject: str, finding: Finding) -> Check:
-    """Return a finding as a test case. A case that is undecided or not tested is skipped, which says why."""
+    """Return a finding as a test case. A case that is undecided or not tested is skipped, with the reason."""
     why = explanation(finding)
     name = _named(finding.check, finding.case)
     if finding.verdict is Verdict.WRONG:

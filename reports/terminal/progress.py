@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from threading import Timer
 from time import monotonic
 
-Step = Callable[[float, str], None]
+Tell = Callable[[float, str], None]
 """Called with the finished share of all work, 0 to 1, and a description of the next piece."""
 DELAY = 1.0
 """Time, s, after which a bar appears."""
@@ -29,17 +29,17 @@ def announce(what: str) -> None:
 
 
 @contextmanager
-def progress(title: str = "") -> Iterator[Step]:
-    """Yield the function to call before each step. Without a terminal, the title is a line after `DELAY`."""
+def progress(title: str = "") -> Iterator[Tell]:
+    """Yield the function to call before each piece of work. Without a terminal, the title is a line after `DELAY`."""
     if not has_terminal() or find_spec("rich") is None:  # the gate runs without the extra `report`, which has rich
         written = start = monotonic()
         timer = Timer(DELAY, announce, [title])
         timer.daemon = True
 
-        def step(share: float, what: str) -> None:
+        def tell(share: float, what: str) -> None:
             nonlocal written
             if (now := monotonic()) - written >= SILENCE:
-                # The first steps compile, so an estimate from them would be many times too long.
+                # The first pieces compile, so an estimate from them would be many times too long.
                 left = f", about {(now - start) * (1 - share) / share:.0f} s left" if share > 0.1 else ""
                 print(f"{share:.0%}{left}: {what}", file=sys.stderr, flush=True)
                 written = now
@@ -47,7 +47,7 @@ def progress(title: str = "") -> Iterator[Step]:
         if title:
             timer.start()
         try:
-            yield step
+            yield tell
         finally:
             timer.cancel()
         return
@@ -59,8 +59,8 @@ def progress(title: str = "") -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str, line: bool = False) -> Iterator[Step]:
-    """Show a bar if a piece of work takes longer than `DELAY`. Yield what takes the place of a step, and does nothing.
+def show_waiting(what: str, line: bool = False) -> Iterator[Tell]:
+    """Show a bar if a piece of work takes longer than `DELAY`. Yield a function that does nothing.
 
     Without a terminal nothing is shown, or with `line` a line after the same time.
     """

@@ -113,7 +113,8 @@ def _swap(fresh: Path, target: Path) -> None:
 def _step_aside(target: Path) -> tuple[Path, int | None]:
     """Rename an earlier report and return its new name and its lock, which protects it from `recover`.
 
-    If another process holds the lock, it has just written this report and is about to release it.
+    If another process holds the lock, it has just written this report and is about to release it. If it still holds it after
+    `_SWAP_TIME`, the folder is renamed without a lock.
     """
     end = time.monotonic() + _SWAP_TIME
     while (handle := posix.lock(target)) is None and target.exists() and time.monotonic() < end:

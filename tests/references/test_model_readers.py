@@ -199,7 +199,7 @@ def test_reading_has_limits_of_time_memory_and_size(tmp_path, monkeypatch):
     with pytest.raises(BadInput, match="100 MiB, more than 64 MiB"):
         read_files([large], tmp_path)
     os.mkfifo(fifo := tmp_path / "fifo.urdf")
-    with pytest.raises(BadInput, match="no ordinary file"):
+    with pytest.raises(BadInput, match="not an ordinary file"):
         read_files([fifo], tmp_path)
 
 

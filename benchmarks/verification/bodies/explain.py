@@ -13,7 +13,7 @@ from ..finding import Cause
 from ..mistakes.bodies import FITTED, LOADED, BodyMistake
 
 EQUAL = 10.0
-"""Explanations that leave up to so many times the error of the best one explain a body equally well."""
+"""Largest error of an explanation, relative to the best one, that explains a body equally well."""
 ROUND_OFF = 1e-8
 """Relative error that round-off may leave. Measured with planted mistakes: up to 4e-12."""
 

@@ -57,7 +57,7 @@ class Answer(Enum):
 
 
 class NoBody(Enum):
-    """Why accelerations are not those of a body."""
+    """Why no body has these accelerations."""
 
     NOT_FINITE = "accelerations that are not finite"
     NOT_RIGID = "its accelerations are those of no rigid body"
@@ -87,7 +87,7 @@ class LoadedBody:
     """The details of a finding: a body by the readers of its file, the reference reader first, and in an engine.
 
     A reading is a dictionary of mass, kg, centre of mass, m, and inertia, kg m^2, or why a reader has none. `flaw` says why no
-    body is like that of the file.
+    body can be like the body of the file.
     """
 
     subject: str
@@ -116,7 +116,7 @@ def verify_files(
     tell
         Is called with the share that is done and the next step.
     search
-        Folders of meshes and packages, next to that of the file.
+        Folders of meshes and packages, in addition to the folder of the file.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def verify_files(
 
 
 def _join(file: str, models: list[Model], loaded: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:
-    """Return the verification of a file from those of its bodies."""
+    """Return the verification of a file from the verifications of its bodies."""
     pairs = [pair for model in models for pair in loaded[model.label]]
     notes = [note if len(models) == 1 else f"{model.body.name}: {note}" for model in models for note in model.notes]
     findings = [finding for finding, _ in pairs]
@@ -210,7 +210,7 @@ def decide_body(model: Model, engine: str, seen: Piece | NoBody, tolerance: floa
 def find_warning(output: str, names: Sequence[str]) -> str:
     """Return the first sentence of an engine's output about mass or inertia; "" if it has none.
 
-    `names` are those of the file, which may have these words.
+    `names` are the names in the file, which may contain these words.
     """
     for name in sorted(names, key=len, reverse=True):
         output = output.replace(name, "...") if _ABOUT_MASS.search(name) else output
@@ -383,7 +383,7 @@ class Program:
             if not self.formats:
                 return self.worker.ask("call", **request, engine=self.engine, function="probe", cases=cases)
             result = self.worker.ask("load", **request, velocities=cases[:, 0], forces=cases[:, 1])
-        except EngineError as error:  # also at the first step
+        except EngineError as error:  # it can also fail at the first step
             return {"refused": error.reason}
         try:
             measured = np.asarray(result["accelerations"], float)

@@ -36,7 +36,7 @@ def _linear(w: Array, h: Array) -> Array:
     return np.stack([np.stack(row, -1) for row in rows], 1)
 
 
-def _map(w: Array, h: Array) -> Array:
+def _exponential(w: Array, h: Array) -> Array:
     """Return the matrices (n, 4, 4) of the exponential map."""
     angle = np.linalg.norm(w, axis=1) * h
     size = np.sinc(angle / (2 * np.pi))
@@ -61,12 +61,12 @@ def _in_place(w: Array, h: Array) -> Array:
 def _atan(w: Array, h: Array) -> Array:
     """Return the matrices (n, 4, 4) of a rotation by the arc tangent of the angle, to which R + h R [w] is repaired."""
     angle = np.linalg.norm(w, axis=1) * h
-    return _map(w * (np.arctan(angle) / np.where(angle == 0, 1.0, angle))[:, None], h)
+    return _exponential(w * (np.arctan(angle) / np.where(angle == 0, 1.0, angle))[:, None], h)
 
 
 UPDATES: dict[str, tuple[str, Callable[[Array, Array], Array]]] = {
     "attitude by normalisation": ("the first-order step q + h/2 q w, normalised,", _linear),
-    "attitude by rotation": ("a rotation", _map),
+    "attitude by rotation": ("a rotation", _exponential),
     "attitude in place": (
         "the first-order step of the quaternion, whose components are updated in place, one after another,",
         _in_place,
@@ -83,7 +83,9 @@ RATES: dict[str, tuple[str, Callable[[Array, Array], Array]]] = {
     "mean rates": ("by the mean of the rates of both ends (coning error)", lambda a, b: (a + b) / 2),
 }
 SHORT = {"attitude by rotation, old rates": "stale rates", "attitude by normalisation, new rates": "attitude by normalisation"}
+"""Keys that differ from update and rates."""
 IN_WORLD = ("attitude by normalisation", "attitude by rotation")
+"""Updates that programs also apply to the wrong side: with rates in body axes as if they were in world axes."""
 
 
 def _rule(update: str, rates: str, world: bool) -> Rule:
@@ -108,7 +110,7 @@ RULES = tuple(
 def integrate(rule: Effect, R0: Array, w: Array, h: Array, parts: int) -> Array:
     """Return attitudes (n, 3, 3) by a rule from the first, at every `parts`-th of the rates w (m, 3), rad/s, steps h, s."""
     matrices = rule(w[:-1], w[1:], h)
-    if matrices.shape[1] == 3:  # of rotation matrices, which are not repaired before they are compared
+    if matrices.shape[1] == 3:  # rotation matrices are repaired only when they are compared
         products = [R0]
         for matrix in matrices:
             products.append(products[-1] @ matrix)

@@ -91,7 +91,7 @@ def _other_angles(factor: float) -> Callable[[Links], Links]:
 
     def turn(pose: Array) -> Array:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of two axes that coincide
+            warnings.simplefilter("ignore")  # SciPy warns if two axes coincide
             angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
         return make_pose(pose[:3, 3], Rotation.from_euler("xyz", factor * angles))
 

@@ -22,8 +22,6 @@ class Habit(Mistake):
     ----------
     after
         From rates (..., 3) after a step, rad/s, body axes, and numbers to the rates that are kept.
-    holds
-        From rates and numbers to True where the body stands still from then on, its attitude included.
     guess
         From rates (n, 3) of a recording and rates before the change to the numbers, () if no row shows it. The rates before
         come from exact motions that start in the row before, or from the whole exact motion.
@@ -36,7 +34,10 @@ class Habit(Mistake):
 
 @dataclass(frozen=True)
 class Standstill(Mistake):
-    """The body stands still from a time on, which is found in each recording; `rest` is a factor of the rates from then on."""
+    """The body stands still from a time on, which is found in each recording.
+
+    `rest` is the factor of the rates from then on. `from_start` is True if the body never moves.
+    """
 
     kind: ClassVar[str] = "habits"
     rest: float
@@ -45,14 +46,14 @@ class Standstill(Mistake):
 
 @dataclass(frozen=True)
 class RowHabit(Mistake):
-    """A change of rows by a recorder: `change` returns the rows (n, ...) that are written for right ones.
+    """A change of some rows by a recorder.
 
     Attributes
     ----------
     change
         From right samples, the data, the rows that are off, and numbers to the rows that are written.
     periodic
-        True if each n-th row is off; False if the rows are off in which the quaternion, with a scalar that is not negative,
+        True if every n-th row is off; False if the rows are off in which the quaternion, with a scalar that is not negative,
         changes its sign.
     any
         True if the rows that are off may have any values.
@@ -78,12 +79,13 @@ def limit(w: Array, most: float) -> Array:
 
 
 def _equal(values: Array, most: float) -> Any:
+    """Return which values equal the largest to a part in 1,000, so that few digits in a file do not hide the limit."""
     return np.abs(values - most) <= 1e-3 * most
 
 
 def _guess_limit(sizes: Array, before: Array) -> tuple[float, ...]:
     """Return the largest size, if larger ones were cut to it in two or more rows."""
-    cut = (before > sizes * (1 + 1e-9)) & _equal(sizes, sizes.max())
+    cut = (before > sizes * (1 + 1e-9)) & _equal(sizes, sizes.max())  # larger by more than round-off
     return (float(np.median(sizes[cut])),) if cut.sum() >= 2 else ()
 
 
@@ -109,10 +111,11 @@ def roundest(low: float, high: float) -> float:
 
 
 def _held(right: States, data: States, off: Array) -> States:
-    return _every(right, off, lambda x: x[np.maximum.accumulate(np.where(off, 0, np.arange(len(off))))])
+    return _change_off_rows(right, off, lambda x: x[np.maximum.accumulate(np.where(off, 0, np.arange(len(off))))])
 
 
-def _every(right: States, off: Array, change: Callable[[Array], Array]) -> States:
+def _change_off_rows(right: States, off: Array, change: Callable[[Array], Array]) -> States:
+    """Return right samples, with the rows that are off changed."""
     R, w = (None if x is None else np.where(off.reshape(-1, *(1,) * (x.ndim - 1)), change(x), x) for x in right)
     return R, w
 
@@ -120,7 +123,7 @@ def _every(right: States, off: Array, change: Callable[[Array], Array]) -> State
 def _rolled(by: int) -> Callable[[States, States, Array], States]:
     def change(right: States, data: States, off: Array) -> States:
         R, w = right
-        return (None if R is None else _every((R, None), off, _roll)[0]), w
+        return (None if R is None else _change_off_rows((R, None), off, _roll)[0]), w
 
     def _roll(R: Array) -> Array:
         return from_quaternion(np.roll(to_quaternion(R), by, axis=-1))
@@ -130,12 +133,13 @@ def _rolled(by: int) -> Callable[[States, States, Array], States]:
 
 def _conjugated(right: States, data: States, off: Array) -> States:
     R, w = right
-    return _every((R, None), off, lambda x: np.swapaxes(x, -1, -2))[0], w
+    return _change_off_rows((R, None), off, lambda x: np.swapaxes(x, -1, -2))[0], w
 
 
 def _one_component(right: States, data: States, off: Array) -> States:
+    """Return right samples, with the file's first component in all three components of the rates that are off."""
     R, w = right[0], data[1]
-    return R, None if w is None else _every((None, right[1]), off, lambda _: np.repeat(w[:, :1], 3, axis=1))[1]
+    return R, None if w is None else _change_off_rows((None, right[1]), off, lambda _: np.repeat(w[:, :1], 3, axis=1))[1]
 
 
 def _unknown(right: States, data: States, off: Array) -> States:
@@ -186,31 +190,31 @@ STANDSTILLS = (
         1.0,
         numbers=(Number("time", unit="s"),),
     ),
-    Standstill("frozen motion", "The motion is frozen: attitude and rates are those of the start", 1.0, True),
+    Standstill("frozen motion", "The motion is frozen: attitude and rates stay as at the start", 1.0, True),
 )
 ROWS = (
-    RowHabit("held rows", "Each {period:.0f}. row repeats the one before, from row {first:.0f} on", _held),
+    RowHabit("held rows", "One in {period:.0f} rows repeats the one before, from row {first:.0f} on", _held),
     RowHabit(
         "order xyzw in some rows",
-        "Each {period:.0f}. row has the quaternion in the order xyzw, from row {first:.0f} on, the others wxyz",
+        "One in {period:.0f} rows has the quaternion in the order xyzw, from row {first:.0f} on, the others wxyz",
         _rolled(-1),
     ),
     RowHabit(
         "order wxyz in some rows",
-        "Each {period:.0f}. row has the quaternion in the order wxyz, from row {first:.0f} on, the others xyzw",
+        "One in {period:.0f} rows has the quaternion in the order wxyz, from row {first:.0f} on, the others xyzw",
         _rolled(1),
     ),
     RowHabit(
         "transposed in some rows",
-        "Each {period:.0f}. row has a transposed attitude, from row {first:.0f} on",
+        "One in {period:.0f} rows has a transposed attitude, from row {first:.0f} on",
         _conjugated,
     ),
     RowHabit(
         "one component in some rows",
-        "Each {period:.0f}. row has one number in all components of the rates, from row {first:.0f} on",
+        "One in {period:.0f} rows has one number in all components of the rates, from row {first:.0f} on",
         _one_component,
     ),
-    RowHabit("some rows", "Each {period:.0f}. row is off, from row {first:.0f} on; the others agree", _unknown, any=True),
+    RowHabit("some rows", "One in {period:.0f} rows is off, from row {first:.0f} on; the others agree", _unknown, any=True),
     RowHabit(
         "rates at sign changes",
         "The rates are spoiled in {rows:.0f} rows in which the quaternion changes its sign, the first of them row {first:.0f}",

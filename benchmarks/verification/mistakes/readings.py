@@ -16,13 +16,13 @@ from ..solution import States
 from .mistake import Mistake, Number
 
 Change = Callable[..., States]
-"""From attitudes (..., 3, 3), rates (..., 3), either of which may be None, and numbers to the same."""
+"""Takes attitudes (..., 3, 3) and rates (..., 3), one of which may be None, and numbers. Returns both changed."""
 ATTITUDES, RATES, AXES = "attitudes", "rates", "axes"
 
 
 @dataclass(frozen=True)
 class Reading(Mistake):
-    """Another reading: `read` returns the samples that were meant, `write` those in the recording.
+    """Another reading: `read` returns the samples that were meant, `write` the samples in the recording.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP @ R),
         ATTITUDES,
         of_world=True,
-        remedy="attitudes are relative to W, whose third axis is up",
+        remedy="write attitudes relative to W, whose third axis is up",
     ),
     Reading(
         "world turned the wrong way",
@@ -132,7 +132,7 @@ READINGS = (
         attitude(lambda R: TO_Y_UP.T @ R),
         ATTITUDES,
         of_world=True,
-        remedy="attitudes are relative to W, whose third axis is up",
+        remedy="write attitudes relative to W, whose third axis is up",
     ),
     Reading(
         "axes y up",
@@ -149,7 +149,7 @@ READINGS = (
         to_world,
         RATES,
         both=True,
-        remedy="`w` is in F, `w_W` is in W",
+        remedy="answer rates in F as `w`, or in W as `w_W`",
         option="--rates world",
     ),
     Reading(
@@ -159,7 +159,7 @@ READINGS = (
         to_body,
         RATES,
         both=True,
-        remedy="`w` is in F, `w_W` is in W",
+        remedy="answer rates in F as `w`, or in W as `w_W`",
         option="--rates body",
     ),
     Reading(

@@ -20,8 +20,10 @@ from conservative.scene import Scene
 from .mistake import Mistake, Number
 from .readings import TO_Y_UP
 
-GRAVITY = 9.81  # m/s^2, of programs that get a weight
-SMALLEST = 1e-6  # kg m^2, as engines have it
+GRAVITY = 9.81
+"""Acceleration, m/s^2, with which a weight is a mass."""
+SMALLEST = 1e-6
+"""Smallest principal moment of some engines, kg m^2."""
 Change = Callable[..., Scene | None]
 """From a scene and numbers to the one that was simulated; None if it is the same, or if there is none."""
 
@@ -197,9 +199,9 @@ SCENES = (
     ),
     SceneMistake(
         "moments about the centre of mass",
-        "The principal moments about the centre of mass are used for those about the fixed point",
+        "The principal moments about the centre of mass are used as the moments about the fixed point",
         _central_moments,
-        numbers=(Number("mass share", 15 / 16),),  # of the bodies that PROTOCOL.md describes
+        numbers=(Number("mass share", 15 / 16),),  # the share of bodies in PROTOCOL.md
         remedy="`moments` are about the fixed point",
     ),
     SceneMistake(

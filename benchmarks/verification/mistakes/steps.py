@@ -25,6 +25,9 @@ from conservative.methods.coefficients.explicit import (
 from ..solution import cross
 from .mistake import Mistake, Number
 
+MOST_ITERATIONS = 60
+"""Largest number of fixed-point iterations of an implicit step, which usually end at round-off."""
+
 Slope = Any
 """The derivative of states (7, ...) at a time or times, s, with an attribute `body`, and `rates` of times and states."""
 
@@ -42,7 +45,7 @@ def _product(p: Array, q: Array) -> Array:
 
 
 def _split_step(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], rates: int, use: str, exact: bool) -> Array:
-    """Return the state after rates with so many corrections of their torque, then attitudes by old, new or mean rates."""
+    """Return the state after rates with up to `rates` corrections of their torque, then attitudes by old, new or mean rates."""
     new = y.copy()
     for _ in range(rates):
         before = new[4:].copy()
@@ -91,7 +94,7 @@ def _rates(turn: Array, w: Array) -> Array:
 def _vector_rates(turn: Array, w: Array) -> Array:
     """Return the derivatives of rotation vectors (3, ...) for rates in body axes."""
     angle = np.sqrt((turn * turn).sum(axis=0))
-    small = angle < 1e-2
+    small = angle < 1e-2  # the series is accurate to round-off there, and the quotient is not
     half = np.where(small, 1.0, angle / 2)
     factor = np.where(small, 1 / 12 + angle**2 / 720, (1 - half / np.tan(half)) / np.where(small, 1.0, angle**2))
     across = cross(turn, w)
@@ -101,7 +104,7 @@ def _vector_rates(turn: Array, w: Array) -> Array:
 def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: float) -> Array:
     """Return the state of implicit Euler (at = 1) or of the implicit midpoint rule (at = 1/2)."""
     stage = y
-    for _ in range(60):
+    for _ in range(MOST_ITERATIONS):
         new = y + at * h * f(t + at * h, stage)
         if np.abs(new - stage).max() <= 2e-16 * np.abs(y).max():
             break
@@ -111,7 +114,7 @@ def _implicit(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], at: f
 
 def _trapezoid(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
     new, slope = y, f(t, y)
-    for _ in range(60):
+    for _ in range(MOST_ITERATIONS):
         before, new = new, y + h / 2 * (slope + f(t + h, new))
         if np.abs(new - before).max() <= 2e-16 * np.abs(y).max():
             break
@@ -151,7 +154,7 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     k, w, e, J = f(t, y), f.rates(t, y), 1e-5 * h, f.body.inertia
     slope = (f.rates(t + e, y + e * k) - f.rates(t - e, y - e * k)) / (2 * e)
     turn = h * w + h * h / 2 * slope + h**3 / 12 * cross(slope, w)  # w' x w has the same components in world and body axes
-    if order == 3:  # and w'' is w'' + w x w' in body axes
+    if order == 3:  # w'' in world axes is w'' + w x w' in body axes
         turn = turn + h**3 / 6 * ((f(t + e, y + e * k) - f(t - e, y - e * k))[4:] / (2 * e) + cross(w, slope))
     rotor = np.zeros(3) if f.body.rotor_momentum is None or f.body.motor else f.body.rotor_momentum
     L = (J @ y[4:].reshape(3, -1) + rotor[:, None]).reshape(w.shape)

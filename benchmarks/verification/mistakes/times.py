@@ -126,7 +126,7 @@ TIMES = (
 )  # fmt: skip
 DROPPED = RowTimes(
     "dropped rows",
-    "Rows are missing: {rows:.0f}, the first before {at:.6g} s, and the times are those of a file without gaps",
+    "Rows are missing: {rows:.0f}, the first before {at:.6g} s, and the times have no gaps there",
 )
 JITTERED = RowTimes(
     "jittered times",

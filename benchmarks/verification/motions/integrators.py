@@ -207,7 +207,7 @@ def turned_tableau(
 
 
 def semi_implicit(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], use: str, exact: bool, sweeps: int = 1) -> Array:
-    """Rates with so many corrections of their torque, then the attitude with old, new or mean rates."""
+    """Rates with some corrections of their torque, then the attitude with old, new or mean rates."""
     v, end = y[f.n :], y
     for _ in range(sweeps):
         end = np.concatenate([y[: f.n], v + h * f(t, end)[f.n :]])
@@ -258,7 +258,8 @@ def adams(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
     return y + h * f(t, y) if not past else y + h * (3 * f(t, y) - f(t - h, past[0])) / 2
 
 
-KICKS = 12  # iterations, each of which multiplies the error by h D / 2, at most 0.03 here
+KICKS = 12
+"""Number of iterations of a kick. Each multiplies the error by h D / 2, at most 0.03 here."""
 
 
 def splitting(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:

@@ -20,7 +20,10 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.exact.digits import MP_LOCK, mp
 from conservative.scene import Scene
 
-GRAVITY, TERMS, BITS, ANGLE = 9.81, 60, 200, 0.2  # m/s^2; of a Taylor series, its precision, and its step, rad
+GRAVITY = 9.81
+"""Acceleration, m/s^2, with which a weight is a mass."""
+TERMS, BITS, ANGLE = 60, 200, 0.2
+"""The exact motion: terms of its Taylor series, bits of its numbers, and length of its steps, rad."""
 KINDS = {"rotor_momentum_B": "rotor", "torque_B": "torque", "torque_W": "torque", "damping": "damping",
          "weight": "fixed point", "orbit": "orbit"}  # fmt: skip
 """The feature of a motion by its key; a motion without any of them is free."""

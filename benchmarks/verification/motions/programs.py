@@ -16,7 +16,8 @@ from conservative.grid import Grid
 from .integrators import designs
 from .motion import Motion
 
-ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)  # declared orders; |w| h, and steps in 0.1 rad
+ORDERS, ANGLES, PARTS = (1, 2, 4), (0.1, 0.03, 0.01), (1, 3, 10)
+"""Declared orders and steps that have tolerances: orders; |w| h, rad; and the number of these steps in 0.1 rad."""
 LEAST = {1: 1e-6, 2: 1e-6, 4: 1e-10}
 """Errors that are allowed in addition, by order: implicit steps are iterated to a tolerance."""
 MARGIN = 2.0
@@ -50,7 +51,7 @@ def measure(motions: Sequence[Motion], parts: Sequence[int] = PARTS) -> list[Mea
 
 
 def single(motion: Motion) -> float:
-    """Return what single precision may add to errors: rounding of each step.
+    """Return the error that single precision may add: rounding of each step.
 
     It is larger if a momentum is, from which rates are computed: with a rotor, or a moment that is small.
     """

@@ -54,6 +54,7 @@ def names() -> dict[str, str]:
 
 
 def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
+    """Yield the name of each signature, its mistake and the numbers of the mistake."""
     for key, mistake in BY_KEY.items():
         of_program = isinstance(mistake, Reading | Time | SceneMistake | EquationsMistake | Habit | Standstill | Rule)
         if not of_program or key in NOT_OF_PROGRAMS or (isinstance(mistake, Time) and not mistake.of_step):

@@ -34,7 +34,7 @@ def _without_fields() -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """A body, its start and its steps, as an engine is given them.
+    """A body, its start and its steps, as an engine gets them.
 
     Attributes
     ----------
@@ -157,7 +157,8 @@ class Pair:
         return self.exact and not self.scales and not self.variant
 
 
-TURN = rotation_about((0, 0, 1), 2.1)  # about the vertical, so that it does not change the weight
+TURN = rotation_about((0, 0, 1), 2.1)
+"""About the vertical, so that it does not change the weight."""
 OTHER = rotation_about((0.3, -0.5, 0.8), 1.3)
 CYCLE = np.roll(np.eye(3), 1, axis=0)
 MIRROR = np.diag((1.0, -1.0, 1.0))

@@ -29,7 +29,7 @@ RUN_LIMIT = 60.0
 START_LIMIT = 600.0
 """Time limit of a run of our own methods in a new process, s, which may compile all kernels."""
 HANGS = 2
-"""After so many runs without an end, an engine is not run any more: each trial of a reduction could take the limit."""
+"""Number of runs without an end after which an engine is not run any more: each trial of a reduction could take the limit."""
 ENDLESS = f"the run had not ended after {RUN_LIMIT:g} s"
 FEW = 4
 """Fewer numbers that are not 0 show no resolution."""
@@ -219,6 +219,7 @@ def find_digits(values: Array) -> Digits:
         single = any(len(part) > 2 and _written(part.astype(np.float32), PROBE) == _written(part, PROBE) for part in parts)
     if len(both) < FEW or single:
         return Digits(single)
+    # A double that is not rounded has 15 digits or more.
     significant = next((n for n in range(3, 15) if all(float(f"{x:.{n}g}") == x for x in both)), 0)
     decimals = next((n for n in range(3, 15) if all(round(x, n) == x for x in both)), 0)
     return Digits(False, significant, decimals)

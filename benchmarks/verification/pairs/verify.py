@@ -218,7 +218,7 @@ class Apart:
 LOST = Apart(math.nan, math.nan)
 """Nothing can be compared: the first motion ends early or gains energy, and the second one may."""
 WILD = 100.0
-"""A motion is lost if its rates exceed so many times the largest one at the start."""
+"""Largest rate of a motion that is not lost, relative to the largest one at the start."""
 GAIN = 0.5
 """Share of its energy that a motion may gain; otherwise the step is too long, and a lost second motion shows nothing."""
 
@@ -264,7 +264,7 @@ def _apart(engine: Engine, pair: Pair, description: Description, scale: float | 
         return Apart(apart)
     if engine.runner.digits:
         allowed += DIGITS * max(engine.runner.digits.resolution(motion) for motion in (samples, raw))
-    if pair.variant == "time":  # which is rounded, and so is each step
+    if pair.variant == "time":  # a large time is rounded, and so is each step
         allowed += 4 * np.finfo(float).eps * LATER * float(np.linalg.norm(description.w0)) * description.n_steps
     if allowed < 10 * apart and pair.variant in OF_INERTIA:
         allowed = max(allowed, engine.rounding(second, raw))
@@ -337,7 +337,7 @@ class _Pair:
                 return math.isinf(seen.value) if lost else seen.wrong
             return False
 
-        def stays(candidate: Description) -> bool:  # with shorter steps
+        def stays(candidate: Description) -> bool:  # with shorter steps, the pair still differs
             if lost or (pair.exact and not pair.scales):
                 return True
             with suppress(FirstFailed, NotAvailable, IntegrationFailed):
@@ -360,7 +360,7 @@ class _Pair:
         return self.wrong(apart, first, motion, threshold)
 
     def wrong(self, apart: Apart, first: Description, motion: str, threshold: str = "") -> PairFinding:
-        """Return the finding on a pair that differs, with what repeats it."""
+        """Return the finding on a pair that differs, with the data that repeats it."""
         size = f"{apart.value / apart.allowed:.2g} times the allowed difference" if apart.allowed else "not the same bits"
         detail = "; ".join(filter(None, (threshold, "" if math.isinf(apart.value) else size, motion)))
         relation = Relation.CRASHES if apart.crashed else Relation.DIFFERS

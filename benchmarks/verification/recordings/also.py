@@ -11,18 +11,19 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 
-from ..compare import UNITS_OF_DIGITS
+from ..compare import FLOOR, UNITS_OF_DIGITS
 from .attitudes import to_matrices
 from .digits import TURNS, find_quantum
 from .layout import ATTITUDES, Layout, Options
 
-TRIED = 200  # rows on which readings are tried
+TRIED = 200
+"""Number of rows on which readings are tried."""
 SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
 
 
 @dataclass(frozen=True)
 class Other:
-    """Attitudes in other columns: their names, the largest angle to those that are compared, rad, and their rounding, rad."""
+    """Attitudes in other columns: their names, the largest angle to the compared ones, rad, and their rounding, rad."""
 
     names: Sequence[str]
     difference: float
@@ -30,11 +31,11 @@ class Other:
 
     def allowed(self, digits: float) -> float:
         """Return the angle, rad, that the rounding of both allows; `digits` is the rounding of attitudes that are compared."""
-        return 1e-9 + UNITS_OF_DIGITS * (self.digits + digits)
+        return FLOOR + UNITS_OF_DIGITS * (self.digits + digits)
 
     @property
     def text(self) -> str:
-        """What they are."""
+        """Text on the difference, for a sentence."""
         return f"another attitude (by {self.difference:.2g} rad)" if math.isfinite(self.difference) else "no attitudes"
 
 

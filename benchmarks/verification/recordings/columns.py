@@ -61,7 +61,7 @@ SHORT = {"time": "time", "rates": "w", "quaternion": "q", "matrix": "R", "angles
 
 
 def choose(path: Path, layout: Layout, options: Options) -> Layout:
-    """Find the columns of each quantity that the file has, and the sizes of their units; give a reason for every other one."""
+    """Find the columns of each quantity in the file, and the sizes of their units; give a reason for every unused column."""
     names = layout.names
     if len(names) > MOST_COLUMNS:
         raise BadInput("run", f"{path} with {len(names)} columns", f"a table of at most {MOST_COLUMNS} columns")
@@ -129,7 +129,7 @@ def _find_looks(layout: Layout) -> list[str]:
 
 
 def _leave_moving(layout: Layout, chosen: dict[str, list[str]], options: Options) -> None:
-    """Leave out attitudes relative to a frame that moves, and say so."""
+    """Leave out attitudes relative to a frame that moves, with the reason."""
     horizon = any(_HORIZON.search(split_name(name)[0]) for name in layout.names)
     for kind in ATTITUDES.keys() & chosen.keys():
         members, reason = chosen[kind], ""
@@ -186,7 +186,7 @@ def _choose_time(layout: Layout, split: Mapping[str, str], matches: Sequence[str
 
     def rank(name: str) -> tuple[bool, bool, bool, int, int]:
         key = split[name]
-        stamped = key.endswith("headerstamp")  # of the measurement, and not of its arrival
+        stamped = key.endswith("headerstamp")  # the time of the measurement, and not of its arrival
         return key != "secondselapsed", not stamped, name.strip() == "T", len(key), order.get(key, 3)  # T: a temperature
 
     times = sorted(matches, key=rank)
@@ -228,15 +228,13 @@ def _by_name(path: Path, layout: Layout) -> dict[str, list[str]]:
             offered = " or ".join(f"--columns {short}={':'.join(members)}" for members in full.values())
             raise BadInput("run", f"{path} with several sets of {kind}: {'; '.join(map(', '.join, full.values()))}", offered)
         for prefix, members in full.items():
+            # Names such as orientation_xyzw_0 number the components, scalar last.
             numbered = prefix.endswith("xyzw") and not split_name(members[0])[0].endswith("w")
             chosen[kind] = [*members[-1:], *members[:-1]] if numbered else members
     place = {split[name]: name for name in names}
-    for joint, skip in (
-        ("qvel", 3),
-        ("qvel", 0),
-    ):  # MuJoCo: a free joint has seven positions and six rates, a ball four and three
+    for skip in (3, 0):  # MuJoCo: a free joint has seven positions and six rates, a ball joint four and three
         positions = [place.get(f"qpos{i}", "") for i in range(skip, skip + 4)]
-        rates = [place.get(f"{joint}{i}", "") for i in range(skip, skip + 3)]
+        rates = [place.get(f"qvel{i}", "") for i in range(skip, skip + 3)]
         if all(positions + rates) and f"qpos{skip + 4}" not in place and f"qvel{skip + 3}" not in place:
             chosen |= {"rates": rates, "quaternion": positions}
             break

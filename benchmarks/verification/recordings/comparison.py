@@ -15,6 +15,7 @@ from conservative.features import IN_TIME
 from conservative.scene import Scene
 
 from ..compare import (
+    FEWEST_FOR_NOISE,
     FLOOR,
     HOPELESS,
     NUMERICAL,
@@ -32,11 +33,18 @@ from ..compare import (
 from ..solution import States, closed, truth
 from .table import Recording
 
-MOST_NOISE = 0.05  # of the largest rate, or rad; what is more is motion
-ROUND_OFF = 2e-15  # of an exact motion
-ROWS_OF_NOISE = 4000  # rows that noise is estimated from
-CLEARLY = 2.0  # times what is allowed, that half of the single rows that are off have as their error
-QUARTER = math.pi / 2  # rad from row to row, above which differences of high order of a motion do not fall
+MOST_NOISE = 0.05
+"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
+ROUND_OFF = 2e-15
+"""Error of an exact motion, rad."""
+ROWS_OF_NOISE = 4000
+"""Largest number of rows from which noise is estimated."""
+CLEARLY = 2.0
+"""Smallest median error of single rows that are off, in allowed errors."""
+MOST_PARTS = 200
+"""Largest number of parts of a recording that are compared one after another."""
+QUARTER = math.pi / 2
+"""Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,13 +157,14 @@ def _find_noise(
     resolved: Any
     other: Any
     noise, resolved = estimate_noise(t, data)
-    if (SIGMAS * noise / sizes > digits).any() and len(t) >= 14:
+    if (SIGMAS * noise / sizes > digits).any() and len(t) >= FEWEST_FOR_NOISE:
         n = len(t) if closed(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
             motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
+            # The estimate from the exact motion contains no noise. An estimate that is clearly larger is noise.
             resolved &= (motion < 0.3 * noise) | (noise < TINY)
             apart = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
             better = apart & (~resolved | (other[0] < noise))
@@ -237,7 +246,7 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
                 fitted = min(fitted, extended, key=lambda part: part.size(part.error))
             part = min(part, fitted, key=lambda candidate: candidate.size(candidate.error))
         parts.append(part)
-        if end >= len(rest.t) or len(parts) > 200 or not part.passes(part.error):
+        if end >= len(rest.t) or len(parts) > MOST_PARTS or not part.passes(part.error):
             break
         rest = rest.take(slice(end, None))
         changes = {name: x[0] for name, x in zip(("R_WB0", "w_WB_B0"), rest.data, strict=True) if x is not None}
@@ -309,14 +318,15 @@ def _compare_all(
 def _late(case: Compared) -> bool:
     """Return whether errors that pass as noise lie along the motion, as errors of times do: noise has all directions."""
     (R, w), n = case.exact, len(case.t)
-    if n < 14 or (case.error.max(axis=1) <= np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))).all():
+    if n < FEWEST_FOR_NOISE or (case.error.max(axis=1) <= np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))).all():
         return False
     turned = (R @ hat(w)).reshape(n, 9) / np.sqrt(2) * (case.data[0] is not None)
     moved = np.gradient(w, case.t, axis=0) / case.scale * (case.data[1] is not None)
     weights = 1 / np.repeat(case.noise, [9, 3])
     v, d = np.hstack([turned, moved]) * weights, case.differences(R, w) * weights
     v = v / (np.linalg.norm(v, axis=1, keepdims=True) + 1e-300)
-    varied = np.linalg.eigvalsh(v.T @ v / n)[-1] < 0.9  # of a motion in one direction nothing can be told
+    varied = np.linalg.eigvalsh(v.T @ v / n)[-1] < 0.9  # a motion in one direction shows nothing
+    # Noise has a third of its square along one of three directions, errors of times have nearly all.
     return bool(varied and ((d * v).sum(axis=1) ** 2).sum() > 0.8 * (d * d).sum())
 
 

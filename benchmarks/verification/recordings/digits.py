@@ -21,6 +21,7 @@ def find_digits(raw: Array, layout: Layout) -> tuple[float, float, float]:
     """Return the largest round-off of times, s, attitudes, rad, and rates, rad/s, that the digits of rows stand for."""
     count = 1 + len(layout.used["rates"])
     t, gaps = raw[:, 0], np.diff(raw[:, 0])
+    # Equal gaps up to round-off: the times are exact, whatever their digits.
     uniform = np.ptp(gaps) <= 8 * np.spacing(np.abs(t).max()) if len(gaps) else True
     off = t - np.rint((t - t[0]) / gaps.min()) * gaps.min() - t[0]
     time = 0.0 if uniform else min(find_quantum(t[:, None]), float(np.abs(off).max()))
@@ -37,7 +38,7 @@ def find_quantum(values: Array) -> float:
     largest = min(float(sizes.max()), OUTLIER * float(np.median(sizes))) if sizes.size else 1.0
     x = np.unique(values[:: max(1, len(values) // 500)])
     x = x[np.abs(x) >= SMALLEST]
-    if len(x) < 5:  # of a constant nothing can be learned
+    if len(x) < 5:  # a constant does not show digits
         return largest * 2.0**-53
     near, half, unit = 4 * np.spacing(np.abs(x)), 0.0, np.zeros_like(x)
     exponent, whole = np.floor(np.log10(np.abs(x))), math.floor(math.log10(largest))

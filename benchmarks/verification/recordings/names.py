@@ -19,7 +19,8 @@ UNITS = {
     | dict.fromkeys(("ns", "nsec"), 1e-9),
 }
 """Units in rad, s and rad/s by their names, lower case."""
-LONGEST_NAME = 200  # letters of a name with a meaning
+LONGEST_NAME = 200
+"""Longest name that is searched for a meaning, characters."""
 _SUFFIX = r"[_-](deg_s|rad_s|deg_sec|rad_sec|dps|rpm|degrees|deg|radians|rad|seconds|msec|usec|nsec|ms|us|ns|s)(?=_|$)"
 _SPOKEN = ((r"^(roll|pitch|yaw)(?:speed|rate)$", r"rate\1"), (r"^heading$", "yaw"), (r"^bank$", "roll"))
 

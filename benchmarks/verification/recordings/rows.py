@@ -23,12 +23,13 @@ _WRAPS = tuple(
     sorted(size * unit for size, unit in product((2.0**16, 2.0**24, 2.0**31, 2.0**32), (1.0, 1e-3, 1e-6, 1e-9)))
 ) + tuple(size * unit for size, unit in product((86_400.0, 604_800.0), (1.0, 1e3, 1e6, 1e9)))
 """Lengths after which counters, and times of a day or a week, begin again."""
-SHORT = 3.0  # typical gaps, that a row after a wrap is later than the row before
+SHORT = 3.0
+"""Largest time between the rows before and after a counter begins again, in typical gaps."""
 
 
 @dataclass
 class Cleaner:
-    """Leaves rows out, chunk by chunk, and refuses rows that cannot be used. It counts what it leaves out.
+    """Leaves rows out, chunk by chunk, counts them, and refuses rows that cannot be used.
 
     `wraps` is the number of steps back of a counter, `ended` the number of rows without numbers at the end.
     """
@@ -98,10 +99,11 @@ class Cleaner:
         return values, numbers
 
     def bad(self, values: Array) -> dict[str, Array]:
-        """Return for each reason why a row (n, width) has no motion the rows of which it holds (n,)."""
+        """Return masks (n,) of the rows (n, width) without a motion, by the reason."""
         rest, kind = values[:, 1 + len(self.layout.used["rates"]) :], self.layout.attitude
         none = np.zeros(len(values), bool)
         with np.errstate(all="ignore"):
+            # 1e-3: rounding does not change a norm or a determinant of 1 so much.
             bad: dict[str, Any] = {
                 "a value that is not a finite number": ~np.isfinite(values).all(axis=1),
                 f"a value beyond {LARGEST:g}": (np.abs(values) > LARGEST).any(axis=1),
@@ -122,7 +124,7 @@ class Cleaner:
                 raise BadInput("run", f"{self.path}, row {numbers[at]}{where}: {what}", allowed)
         before = self.last[0] if self.last.size else -math.inf
         if (late := np.diff(values[:, 0], prepend=before) <= 0).any():
-            got = f"{self.path}, row {numbers[int(np.argmax(late))]}: a time that is not later than that of the row before"
+            got = f"{self.path}, row {numbers[int(np.argmax(late))]}: a time that is not later than the time of the row before"
             raise BadInput("run", f"{got}, in column {names[0]}", f"{allowed}, or --columns with another time")
 
     @property

@@ -26,7 +26,8 @@ from .layout import Layout, Options
 from .rows import Cleaner
 from .units import find_units, guess_time
 
-ROWS = 2000  # rows that are kept for fits, evenly chosen: this to twice as many
+ROWS = 2000
+"""Smallest number of rows that are kept for fits, evenly chosen; up to twice as many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Recording:
         return int(row) + 1 if self.numbers is None else int(self.numbers[row])
 
     def doubt(self, error: float | None) -> str:
-        """Return the sentence on parts of the file that were not compared, or that differ from those that were; or ""."""
+        """Return the sentence on parts of the file that were not compared, or differ from the compared ones; "" without any."""
         if self.ended:
             return f"The last {self.ended} rows have no numbers, so the file does not show the end of its motion"
         for other in self.others:
@@ -132,6 +133,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
             find_units(path, values[usable, :width], layout, options)
             first = False
         values, at = cleaner.choose(values, at)
+        # Every `every`-th row of the file, counted over all chunks.
         kept.append(values[-rows % every :: every])
         numbers.append(at[-rows % every :: every])
         rows += len(values)

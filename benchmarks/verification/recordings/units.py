@@ -34,7 +34,7 @@ def guess_time(values: Array, layout: Layout) -> None:
     if more:  # seconds and their fractions: the sum would lose digits
         layout.origin = math.floor(values[0, 0]) if values[0, 0] > 1e6 else 0.0
         layout.notes += [f"Times are from {layout.origin:.0f} s on."] * bool(layout.origin)
-    elif size == 1.0 and split_name(name)[1] is None and values[0, 0] > 1e11:
+    elif size == 1.0 and split_name(name)[1] is None and values[0, 0] > 1e11:  # 1e11 s is the year 5138
         power = 3 * int(1 + (values[0, 0] > 1e14) + (values[0, 0] > 1e17))
         layout.used["time"] = {name: 10.0**-power}
         layout.notes.append(f"{name} is read as a time since 1970 in 1e-{power} s, because of its size.")
@@ -45,6 +45,7 @@ def find_units(path: Path, values: Array, layout: Layout, options: Options) -> N
     parts, some, (time, *_) = layout.used, values[:400], layout.used["time"]
     open_ = [kind for kind, part in parts.items() if any(map(math.isnan, part.values()))]
     turns = some[:, 1 + len(parts["rates"]) :]
+    # Rotation vectors of up to a revolution are in rad: in degrees they would all be tiny.
     short = layout.attitude == "rotation vector" and np.linalg.norm(turns, axis=1).max() < 2.1 * math.pi
     usual = [1.0 if short and kind == layout.attitude else _usual(parts[kind]) for kind in open_]
     expected = (parts["time"][time], *usual)
@@ -63,6 +64,7 @@ def find_units(path: Path, values: Array, layout: Layout, options: Options) -> N
         off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
         ranked.append((min(off), sizes))
     ranked.sort()
+    # One choice agrees, and all others clearly do not.
     if len(ranked) > 1 and ranked[0][0] < 0.1 and ranked[1][0] > 0.5:
         for kind, size, usual_size in zip(("time", *open_), ranked[0][1], expected, strict=True):
             if size != usual_size:

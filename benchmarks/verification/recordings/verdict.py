@@ -17,7 +17,7 @@ from conservative.number_text import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..compare import SIGMAS, UNITS_OF_DIGITS, Compared
+from ..compare import FEWEST_FOR_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
@@ -25,10 +25,13 @@ from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .table import Recording
 
-ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4  # errors that a good solver may leave, in double and in single precision
-SHAPE = 1e-6  # departure from a rotation that a good solver may leave
+ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
+"""Errors that a good solver may leave, in double and in single precision."""
+SHAPE = 1e-6
+"""Departure from a rotation that a good solver may leave."""
 UNITS = "rad", "of the largest rate"
-FAR = 0.05  # rad, or of the largest rate: of another motion
+FAR = 0.05
+"""Error, rad or relative to the largest rate, above which a motion is a different one."""
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
@@ -184,6 +187,7 @@ def verify_recording(
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
+    # With noise, the fit shows how well the recording determines the moments.
     if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
         tell("moments")
         fit = fit_moments(case)
@@ -248,7 +252,7 @@ def _cause(explanation: Explanation, worse: int) -> Cause:
 
 
 def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -> str:
-    """Return what decides the verdict: the errors, what is allowed, and the mistakes with what they leave."""
+    """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
     decided = [
@@ -277,13 +281,17 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
     """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
-    single = max(recording.digits[1:]) > 1e-9
+    single = max(recording.digits[1:]) > 1e-9  # fewer than nine digits
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
             f"The error is larger than the digits of the file allow, and as small as the error of a good solver in "
             f"{'single' if single else 'double'} precision. An allowed error decides: --error"
         )
-    if not resolved[[x is not None for x in case.data]].all() and errors.max() <= 2 * MOST_NOISE and len(case.t) >= 14:
+    if (
+        not resolved[[x is not None for x in case.data]].all()
+        and errors.max() <= 2 * MOST_NOISE
+        and len(case.t) >= FEWEST_FOR_NOISE
+    ):
         d = case.differences(*case.exact)
         lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
         if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
@@ -330,9 +338,8 @@ def _instability(comparison: Comparison) -> list[str]:
 def _drifts(case: Compared, from_row: bool) -> dict[str, Array]:
     """Return the drifts (n,) of the invariants that the data determine. Balances also need the work of the loads."""
     (R, w), drifts = case.data, dict[str, Array]()
-    energy = (
-        None if case.scene.potential else find_energy(case.scene.invariants)
-    )  # rates alone determine the energy of a free body
+    # Rates alone determine the energy of a free body.
+    energy = None if case.scene.potential else find_energy(case.scene.invariants)
     for invariant in case.scene.invariants if w is not None else ():
         if w is not None and invariant.supplied is None and (R is not None or invariant is energy):
             R_WB = np.broadcast_to(np.eye(3), (len(w), 3, 3)) if R is None else R

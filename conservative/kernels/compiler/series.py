@@ -239,7 +239,7 @@ class Series:
         zero = Symbol(builder, [ir.Constant(memory.register, [0.0] * memory.register.count)])
         starts = [(zero,) * width if total is None else total for (total,), width in zip(totals, widths, strict=True)]
         places = sums[0][0][0].places
-        step = places[2][0] - places[1][0]  # of all histories: the same values are stored for every order
+        step = places[2][0] - places[1][0]  # the same in all histories, which store the same values for every order
         # A loop with a constant end is unrolled, and a step of order 12 or 16 then takes 1.3 to 1.4 times as long.
         end = hide(builder, memory.count_bytes(n * step))
         before, body = builder.block, builder.append_basic_block(f"loop_{n}")

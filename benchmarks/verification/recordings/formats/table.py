@@ -18,10 +18,14 @@ from conservative.attitude import Array
 from conservative.errors import BadInput
 from conservative.files import open_file
 
-CHUNK = 50_000  # rows that are read at a time
-LOOKED = 200  # lines among which the header and the first row of numbers are
-LONGEST = 1_000_000  # characters of a line, and of the lines that are looked at
-AT_ONCE = 64 * LONGEST  # characters that are read at a time
+CHUNK = 50_000
+"""Number of rows that are read at a time."""
+LOOKED = 200
+"""Number of lines in which the header and the first row of numbers are searched."""
+LONGEST = 1_000_000
+"""Largest length of a line, and of the `LOOKED` lines together, characters."""
+AT_ONCE = 64 * LONGEST
+"""Largest number of characters that are read at a time."""
 UNREADABLE = OSError, ValueError, TypeError, RecursionError
 """Errors of files that cannot be read, and of values such as JSON in a thousand brackets."""
 
