@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import BadInput
+from .errors import BadInput, require_extra
 from .posix import is_own
 from .toml_reader import read
 
@@ -62,7 +62,8 @@ def _is_trusted(file: Path) -> bool:
 
 
 def user_file() -> Path:
-    """Return the user's file, which may not exist. It needs platformdirs."""
+    """Return the user's file, which may not exist. Raise `MissingExtra` without platformdirs."""
+    require_extra("An engine or a program in a process of its own", "environments", "platformdirs")
     from platformdirs import user_config_path
 
     return user_config_path("conservative-rotation") / "conservative.toml"

@@ -1,6 +1,8 @@
 """Without extras the package integrates, and errors name the extra that provides a missing package."""
 
+import sys
 from importlib.metadata import packages_distributions
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,3 +113,12 @@ def test_the_gate_needs_no_table_library():
     gate = "import conservative.benchmarks.suite.test_speed, conservative.reports.cli.gate, conservative.reports.cli.main"
     code, _, error = run_python(REFUSE + gate, "pandas,altair,vl_convert,jinja2,rich,mujoco,pinocchio")
     assert code == 0, error
+
+
+@pytest.mark.slow
+def test_a_program_that_cannot_be_run_without_an_extra_is_not_wrong():
+    program = Path(__file__).parent / "references" / "programs" / "engine.py"
+    arguments = ["verify", f"{sys.executable} {program}", "--only", "protocol"]
+    code, out, error = run_python(REFUSE + LOOK + COMMAND, "platformdirs", *arguments)
+    assert (code, out) == (2, ""), error
+    assert "pip install 'conservative-rotation[environments]'" in error

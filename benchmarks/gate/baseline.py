@@ -136,9 +136,12 @@ def _measure(name: str, rows: Sequence[Row]) -> Allowed:
     values = [row.values[name] for row in rows]
     if not all(math.isfinite(value) for value in values):
         raise BadInput("results", f"{name} = {values} of {rows[0].id}", "finite values: NaN is not accepted")
+    spreads = [row.spreads.get(name, 0.0) for row in rows]
+    if not all(0 <= spread < math.inf for spread in spreads):
+        raise BadInput("results", f"spreads {spreads} of {name} of {rows[0].id}", "finite spreads of 0 or more")
     if runaway := find_runaway({name: max(values)}):
         raise BadInput("results", f"{rows[0].id}, whose {runaway}", "runs that keep their energy: a failure is not accepted")
-    spread = max(max(row.spreads.get(name, 0.0) for row in rows), max(values) - min(values))
+    spread = max(*spreads, max(values) - min(values))
     value = statistics.median(values)
     return Allowed(value, spread, len(values), limit(name, value, spread))
 

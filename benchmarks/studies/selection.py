@@ -111,7 +111,7 @@ def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
 
 def bits_of(method: Method) -> int:
     """Return the bits of the numbers of a method: 64 for double precision, 32 for single."""
-    return {"f64": 64, "f32": 32}[getattr(method, "precision", "f64")]
+    return 32 if getattr(method, "precision", "f64") == "f32" else 64
 
 
 def tolerance_setting(method: Method) -> str | None:

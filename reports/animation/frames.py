@@ -152,7 +152,8 @@ class Panel:
     def data(self) -> dict[str, Any]:
         """Return the data for the player: rounded, and numbers as the frames from which they have a text and a grade."""
         values = {"size": self.solid.size, "tip": self.tip, "q": np.roll(to_quaternion(self.R_WP), -1, axis=1), "L": self.L_W}
-        texts = [[self.text(name, frame) for frame in range(len(self.R_WP))] for name in self.sizes]
+        numbers = [[self.number(name, frame) for frame in range(len(self.R_WP))] for name in self.sizes]
+        texts = [[(f"{symbol} {size}", grade) for symbol, size, grade in track] for track in numbers]
         starts = [[next(same) for _, same in groupby(enumerate(track), lambda pair: pair[1])] for track in texts]
         shown = [[(frame, *text) for frame, text in start] for start in starts]
         return {name: value.round(4).ravel().tolist() for name, value in values.items()} | {
@@ -160,13 +161,13 @@ class Panel:
             "sizes": shown,
         }
 
-    def text(self, name: str, frame: int) -> tuple[str, str]:
-        """Return the number of a frame in `sizes` as tables show it, rounded up, and its grade."""
+    def number(self, name: str, frame: int) -> tuple[str, str, str]:
+        """Return the symbol, the number and the grade of a frame in `sizes`: as tables show it, rounded up."""
         value = float(self.sizes[name][frame])
         good, fair = LIMITS.get(name, (1e-10, 1e-3))
         symbol, grade = ("✓", "good") if value <= good else ("≈", "fair") if value <= fair else ("✗", "bad")
         shown = angle(value) if name == ERROR else bound(value)
-        return f"{symbol} {shown if value >= 1e-15 else '< 1e-15'}", grade
+        return symbol, shown if value >= 1e-15 else "< 1e-15", grade
 
 
 def speeds(duration: float) -> list[float]:

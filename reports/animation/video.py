@@ -227,11 +227,11 @@ def _write_numbers(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: 
         text = _ascii(panel.outcome)
         sheet.text(middle, y, text, sheet.fit(text, 8, room), anchor="ma")
         y += LINE
-    rows = [(f"{_ascii(name)}: ", *panel.text(name, frame)) for name in panel.sizes]
-    widest = max((sheet.width(name + "1.1e-11", 8) for name, _, _ in rows), default=0.0)  # the same in all frames
+    rows = [(f"{_ascii(name)}: ", *panel.number(name, frame)) for name in panel.sizes]
+    widest = max((sheet.width(name + "1.1e-11", 8) for name, *_ in rows), default=0.0)  # the same in all frames
     size = 8 * min(1.0, (room - LINE) / max(widest, 1e-9))
-    for name, value, grade in rows:
+    for name, _, size_text, grade in rows:
         left = middle - widest * size / 16 - LINE / 2
         sheet.chip(left, y, GRADES[grade])
-        sheet.text(left + LINE, y, name + _ascii(value.partition(" ")[2]), size)
+        sheet.text(left + LINE, y, name + _ascii(size_text), size)
         y += LINE

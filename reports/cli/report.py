@@ -65,7 +65,7 @@ from .options import (
     metavar="S",
     help="Time budget per run, s. Slower methods get fewer points. Slow runs of a study on a scene, such as runs with a "
     "potential in Python, may take up to 100 budgets together; further ones are skipped, with the reason. A run beyond ten "
-    "times the budget (at least 60 s) is stopped.  [default: 0.15, with --full 0.6]",
+    "times the budget (at least 60 s) is stopped.  [default: 0.15; with --full or --engines 0.6]",
 )
 @click.option("--png", is_flag=True, help="Write pictures as PNG as well as SVG.")
 @click.option("--latex", is_flag=True, help="Write a table of errors, drifts, orders and times as LaTeX, report.tex.")

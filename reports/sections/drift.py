@@ -60,7 +60,7 @@ def _why_early(drifts: pd.DataFrame) -> str:
         parts.append(f"The exact motion is drawn for one duration, {ends.pop(lines.EXACT):.3g} s.")
     if ends:
         names = ", ".join(f"{name} ({end:.3g} s)" for name, end in ends.items())
-        parts.append(f"Lines that end early: {names}. Longer runs failed, or exceed the time budget.")
+        parts.append(f"Lines that end early: {names}. Longer runs failed, exceed the time budget, or have too many samples.")
     return "".join(f" {part}" for part in parts)
 
 

@@ -83,7 +83,8 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     cases = part("hard cases", lambda: hard_cases.sections(measured.rows))
     details += [cases] if isinstance(cases, Paragraph) else cases
     details.append(part("failures", lambda: failures.section(measured.together)))
-    paper = part("table for a paper", lambda: closing.paper_table(rows, points, plan.scenes)) if plan.latex else None
+    make_table = partial(closing.paper_table, measured.together, points, plan.scenes)
+    paper = part("table for a paper", make_table) if plan.latex else None
     if isinstance(paper, Paragraph):
         details.append(paper)
         paper = None

@@ -72,7 +72,7 @@ def test_a_number_of_a_panel_is_never_below_its_value(motions):
     for each in (panel, turned):
         for name, values in each.sizes.items():
             for frame, value in enumerate(values[values >= 1e-15]):
-                shown = float(each.text(name, frame + np.sum(values < 1e-15))[0].split()[1].replace("π", str(np.pi)))
+                shown = float(each.number(name, frame + np.sum(values < 1e-15))[1].replace("π", str(np.pi)))
                 assert value * (1 - 1e-14) <= shown <= min(value * 1.1, np.pi if name == ERROR else np.inf)
     assert len(panel.sizes) == 3
 

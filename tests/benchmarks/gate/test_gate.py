@@ -164,6 +164,8 @@ def test_runs_that_disagree_are_refused():
         {"values": {"rate error max": float("nan")}},
         {"values": {"iterations": float("inf")}},
         {"values": {results.ENERGY_DRIFT: 1.01}},
+        {"spreads": {results.ENERGY_DRIFT: float("nan")}},
+        {"spreads": {results.ENERGY_DRIFT: -1.0}},  # the limit would be on the other side of the value
     ],
 )
 def test_a_failure_cannot_be_accepted(changes):
@@ -314,6 +316,13 @@ def test_a_violation_has_the_value_before_and_now_and_the_limit():
     ]
     assert "| observed order | brick | reduced | 2 | 1.9 |" in verdict.markdown_text()
     assert "--update" in str(verdict)
+
+
+def test_a_limit_that_is_no_number_is_reached_by_no_value():
+    (kept,) = KEPT.rows.values()
+    measures = {name: replace(allowed, limit=float("nan")) for name, allowed in kept.measures.items()}
+    without = replace(KEPT, rows={ROW.id: replace(kept, measures=measures)})
+    assert failures(without, RUN) == {(name, "reduced") for name in measures}
 
 
 TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
