@@ -6,7 +6,7 @@ Two statistics of times use it, because they answer different questions:
   measured once, in few processes. Its interval is therefore `widened`.
 * A ratio of two versions (`versions.times`) compares the faster halves of the processes: the place of code in memory makes some
   processes slower, in either version, and no change of the code explains it. Slower rows are measured again, which keeps false
-  alarms out. Of 400 rows that are 8 % slower, 287 are caught (seven processes that scatter by 2 %), and 210 if widened.
+  alarms out; a widened interval would miss more rows that are slower.
 """
 
 from __future__ import annotations

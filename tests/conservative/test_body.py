@@ -154,6 +154,13 @@ def test_a_cone_on_its_tip_is_the_papers_top():
     np.testing.assert_allclose(cone.gravity(9.81).moment_B, top.potential.moment_B, rtol=1e-14)  # measured 2e-16
 
 
+def test_a_shape_beside_its_fixed_point_turns_about_it():
+    shape = shapes.box((1, 2, 3), mass=1.7).about((0.3, -0.2, 0.5))
+    turned = shape.rotate(R_BS)
+    np.testing.assert_allclose(turned.com_B, R_BS @ shape.com_B, atol=1e-15)
+    np.testing.assert_allclose(turned.inertia, R_BS @ shape.inertia @ R_BS.T, atol=1e-14)  # measured 9e-16
+
+
 def test_scipy_rotations_are_accepted_as_attitudes():
     rotation = Rotation.from_matrix(R_BS)
     shape = shapes.box((1, 2, 3), mass=1.7)

@@ -230,6 +230,17 @@ def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
     assert choice.grid.dt < steps[0] * 5e5 ** (-1 / choice.method.order)
 
 
+def test_the_estimate_is_the_largest_of_all_bodies_that_are_tried(monkeypatch):
+    """Bodies that only verify a step can have a larger error than those that chose it, as long as it is allowed."""
+    bodies = read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), *starts(100), None, None)
+    last = shared_choice.pick(bodies)[-1]
+    monkeypatch.setattr(
+        shared_choice, "find_worst", lambda bodies, numbers, *_: (Estimate(9e-7 if last in numbers else 4e-7, 0.0), numbers[-1])
+    )
+    choice = shared_choice.choose_for_all(bodies, 1e-6, 2.0, SampleTimes(None, 1))
+    assert (choice.estimate, choice.reached) == (9e-7, True)
+
+
 def test_an_error_below_round_off_is_a_warning():
     with pytest.warns(cv.AccuracyNotReached):
         found = cv.integrate_many(scene(body=BODY), *starts(3), error=1e-18, t_end=1.0)
@@ -571,6 +582,7 @@ REFUSED = {
     "nan weight": ({"parameters": {"weight": changed(np.ones(THOUSAND), 8, np.nan)}}, r"^parameters\['weight'\]\[8\]: got nan"),
     "huge lever": ({"parameters": {"com_B": changed(W, 8, 1e101)}}, r"^parameters\['com_B'\]\[8\]: got \[1e\+101"),
     "stiffness": (bad_field("spring", "stiffness", 0.0), r"^parameters\['stiffness'\]\[2\]: got 0.0"),
+    "rest length": (bad_field("rest length", "rest_length", -1.0), r"^parameters\['rest_length'\]\[2\]: got -1.0"),
     "rate": (bad_field("gradient", "rate", -1.0), r"^parameters\['rate'\]\[2\]: got -1.0"),
     "inertia of a field": (
         bad_field("gradient", "inertia", -np.eye(3)),

