@@ -54,7 +54,7 @@ ATTITUDE = Measure.ATTITUDE_MAX.text
 LOST, OTHER, FAR = 0.1, 1.0, 3.0
 """Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
 than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
-ANOTHER_SCENE = Outcome(OutcomeKind.SKIPPED, "the scene is another one")
+ANOTHER_SCENE = Outcome(OutcomeKind.OK, "the scene is another one")
 """Outcome of a row that was not measured, because its scene has another definition than in this process."""
 SLOW = 1.0
 """Duration of a run, s, above which a row is measured with fewer points."""
@@ -369,6 +369,8 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
     for when, row in (("was", was), ("is", now)):
         if row is None:
             yield f"{name}: {when} not there"
+        elif row.outcome == ANOTHER_SCENE:
+            yield f"{name}: {when} not measured: {row.outcome.reason}"
         elif row.outcome != OK and row.outcome.kind is not OutcomeKind.UNSUPPORTED:
             yield f"{name}: {when} without values: {row.outcome}"
     if time and time.again and not time.failed:

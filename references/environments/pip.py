@@ -84,11 +84,12 @@ def versions_in(lock: str) -> dict[str, str]:
 def requirements_in(lock: str) -> str:
     """Return the packages of a lock with their hashes as requirements, which a folder of wheels can satisfy without a network.
 
-    A lock has the addresses from which its packages came. Empty if one of them has no version or no hash.
+    A lock has the addresses from which its packages came. Empty if one of them has no version or no hash, or is a file of its
+    own, such as a build, which no folder of wheels has.
     """
     lines = []
     for package in tomllib.loads(lock)["packages"]:
-        files = [*package.get("wheels", ()), *(package[kind] for kind in ("sdist", "archive") if kind in package)]
+        files = [*package.get("wheels", ()), *([package["sdist"]] if "sdist" in package else ())]
         hashes = sorted({f"--hash={kind}:{value}" for file in files for kind, value in file.get("hashes", {}).items()})
         if not hashes or "version" not in package:
             return ""

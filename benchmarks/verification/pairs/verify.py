@@ -449,11 +449,9 @@ def _reduce(description: Description, pair: Pair, scale: float | None, wrong: Ca
             few = count
     if enough < description.n_steps:
         description = replace(description, n_steps=enough, every=enough)
-    both = pair.second(description, *_scaled(scale)).possible  # not of the pair whose second body is impossible on purpose
     for simpler in SIMPLER:
         candidate, _ = to_principal(simpler(description))
-        possible = candidate.possible and (not both or pair.second(candidate, *_scaled(scale)).possible)
-        if possible and wrong(candidate):
+        if candidate.possible and pair.second(candidate, *_scaled(scale)).possible and wrong(candidate):
             description = candidate
     return description
 

@@ -156,7 +156,7 @@ def test_tum_has_its_header_in_a_comment(tmp_path):
 
 @pytest.mark.parametrize("beginning", GONE)
 def test_a_format_that_is_gone_is_answered_with_what_to_do(beginning, tmp_path):
-    file = tmp_path / f"run{GONE[beginning]}"
+    file = tmp_path / ("run.csv.gz" if GONE[beginning] == ".gz" else f"run{GONE[beginning]}")  # not any archive, in a folder
     file.write_bytes(beginning + b"\n0 1 2 3\n1 1 2 3\n")
     for subject in (file, tmp_path):  # a file, and a folder with it
         with pytest.raises(BadInput) as error:
